@@ -97,8 +97,7 @@ def implicit_equations(
 def _add_normal_forces(
     motion: Equations, contacts: Sequence[Contact], shares: Sequence[SX], free: Sequence[SX], stiff: SX
 ) -> Equations:
-    """Add the given shares of the contacts' normal forces (eq. 35)."""
-    mass, force = motion
+    mass, force = motion  # (eq. 35)
     for contact, share, push in zip(contacts, shares, free, strict=True):
         mass = mass + share * stiff * contact.normal @ contact.normal.T
         force = force + share * push * contact.normal

@@ -110,15 +110,12 @@ class Exact:
     exact = True
 
     def root(self, root: Root, inputs: SX) -> SX:
-        """See ``Nonsmooth``."""
         return root.newton(inputs)
 
     def open_roots(self) -> OpenRoots | None:
-        """See ``Nonsmooth``."""
         return None
 
     def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """See ``Nonsmooth``."""
         return start
 
     def acos(self, argument: SX, margin: SX) -> Angle:
@@ -130,11 +127,9 @@ class Exact:
         return Angle(ca.acos(clamped), first, first * clamped / sine_squared)
 
     def abs(self, v: MX) -> MX:
-        """See ``Nonsmooth``."""
         return ca.fabs(v)
 
     def min(self, a: MX, b: MX) -> MX:
-        """See ``Nonsmooth``."""
         return ca.fmin(a, b)
 
     def largest(self, v: MX) -> MX:
@@ -150,7 +145,6 @@ class Exact:
         return below + (switch >= 0) * (above - below)
 
     def tie(self, v: MX) -> MX:
-        """See ``Nonsmooth``."""
         return v
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
@@ -202,12 +196,10 @@ class Lifted:
         return unknowns
 
     def open_roots(self) -> OpenRoots | None:
-        """See ``Nonsmooth``."""
         found, self._open = self._open, []
         return OpenRoots(*(ca.vertcat(*parts) for parts in zip(*found, strict=True))) if found else None
 
     def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """See ``Nonsmooth``."""
         columns = start.shape
         lifted = self._lift("root", ca.vec(start), lambda v: ca.vec(residual(ca.reshape(v, *columns))), tight=True)
         return ca.reshape(lifted, *columns)

@@ -108,7 +108,6 @@ def _raise_degree(values: list[SX], knots: Array, degree: int, phase: SX) -> lis
 
 
 def _differentiate(values: list[SX], knots: Array, degree: int, _: SX) -> list[SX]:
-    """Return the derivatives of the basis functions of the next degree."""
     one = SX(degree)
     return [
         _divide(one, knots[i + degree] - knots[i]) * values[i]

@@ -12,10 +12,11 @@ import nlp_gait
 from compare.study.run_study import Study, run_study
 from compare.study.run_task import try_task
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait.backends.solvers import iteration_watch, nlpsol
+from nlp_gait.backends.solvers import nlpsol
+from nlp_gait.backends.solvers import solver as solver_module
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.backends.solvers.iteration_watch import IterationWatch
 from nlp_gait.backends.solvers.registry import make_solver
+from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.errors import InputError
 
 WALK = ProblemSpec(name="walk12")
@@ -40,7 +41,7 @@ def test_ipopt_says_so_and_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -
     problem = nlp_gait.load("walk12")
     nlp_gait.solve(problem)  # what is built is built
     clock = iter(range(10_000))
-    monkeypatch.setattr(iteration_watch.time, "perf_counter", lambda: float(next(clock)))
+    monkeypatch.setattr(solver_module.time, "perf_counter", lambda: float(next(clock)))
     solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=4.0))
     assert not solution.converged and "stopped at the time limit" in solution.status
     assert 1 <= solution.iterations <= 4
@@ -54,7 +55,7 @@ def test_the_limit_is_for_all_stages_of_a_run(monkeypatch: pytest.MonkeyPatch) -
     problem = nlp_gait.load("nao-ssp")
     whole = nlp_gait.solve(problem)
     clock = iter(range(10_000))
-    monkeypatch.setattr(iteration_watch.time, "perf_counter", lambda: float(next(clock)))
+    monkeypatch.setattr(solver_module.time, "perf_counter", lambda: float(next(clock)))
     solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=whole.iterations - 3.0))
     assert solution.starts[0].status == "stopped at the time limit"
     assert 0 < solution.iterations < whole.iterations

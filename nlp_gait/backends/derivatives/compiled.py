@@ -103,14 +103,12 @@ class CompiledNlp:
             )
 
     def _evaluate_gradient(self, w: Array, p: Array, weights: Array) -> Array:
-        """Return the gradient of the Lagrangian."""
         (_, slope), (_, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
         return _numbers([slope + J.T @ weights])
 
 
 @cache
 def _hash_generator() -> str:
-    """Return a hash of the code that writes the source."""
     digest = hashlib.sha256(files("nlp_gait.symbolic").joinpath("tape.py").read_bytes())
     backends = files("nlp_gait.backends")
     for folder in ("derivatives", "derivatives/native", "kernel/native"):

@@ -116,7 +116,6 @@ def _split(text: str) -> tuple[str, ...] | None:
 
 
 def _run(command: Sequence[str], time_limit_s: float) -> str:
-    """Run a program, and return its standard output."""
     program = Path(command[0]).name
     read_end, write_end = os.pipe()
     try:

@@ -16,8 +16,7 @@ import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
 from nlp_gait.backends.nlp import WIDTHS, build_nlp
-from nlp_gait.backends.solvers.iteration_watch import REASONS, IterationWatch
-from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
+from nlp_gait.backends.solvers.solver import REASONS, IterationWatch, Solver, count_evaluations, judge_point
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import make_temporary_folder
@@ -103,7 +102,6 @@ class IpoptSettings(Solver):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
     def choose_settings(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
-        """See ``Solver``."""
         # The cache folder has no influence: compiled and interpreted functions differ in the last bits, and the same call must
         # give the same result.
         pays = solves * build_nlp(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
@@ -130,11 +128,9 @@ class IpoptSettings(Solver):
             return replace(self, compiled=False).prepare(problem)
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """See ``Solver``."""
         return self.prepare(problem).run(problem, x0, stop)
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
-        """See ``Solver``."""
         return self.prepare(problem).run_from(problem, near, stop)
 
 

@@ -18,8 +18,14 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, REASONS, IterationWatch
-from nlp_gait.backends.solvers.solver import Solver, count_evaluations, judge_point
+from nlp_gait.backends.solvers.solver import (
+    INTERRUPTED,
+    REASONS,
+    IterationWatch,
+    Solver,
+    count_evaluations,
+    judge_point,
+)
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -73,13 +79,11 @@ class CasadiSolver(Solver):
     time_limit_s: ClassVar[float | None] = None
 
     def check(self, problem: GaitProblem) -> None:
-        """See ``Solver``."""
         reason = probe(self.name)
         if reason is not None:
             raise InputError(f"NLP solver {self.name!r} does not run in this installation: {reason}")
 
     def to_dict(self) -> dict[str, Any]:
-        """See ``Solver``."""
         return {"kind": self.name}
 
     @lock_casadi

@@ -46,16 +46,13 @@ class Slsqp(Solver):
     time_limit_s: float | None = None
 
     def check(self, problem: GaitProblem) -> None:
-        """See ``Solver``."""
         if self.evaluations <= len(problem.names):
             raise InputError(f"slsqp needs at least {len(problem.names) + 1} evaluations for one gradient")
 
     def to_dict(self) -> dict[str, Any]:
-        """See ``Solver``."""
         return {"kind": "SLSQP", "step": STEP, "ftol": TOLERANCE, "evaluations": self.evaluations}
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """See ``Solver``."""
         from scipy.optimize import minimize
 
         started = time.perf_counter()

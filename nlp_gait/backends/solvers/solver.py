@@ -1,18 +1,26 @@
-"""The interface of an NLP solver: one run of a problem from one start point."""
+"""The interface of an NLP solver: one run of a problem from one start point; and a callback that ends runs."""
 
 from __future__ import annotations
 
+import math
+import threading
+import time
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import Any, ClassVar, Protocol
 
+import casadi as ca
 import numpy as np
+from casadi import MX
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import never
+
+INTERRUPTED, TIME_IS_UP = "Interrupted", "Maximum_WallTime_Exceeded"
+REASONS = {INTERRUPTED: "was interrupted", TIME_IS_UP: "stopped at the time limit"}
 
 
 class Solver(Protocol):
@@ -84,3 +92,53 @@ def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
         jacobian=calls("nlp_jac_g", "nlp_jac_fg"),
         hessian=calls("nlp_hess_l"),
     )
+
+
+class IterationWatch(ca.Callback):
+    """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
+
+    def __init__(self, nlp: Mapping[str, MX], shared: IterationWatch | None = None) -> None:
+        """Make a watch for an NLP.
+
+        Args:
+            nlp: CasADi's dictionary of x, p, f, g.
+            shared: another watch, whose ``begin`` applies to this one too.
+        """
+        ca.Callback.__init__(self)
+        n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))
+        self._sizes = {"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": k}
+        self._of_thread: threading.local = threading.local() if shared is None else shared._of_thread
+        self.construct("watch", {})
+
+    def begin(self, stop: Callable[[], bool], deadline: float) -> None:
+        """Watch the next run of this thread.
+
+        Args:
+            stop: returns whether the run should end.
+            deadline: of ``time.perf_counter`` [s].
+        """
+        self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
+
+    @property
+    def reason(self) -> str:
+        """Why the watch ended the run of this thread, as IPOPT would report it; empty if it did not."""
+        return getattr(self._of_thread, "reason", "")
+
+    def get_n_in(self) -> int:
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(i)], 1)
+
+    def eval(self, iterate: object) -> list[int]:
+        """Return 1 to end the run, 0 to continue."""
+        stop = getattr(self._of_thread, "stop", never)
+        deadline = getattr(self._of_thread, "deadline", math.inf)
+        if stop():
+            self._of_thread.reason = INTERRUPTED
+        elif time.perf_counter() >= deadline:
+            self._of_thread.reason = TIME_IS_UP
+        return [int(bool(self.reason))]

@@ -17,7 +17,7 @@ from casadi import MX
 from numpy.typing import NDArray
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NO_OTHERS
-from nlp_gait.backends.solvers.iteration_watch import IterationWatch
+from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.formulation import Array
 
 Rows = NDArray[np.bool_]

@@ -11,7 +11,7 @@ import pytest
 from casadi import MX
 
 from nlp_gait.backends.solvers.ipopt import QUIET, IpoptSettings
-from nlp_gait.backends.solvers.iteration_watch import INTERRUPTED, IterationWatch
+from nlp_gait.backends.solvers.solver import INTERRUPTED, IterationWatch
 from nlp_gait.backends.solvers.working_set import WorkingSet
 from nlp_gait.formulation import load
 from nlp_gait.interrupts import never

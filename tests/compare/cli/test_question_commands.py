@@ -13,7 +13,7 @@ from compare.questions.motors import study as motors
 from compare.questions.pareto import front as pareto_front
 from compare.questions.prices import study as prices
 from compare.questions.robust import study as robust
-from nlp_gait.backends.solvers.iteration_watch import IterationWatch
+from nlp_gait.backends.solvers.solver import IterationWatch
 from tests.compare.cli.calls import nlp_gait, one_sentence
 
 # Three free variables, so that both the front and a search of one generation take no time.
