@@ -75,8 +75,7 @@ def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
 
 
 def _robot(name: str, out: Path | None, as_json: bool) -> None:
-    from nlp_gait.gaits.humanoid.body import make_humanoid
-    from nlp_gait.gaits.humanoid.report import understood_of
+    from nlp_gait.gaits.humanoid.body import describe_humanoid, make_humanoid
 
     target = None if out is None else output_file(out)
     log = logging.getLogger("nlp_gait")
@@ -86,7 +85,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
         body = make_humanoid(name)
     finally:
         log.setLevel(level)
-    facts, notes = understood_of(body), body.biped.full.notes
+    facts, notes = describe_humanoid(body), body.biped.full.notes
     if as_json:
         print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}, "notes": list(notes)})
     else:

@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.humanoid.newton import newton_steps, residuals
-from nlp_gait.gaits.nao.joints import LEG_JOINTS
-from nlp_gait.gaits.nao.legs import leg_geometry
+from nlp_gait.gaits.humanoid.body import compute_residuals, count_newton_steps
+from nlp_gait.gaits.nao.joints import LEG_JOINTS, measure_leg
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped
 from nlp_gait.robots.leg import Leg
@@ -46,7 +45,7 @@ def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
     spin = y * pitch.velocity + about * roll.velocity
     rate = y * pitch.acceleration + about * roll.acceleration + ca.cross(y, about) * pitch.velocity * roll.velocity
     torso = TorsoMotion(rotation, spin, rate, np.zeros(3), place)
-    found = leg_motion(leg, newton_steps(leg), torso, SX(0.01), Exact(), held=True)
+    found = leg_motion(leg, count_newton_steps(leg), torso, SX(0.01), Exact(), held=True)
     return leg, ca.Function("leg", [*place, *roll, *pitch], [*found.joints, found.miss, found.reach])
 
 
@@ -95,7 +94,7 @@ def test_the_guess_is_exact_where_hip_and_ankle_axes_meet(robots: dict[str, Robo
     meeting = np.array([*[leg.hip_m] * 3, leg.points[3], *[leg.ankle_m] * 2])
     turns = Rotation.from_rotvec(0.2 * np.random.default_rng(3).standard_normal((6, 3)))
     skew = replace(leg, points=meeting, axes=turns.apply(leg.axes))
-    left = residuals(skew, 0, sample_flat_foot_poses(skew, POSES))
+    left = compute_residuals(skew, 0, sample_flat_foot_poses(skew, POSES))
     assert np.mean(left < PLACE_TOLERANCE) > 0.6
 
 
@@ -124,7 +123,7 @@ def test_naos_leg_is_the_closed_forms() -> None:
     """To 5e-15 rad in angles; accelerations to the rounding of a system of six equations."""
     robot = load_robot("nao-v5")
     leg, solve = leg_function(robot, "left")
-    geometry = leg_geometry(robot, "L")
+    geometry = measure_leg(robot, "L")
     motion = Motion(*(SX.sym(name, 3) for name in ("p", "v", "a")))
     closed = leg_angles(motion, geometry.thigh_m, geometry.tibia_m, SX(0.01), Exact())
     form = ca.Function("form", list(motion), list(closed.joints))

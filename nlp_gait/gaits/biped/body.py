@@ -15,7 +15,7 @@ from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Limit, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
-from nlp_gait.gaits.biped.skeleton import skeleton
+from nlp_gait.gaits.biped.skeleton import make_skeleton
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
@@ -236,4 +236,4 @@ class Body(ABC):
     @property
     def skeleton(self) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
         """Function that draws the robot."""
-        return skeleton(self.full)
+        return make_skeleton(self.full)

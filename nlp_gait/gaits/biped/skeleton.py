@@ -27,18 +27,18 @@ ON_GROUND = 1e-6  # [m]; a higher sole does not bear load
 SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs are fingers and cameras
 
 
-def skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
+def make_skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
     """Return the function that draws a robot; joints that a gait does not move are at zero."""
-    return lambda signals, parameters: _skeleton(robot, signals)
+    return lambda signals, parameters: _draw(robot, signals)
 
 
-def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
-    arrays, at = signals.arrays, _link_origins(robot, signals)
+def _draw(robot: Robot, signals: Signals) -> Skeleton:
+    arrays, at = signals.arrays, locate_links(robot, signals)
     limbs, soles = [], []
     for side in (LEFT, RIGHT):
         leg = [at[link] for link in _chain(robot, robot.feet[side].link)]
         limbs.append(Limb(side=side, points=np.stack([*leg, arrays[f"{side}_foot"]], axis=1)))
-        soles.append(level_sole(robot, side, arrays[f"{side}_foot"]))
+        soles.append(make_level_sole(robot, side, arrays[f"{side}_foot"]))
     feet = {link for side in (LEFT, RIGHT) for link in _chain(robot, robot.feet[side].link)[1:]}
     height = -min(float(_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
     for tip in _tips(robot):
@@ -53,7 +53,7 @@ def _skeleton(robot: Robot, signals: Signals) -> Skeleton:
     return make_flat_skeleton(signals, limbs, soles)
 
 
-def level_sole(robot: Robot, side: str, centre: Array) -> Sole:
+def make_level_sole(robot: Robot, side: str, centre: Array) -> Sole:
     """Return the sole of a foot that stays level, from the point under its ankle (T, 3) [m]."""
     foot = robot.feet[side]
     outline = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
@@ -70,24 +70,24 @@ def _tips(robot: Robot) -> list[str]:
 
 
 def _at_zero(robot: Robot, link: str) -> Array:
-    """(3,) of a link's joint from the root at zero angles [m]."""
+    """Position (3,) of a link's joint from the root at zero angles [m]."""
     return np.sum([(0.0, 0.0, 0.0), *(joint.origin_m for joint in robot.path_to_root(link))], axis=0)
 
 
-def _link_origins(robot: Robot, signals: Signals) -> dict[str, Array]:
-    """World positions (T, 3) of every link's joint, seen from the left foot, which is flat."""
+def locate_links(robot: Robot, signals: Signals) -> dict[str, Array]:
+    """Return world positions (T, 3) of every link's joint, and of its tip, the centre of mass, seen from the flat left foot."""
     q, base = SX.sym("q", len(signals.joints)), SX.sym("base", 3)
     angles = {name: SX(0) for name in robot.joints} | {name: q[i] for i, name in enumerate(signals.joints)}
     tree = tree_from(robot, robot.feet[LEFT].link)
-    poses = forward_kinematics(tree, angles, base)
-    origins: dict[str, SX] = {}
-    for body, pose in zip(tree, poses, strict=True):
+    places: dict[str, SX] = {}
+    for body, pose in zip(tree, forward_kinematics(tree, angles, base), strict=True):
         # A body's reference point is the joint by which it is reached; its own joint is elsewhere where that leads up.
         own = robot.joint_to.get(body.link.name)
         upwards = body.joint is not None and body.direction < 0
         offset = np.array(body.com_offset_m) - np.array(body.link.com_m) if upwards or own is None else np.zeros(3)
-        origins[body.link.name] = pose.position + pose.rotation @ ca.DM(offset)
-    function = ca.Function("origins", [q, base], list(origins.values()))
+        places[body.link.name] = pose.position + pose.rotation @ ca.DM(offset)
+        places[f"{body.link.name} tip"] = pose.com
+    function = ca.Function("places", [q, base], list(places.values()))
     standing = signals.arrays["left_foot"] + np.array([0.0, 0.0, robot.feet[LEFT].ankle_height_m])
     values = function.map(len(signals.arrays["t"]))(signals.arrays["q"].T, standing.T)
-    return {name: np.array(value.full().T) for name, value in zip(origins, values, strict=True)}
+    return {name: np.array(value.full().T) for name, value in zip(places, values, strict=True)}

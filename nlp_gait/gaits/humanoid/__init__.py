@@ -1,19 +1,19 @@
 """Single support, double support and walking cycle of any humanoid with two legs of six turning joints.
 
-The published phases of NAO (Gupta, Pratihar, Deb 2023) with the robot found in its file, legs of any build, and a torso that may
-lean. Lengths are NAO's times lambda, the ratio of the legs' lengths; velocities and times go with its root, so that Froude
-numbers are equal; torques with lambda times the ratio of the masses. Arms and all else that is no leg stay in a posture.
+The published phases of NAO (Gupta, Pratihar, Deb 2023) with a robot inferred from its file, legs of any build, and a torso that
+may lean. Lengths are NAO's times lambda, the ratio of the legs' lengths; velocities and times scale with its root, so that Froude
+numbers are equal; torques with lambda times the ratio of the masses. Arms and other joints are held in a posture.
 
 Options that the problems share:
 
     robot                  file of the robot, URDF, MJCF or JSON; or a name
     intervals              equal parts of a phase over which torques may change by the limit
     step_length_m          from foot to foot; 0 for NAO's 0.06 m times lambda
-    drive_limits           whether torques and speeds must be within what the robot's file says
-    trajectory             of hip, swing foot and torso: cubics, or more coefficients on top of them
+    drive_limits           whether torques and speeds must be within the limits of the robot's file
+    trajectory             of hip, swing foot and torso: cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory
     objective              what is minimised: power, joint jerk, or the rate of torques; of a cycle energy per metre, or power
-    motors                 what of the real motors is taken into account, see ``gaits.biped.motors``, where the file has them
+    motors                 features of the real motors, see ``gaits.biped.motors``, if the file has their data
     torso_share            in double support: lever shares the torso's mass by the lever rule, free plans the ground's wrench
     load_degree            of that wrench's polynomials over double support
 """

@@ -11,20 +11,26 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import InstantPoint, Variable
+from nlp_gait.formulation import Array, InstantPoint, Variable
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
-from nlp_gait.gaits.biped.limits import Margins
+from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.single_support import nearest_edge_margins
-from nlp_gait.gaits.humanoid.newton import newton_steps
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped
-from nlp_gait.robots.leg import LEG_JOINT_COUNT
-from nlp_gait.symbolic.general_leg import TorsoMotion, compute_reach, leg_motion
+from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
+from nlp_gait.symbolic.general_leg import (
+    POSES,
+    TorsoMotion,
+    compute_reach,
+    leg_motion,
+    make_leg_root,
+    sample_flat_foot_poses,
+)
 from nlp_gait.symbolic.kinematics import axis_rotation
-from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
 GRAVITY = 9.81  # [m/s^2]
@@ -37,6 +43,9 @@ LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 STEP_M = 0.06  # NAO's, from foot to foot
+# Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
+NEARLY_CLOSED, CLOSED, SHARE = 1e-9, 1e-12, 0.995
+MOST_STEPS = 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -187,5 +196,72 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         time_scale=biped.time_scale,
         torque_scale=biped.torque_scale,
         biped=biped,
-        newton_steps={side: newton_steps(leg) for side, leg in biped.legs.items()},
+        newton_steps={side: count_newton_steps(leg) for side, leg in biped.legs.items()},
     )
+
+
+def count_newton_steps(leg: Leg) -> int:
+    """Return the steps that a leg needs after the guess: none if that is exact, else one more than closes nearly all poses.
+
+    Raises:
+        InputError: it needs too many.
+    """
+    inputs = sample_flat_foot_poses(leg)
+    for steps in range(MOST_STEPS):
+        left = compute_residuals(leg, steps, inputs)
+        if steps == 0 and np.quantile(left, SHARE) <= CLOSED:
+            return 0
+        if np.quantile(left, SHARE) <= NEARLY_CLOSED:
+            return steps + 1
+    raise InputError(
+        f"the leg of joints {', '.join(leg.joints)} is not solved in {MOST_STEPS} Newton steps: its hip axes pass each other too "
+        f"far, or its ankle's; after {MOST_STEPS - 1} steps {100 * float(np.mean(left <= NEARLY_CLOSED)):.0f} % of "
+        f"{POSES} poses are closed"
+    )
+
+
+def compute_residuals(leg: Leg, steps: int, inputs: Array) -> Array:
+    """Compute the largest residual of each pose (N,) after a number of steps."""
+    symbols = SX.sym("inputs", len(inputs))
+    root = make_leg_root(leg, steps, Exact(), SX(0.0))
+    left = root.residual(root.newton(symbols), symbols)
+    function = ca.Function("residual", [symbols], [left])
+    return np.abs(np.array(function.map(inputs.shape[1])(inputs))).max(axis=0)
+
+
+def describe_humanoid(body: Humanoid) -> list[tuple[str, str]]:
+    """Return what was inferred from a robot's file as pairs of texts: feet, legs, soles, posture, sizes."""
+    biped = body.biped
+    robot, legs = biped.full, biped.legs
+    held = {name: angle for name, angle in biped.posture_rad.items() if angle}
+    rows = [("root", robot.root), ("mass", f"{robot.mass_kg:.2f} kg, {biped.mass_scale:.2f} times NAO's (mu)")]
+    for side in BOTH_FEET.values():
+        leg, foot = legs[side], robot.feet[side]
+        rows.append((f"{side} leg", ", ".join(leg.joints)))
+        rows.append(
+            (
+                f"{side} sole",
+                f"{1e3 * (foot.front_m + foot.back_m):.0f} mm by {1e3 * (foot.left_m + foot.right_m):.0f} mm, "
+                f"{1e3 * foot.front_m:.0f} mm ahead of the joint of {foot.link}, {1e3 * foot.ankle_height_m:.0f} mm high",
+            )
+        )
+    left = legs["left"]
+    most = max(body.newton_steps.values())
+    rows += [
+        ("leg length", f"{biped.leg_length_m:.4f} m, {biped.length_scale:.3f} times NAO's (lambda)"),
+        (
+            "straight knee",
+            f"at {left.straight_rad:z.4f} rad, bends to {'larger' if left.bend > 0 else 'smaller'} angles",
+        ),
+        ("inverse kinematics", f"by {most} Newton steps" if most else "in closed form"),
+        (
+            "held joints",
+            f"{len(biped.posture_rad)}, at zero"
+            + (" but " + ", ".join(f"{name} {angle:+.3f} rad" for name, angle in held.items()) if held else ""),
+        ),
+        ("heat constant K", f"{biped.heat_W_per_Nm2:.3g} W/(Nm)^2, {biped.heat_source}"),
+        ("step length", f"{body.step_length_m:.3f} m by default"),
+        ("time of a swing", f"{body.scale_time(0.4):.3g} to {body.scale_time(4.0):.3g} s"),
+        ("torque may change", f"by {TORQUE_CHANGE_NM * biped.torque_scale:.3g} Nm over an interval"),
+    ]
+    return rows

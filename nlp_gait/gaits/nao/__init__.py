@@ -1,4 +1,6 @@
-"""Gupta, Pratihar, Deb (2023): NAO's single and double support, and what they leave open.
+"""Gupta, Pratihar, Deb (2023): NAO's single and double support, also with free joints, and a walking cycle.
+
+Variables of both phases are in the paper's order, x1 to x9 and x1 to x8.
 
 Options that the problems share:
 
@@ -7,14 +9,12 @@ Options that the problems share:
     derivatives            analytic, or finite-difference: of the sampled angles, as in the paper
     rotational_inertia     false takes every link as a point mass, in torques and ZMP
     step_length_m          from foot to foot
-    torso_share            how the torso's mass is shared between the legs in double support, see
-                           ``double_support.torso_shares``; free plans the ground's wrench on the second foot instead
+    torso_share            rule that divides the torso's mass between the legs in double support, see
+                           ``load_sharing.torso_shares``; free plans the ground's wrench on the second foot instead
     load_degree            of that wrench's polynomials over double support
-    trajectory             of hip, swing foot and arms, or of every free joint: the paper's cubics, or more coefficients on
-                           top of them
+    trajectory             of hip, swing foot and arms, or of every free joint: the paper's cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
-                           cubics, 4 with splines and with planned loads, which would else bend between the samples
+                           cubics, 4 with splines and with planned loads, which would otherwise bend between the samples
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
-    motors                 what of the real motors is taken into account, separated by commas, see ``motors``; nothing by
-                           default
+    motors                 features of the real motors, separated by commas, see ``gaits.biped.motors``; none by default
 """

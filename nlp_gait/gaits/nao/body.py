@@ -20,10 +20,10 @@ from nlp_gait.gaits.nao.joints import (
     LEG_JOINTS,
     PLANNED_JOINTS,
     RESTING_ARM_ANGLES,
+    measure_leg,
 )
-from nlp_gait.gaits.nao.legs import GREATEST_HEIGHT_SHARE, LEAST_HEIGHT_SHARE, leg_geometry
 from nlp_gait.gaits.nao.motors import parse_nao_motors
-from nlp_gait.gaits.nao.skeleton import skeleton
+from nlp_gait.gaits.nao.skeleton import make_skeleton
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.mirror import partner
 from nlp_gait.robots.tree import point_masses, weld
@@ -33,6 +33,9 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 
+# Section 4: the torso's origin is 0.25 to 0.31 m high. With NAO's ankles, hips and legs of 0.2029 m the distance of hip and ankle
+# is then 0.5905 to 0.8862 leg lengths, which is taken for other robots, to the millimetre.
+LEAST_HEIGHT_SHARE, GREATEST_HEIGHT_SHARE = 0.5905, 0.8862
 ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {  # [rad]
     "ssp": {  # Table 3, rows 6 to 9
         "LShoulderPitch": (2.0, 1.0),
@@ -77,7 +80,7 @@ def load_nao(robot: str) -> Robot:
         raise InputError(f"robot {loaded.name!r} does not suit the NAO problems: {error}") from error
     welded = weld(loaded, [joint for joint in loaded.joints if joint not in JOINTS])
     for side in "LR":
-        leg_geometry(welded, side)
+        measure_leg(welded, side)
     return welded
 
 
@@ -94,7 +97,7 @@ def upright_plan(
     joints: dict[str, Motion] = {}
     reach = []
     for side, ankle in ankles.items():
-        geometry = leg_geometry(robot, side)
+        geometry = measure_leg(robot, side)
         hip_to_ankle = Motion(
             ankle.position - hip.position - DM(geometry.hip_m),
             ankle.velocity - hip.velocity,
@@ -189,7 +192,7 @@ class NaoBody(Body):
 
     @property
     def skeleton(self) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-        return skeleton(self.full)
+        return make_skeleton(self.full)
 
 
 def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -> NaoBody:
@@ -204,7 +207,7 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -
         InputError: the robot or its motors do not suit the NAO problems.
     """
     simulated = load_nao(robot)
-    left, right = (leg_geometry(simulated, side) for side in "LR")
+    left, right = (measure_leg(simulated, side) for side in "LR")
     leg_length = left.thigh_m + left.tibia_m
     ground = left.ankle_height_m - left.hip_m[2]
     return NaoBody(

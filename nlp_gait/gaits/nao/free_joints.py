@@ -1,9 +1,9 @@
 """NAO on its left foot with free joints between the paper's ends: the lower bound of all plans of hip, foot and arms.
 
-Each joint's angle is a cubic between the ends plus a spline that leaves the ends alone. At both ends the robot is where the paper
-puts it: torso upright at the paper's hip positions with the hip's velocities as variables, both soles flat and at rest, arms at
-rest. In between every joint of the legs is free, the coupled yaw-pitch of the hips with them, and so are those of the arms that
-the paper swings: the torso leans and turns, the swing foot tilts and leaves its line.
+Each joint's angle is a cubic between the ends plus a spline that leaves the ends unchanged. At both ends the robot has the
+paper's pose: torso upright at the paper's hip positions with the hip's velocities as variables, both soles flat and at rest, arms
+at rest. In between all joints of the legs are free, including the coupled yaw-pitch of the hips, and those of the arms that the
+paper swings: the torso leans and turns, the swing foot tilts and leaves its line.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class FreeMotion:
     """Joint angles as splines.
 
     Attributes:
-        paper: the paper's phase, whose ends are taken, for a body none of whose links stays upright.
+        paper: the paper's phase, which defines the ends, for a body none of whose links stays upright.
         splines: on every curve.
         support: (3,) the left ankle, which stands [m].
     """
@@ -120,12 +120,14 @@ class FreePhase(Phase):
     free: FreeMotion
 
     def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
-        """The phase at its samples, or at other phases (1, k); traces are ``others``, ``along``, ``heights`` and ``sides``.
+        """Evaluate the phase at its samples, or at other phases (1, k).
 
-        The joints' motion is tied, for torques are far from linear in it and it is linear in most of the many variables; and so
-        is what follows from it at each sample alone, before limits join samples. Traces: ``others`` (5, N + 1), angles of the
-        hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad]; ``along`` (1, N + 1), x of the right ankle [m]; ``heights``
-        (4, N + 1) of the right sole's corners above the ground [m]; ``sides`` (2, N + 1), y of its left corners [m].
+        The joints' motion becomes variables of gradient solvers, because torques are far from linear in it and it is linear in
+        most of the many variables; so does what follows from it at each sample, before limits join samples.
+
+        Traces: ``others`` (5, N + 1), angles of the hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad]; ``along``
+        (1, N + 1), x of the right ankle [m]; ``heights`` (4, N + 1) of the right sole's corners above the ground [m]; ``sides``
+        (2, N + 1), y of its left corners [m].
         """
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")

@@ -1,6 +1,13 @@
-"""Joints of NAO that its gaits move, and angles at which its arms are held."""
+"""Joints of NAO that its gaits move, angles at which its arms are held, and the geometry of its legs."""
 
 from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from nlp_gait.errors import InputError
+from nlp_gait.robots import Joint, Robot
+from nlp_gait.robots.robot import Vector
 
 LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
@@ -26,3 +33,84 @@ RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {
     "LElbowRoll": -0.53,
     "RElbowRoll": 0.53,
 }
+
+# The axis about which each joint must turn.
+FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
+
+# Published axes and origins are rounded: 1e-3 rad and 0.1 mm move a foot by less than the 4 mm by which margins reproduce.
+AXIS_TOLERANCE, ORIGIN_TOLERANCE_M = 1e-3, 1e-4
+
+
+class LegGeometry(NamedTuple):
+    """Lengths of one leg.
+
+    Attributes:
+        hip_m: (3,) centre of the hip joints from the torso's origin.
+        thigh_m: hip to knee.
+        tibia_m: knee to ankle.
+        ankle_height_m: ankle above the ground.
+    """
+
+    hip_m: Vector
+    thigh_m: float
+    tibia_m: float
+    ankle_height_m: float
+
+
+def measure_leg(robot: Robot, side: str) -> LegGeometry:
+    """Measure the leg on side ``"L"`` or ``"R"``.
+
+    Raises:
+        InputError: the closed form does not solve this leg; the message names the joint.
+        UnknownNameError: a joint is missing.
+    """
+    yaw = robot.joint(f"{side}HipYawPitch")
+    roll, pitch, knee, ankle, ankle_roll = (robot.joint(f"{side}{name}") for name in LEG_JOINTS)
+    _check_chain(robot, (yaw, roll, pitch, knee, ankle, ankle_roll))
+    for joint, name in zip((roll, pitch, knee, ankle, ankle_roll), LEG_JOINTS, strict=True):
+        if math.dist(joint.axis, AXES[name]) > AXIS_TOLERANCE:
+            raise InputError(
+                f"robot {robot.name!r}, joint {joint.name!r}: its axis must be {list(AXES[name])} (x forward, y left, z up, "
+                f"at zero angles), got {list(joint.axis)}; a joint of the opposite sense can be reversed, see joint_names"
+            )
+    for joint, above in ((pitch, roll), (ankle_roll, ankle)):
+        if math.hypot(*joint.origin_m) > ORIGIN_TOLERANCE_M:
+            raise InputError(
+                f"robot {robot.name!r}, joint {joint.name!r}: its axis must cross that of {above.name!r}, origin_m "
+                f"[0, 0, 0]; got {list(joint.origin_m)}. The closed-form legs have no offset there"
+            )
+    for joint in (knee, ankle):
+        x, y, z = joint.origin_m
+        if math.hypot(x, y) > ORIGIN_TOLERANCE_M or not z < 0.0:
+            raise InputError(
+                f"robot {robot.name!r}, joint {joint.name!r}: at zero angles it must be straight below the joint before it, "
+                f"origin_m [0, 0, -length]; got {list(joint.origin_m)}. The closed-form legs have no offset there"
+            )
+    name = "left" if side == "L" else "right"
+    foot = robot.feet[name]
+    if foot.link != ankle_roll.child:
+        raise InputError(
+            f"robot {robot.name!r}, foot {name!r}: its link must be {ankle_roll.child!r}, which joint "
+            f"{ankle_roll.name!r} carries, got {foot.link!r}"
+        )
+    hip = tuple(a + b for a, b in zip(yaw.origin_m, roll.origin_m, strict=True))
+    return LegGeometry(hip, -knee.origin_m[2], -ankle.origin_m[2], foot.ankle_height_m)  # type: ignore[arg-type]
+
+
+def check_step_length(step_length_m: float) -> None:
+    """Raise InputError unless it is a finite number > 0."""
+    number = isinstance(step_length_m, (int, float)) and not isinstance(step_length_m, bool)
+    if not (number and 0.0 < step_length_m < math.inf):
+        raise InputError(f"step_length_m must be a finite number > 0, got {step_length_m!r}")
+
+
+def _check_chain(robot: Robot, joints: tuple[Joint, ...]) -> None:
+    above = robot.root
+    for joint in joints:
+        if joint.parent != above:
+            raise InputError(
+                f"robot {robot.name!r}, joint {joint.name!r}: its parent must be link {above!r}, got {joint.parent!r}; a leg is "
+                f"the chain {' - '.join(j.name for j in joints)} from the torso"
+            )
+        above = joint.child

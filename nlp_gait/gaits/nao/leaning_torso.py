@@ -1,14 +1,13 @@
 """NAO between two flat, standing soles with a torso that leans: the closed chain of double support.
 
-Torso and soles are held apart by twelve leg joints of which two are one motor: that leaves the torso five of its six freedoms.
-Its position, roll and pitch are free here; its yaw and the angle of the hips' yaw-pitch follow.
+Twelve leg joints, two of which share a motor, connect torso and soles: the torso keeps five of its six degrees of freedom. Its
+position, roll and pitch are planned; its yaw and the angle of the hips' yaw-pitch follow.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
 
 import casadi as ca
 from casadi import DM, MX, SX
@@ -19,8 +18,15 @@ from nlp_gait.gaits.biped.body import Angles, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, rows_at_samples
 from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
 from nlp_gait.gaits.nao.body import NaoBody
-from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, LEG_JOINTS, YAW_PITCHES
-from nlp_gait.gaits.nao.legs import AXIS_TOLERANCE, FORWARD, TO_THE_LEFT, leg_geometry
+from nlp_gait.gaits.nao.joints import (
+    AXIS_TOLERANCE,
+    FORWARD,
+    HELD_ARM_ANGLES,
+    LEG_JOINTS,
+    TO_THE_LEFT,
+    YAW_PITCHES,
+    measure_leg,
+)
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.kinematics import axis_rotation
@@ -31,7 +37,7 @@ UP = (0.0, 0.0, 1.0)
 LEAN = ("torso_roll", "torso_pitch")
 # A sole turned by this leaves the ground by a tenth of a micrometre: largest error of the closed chain [rad].
 FLAT = 1e-6
-# Each step of Newton's method squares the error: from 0.3 rad of lean four end at rounding; limits on the turn say so if not.
+# Each step of Newton's method squares the error: from 0.3 rad of lean four reach rounding; limits on the turn check that.
 NEWTON_STEPS = 4
 
 
@@ -46,10 +52,10 @@ class LeaningNao(NaoBody):
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         places = {side: ankle.position for side, ankle in ankles.items()}
-        legs = leaning_legs(self.robot, hip, lean_of(angles), places, margin, ops)
+        joints, reach = solve_leaning_legs(self.robot, hip, lean_of(angles), places, margin, ops)
         arms = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
         arms |= {name: motion for name, motion in angles.items() if name not in LEAN}
-        return Instant(joints={**legs.joints, **arms}, hip=hip.position, ankles=places, reach=legs.reach)
+        return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=reach)
 
     def curve_limits(
         self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
@@ -57,7 +63,7 @@ class LeaningNao(NaoBody):
         def close(at: InstantPoint, s: SX) -> tuple[SX, SX]:
             hip, angles, ankles = state(at, s)
             places = {side: ankle.position for side, ankle in ankles.items()}
-            return closure(self.robot, ca.vertcat(hip.position, lean_of(angles).position), places)
+            return close_chain(self.robot, ca.vertcat(hip.position, lean_of(angles).position), places)
 
         yaw_pitch = AngleLimits("other_angle", self.robot, YAW_PITCHES[:1], lambda at, s: close(at, s)[0])
         return (*super().curve_limits(phase, count, state), yaw_pitch, FlatSoles(lambda at, s: close(at, s)[1]))
@@ -91,23 +97,12 @@ class FlatSoles(Limit):
 
 def lean_of(angles: Angles) -> Motion:
     """Return roll and pitch of the torso (2,) [rad]."""
-    return stack(*(angles[name] for name in LEAN))
-
-
-class Stance(NamedTuple):
-    """Both legs from the pose of the torso.
-
-    Attributes:
-        joints: motions of the twelve leg joints by name [rad].
-        reach: (2,) cosines of the left and the right knee.
-    """
-
-    joints: dict[str, Motion]
-    reach: SX
+    # Without splines the lean is a structural zero, which the chain rule does not take.
+    return Motion(*map(ca.densify, stack(*(angles[name] for name in LEAN))))
 
 
 def check_yaw_pitches(robot: Robot) -> None:
-    """Refuse hips whose yaw-pitch turns both legs as the torso's yaw does: the pair would not follow from the lean.
+    """Refuse hips whose yaw-pitch turns both legs as the torso's yaw does: both would not follow from the lean.
 
     Raises:
         InputError: the axes are equally steep.
@@ -120,16 +115,16 @@ def check_yaw_pitches(robot: Robot) -> None:
         )
 
 
-def leaning_legs(
+def solve_leaning_legs(
     robot: Robot, torso: Motion, lean: Motion, ankles: Mapping[str, SX], margin: SX, ops: Nonsmooth
-) -> Stance:
-    """Motions of both legs under a torso whose pose is given, over ankles that stand with flat soles.
+) -> tuple[dict[str, Motion], SX]:
+    """Return the motions of both legs [rad] and the cosines of the knees (2,) under a torso whose pose is given.
 
     Args:
         robot: with links welded that never move.
         torso: (3,) its origin [m].
         lean: (2,) its roll about its own x axis and its pitch before that [rad].
-        ankles: (3,) by side, at rest [m].
+        ankles: (3,) by side, at rest on flat soles [m].
         margin: on the reach of a knee (see ``Nonsmooth.acos``).
         ops: interpretation of acos.
 
@@ -142,7 +137,7 @@ def leaning_legs(
     joints: dict[str, Motion] = {}
     reach: list[SX] = []
     for side, hip in zip("LR", sides, strict=True):
-        geometry = leg_geometry(robot, side)
+        geometry = measure_leg(robot, side)
         to_ankle = add_motions(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-part[:3] for part in hip)))
         leg = leg_angles(to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
         _, pitch, *below = (_part(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
@@ -150,12 +145,12 @@ def leaning_legs(
         joints |= {f"{side}{name}": motion for name, motion in zip(LEG_JOINTS, (*at_hip, *below), strict=True)}
         joints[f"{side}HipYawPitch"] = yaw_pitch
         reach.append(leg.reach)
-    return Stance(joints, ca.vertcat(*reach))
+    return joints, ca.vertcat(*reach)
 
 
-def closure(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> tuple[SX, SX]:
-    """Angle of the hips' yaw-pitch [rad], and how far each sole is from flat (2,) [rad], at a pose (5,) of the torso."""
-    turn = _solved(robot, pose, ankles)
+def close_chain(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> tuple[SX, SX]:
+    """Return the angle of the hips' yaw-pitch and that of each sole from flat (2,) [rad] at a pose (5,) of the torso."""
+    turn = _solve_turn(robot, pose, ankles)
     return turn[1], ca.vertcat(*(_misfit(robot, side, turn, pose, ankles[side]) for side in "LR"))
 
 
@@ -165,7 +160,7 @@ def _part(motion: Motion, rows: slice) -> Motion:
 
 def _hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     """(11,) of a pose (5,): yaw-pitch, and by side the hip (3,) [m], its roll, and its pitch beyond upright [rad]."""
-    turn = _solved(robot, pose, ankles)
+    turn = _solve_turn(robot, pose, ankles)
     found = [turn[1]]
     for side in "LR":
         hip, rotation = _hip(robot, side, turn, pose)
@@ -174,8 +169,8 @@ def _hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     return ca.vertcat(*found)
 
 
-def _solved(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
-    """(2,) torso's yaw and hips' yaw-pitch that let both soles be flat [rad], by Newton's method from zero."""
+def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
+    """Solve for the torso's yaw and the hips' yaw-pitch (2,) with flat soles [rad], by Newton's method from zero."""
     turn, at = SX.sym("turn", 2), SX.sym("pose", 5)
     misfits = ca.vertcat(*(_misfit(robot, side, turn, at, ankles[side]) for side in "LR"))
     slope = ca.jacobian(misfits, turn)

@@ -26,10 +26,10 @@ from nlp_gait.gaits.biped.phase_problem import Criterion, phase_problem
 from nlp_gait.gaits.biped.single_support import plan_single_support, stance_of
 from nlp_gait.gaits.nao.body import ARM_SWING, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, free_single_support_phase
+from nlp_gait.gaits.nao.joints import check_step_length
 from nlp_gait.gaits.nao.leaning_torso import leaning_nao
 from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, power_form_maker
 from nlp_gait.gaits.nao.least_power.power_instants import double_support_instants, single_support_instants
-from nlp_gait.gaits.nao.legs import check_step_length
 
 
 @maker

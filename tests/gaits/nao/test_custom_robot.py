@@ -17,7 +17,7 @@ from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import Solution
 from nlp_gait.gaits.nao.body import GRAVITY
-from nlp_gait.gaits.nao.legs import LegGeometry, leg_geometry
+from nlp_gait.gaits.nao.joints import LegGeometry, measure_leg
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import floating_model, stand
@@ -86,7 +86,7 @@ def test_what_depends_on_the_robot_follows_from_its_file(path: str) -> None:
     assert (problem.value("dbm_x_mean_limit_m"), problem.value("dbm_y_mean_limit_m")) == (0.0533, 0.0225)
     assert problem.value("LKneePitch_rad.upper") == load_robot(path).joint("LKneePitch").limits_rad[1]
     assert load_robot(path).mass_kg == pytest.approx(HEAVIER * load_robot("nao-v5").mass_kg)
-    assert leg_geometry(load_robot(path), "R") == LegGeometry((0.0, -HIP_OFFSET, -0.085), THIGH, TIBIA, 0.04519)
+    assert measure_leg(load_robot(path), "R") == LegGeometry((0.0, -HIP_OFFSET, -0.085), THIGH, TIBIA, 0.04519)
 
 
 @pytest.mark.parametrize(("name", "x_m", "y_m"), [("nao-ssp", 0.05, 0.02), ("nao-dsp", 0.08, 0.08)])
@@ -214,7 +214,7 @@ def test_a_yaw_joint_above_the_other_hip_joints_shifts_their_centre(tmp_path: Pa
     for side, y in (("L", 0.05), ("R", -0.05)):
         raw["joints"][f"{side}HipYawPitch"]["origin_m"] = [0.0, y / 2, -0.05]
         raw["joints"][f"{side}HipRoll"]["origin_m"] = [0.0, y / 2, -0.035]
-    assert leg_geometry(load_robot(written(tmp_path, raw)), "L").hip_m == pytest.approx((0.0, 0.05, -0.085))
+    assert measure_leg(load_robot(written(tmp_path, raw)), "L").hip_m == pytest.approx((0.0, 0.05, -0.085))
 
 
 def test_a_robot_that_lacks_a_joint_is_answered_with_its_name(tmp_path: Path) -> None:

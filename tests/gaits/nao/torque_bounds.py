@@ -19,9 +19,8 @@ from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.gaits.biped.curves import hip_motion
 from nlp_gait.gaits.biped.single_support import stance_of, swing_foot
 from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, make_nao, upright_links, upright_plan
-from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS
+from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
-from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
@@ -51,7 +50,7 @@ def upright_frames(
     """Return the frames of all links in the motion of ``upright_plan``; see ``leg_frames``."""
     frames = {robot.root: upright(hip)}
     for side, ankle in ankles.items():
-        geometry, pelvis = leg_geometry(robot, side), robot.joint(f"{side}HipYawPitch")
+        geometry, pelvis = measure_leg(robot, side), robot.joint(f"{side}HipYawPitch")
         at_hip, at_pelvis = (add_motions(hip, resting_point(place)) for place in (geometry.hip_m, pelvis.origin_m))
         leg = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, largest_cosine)
         *turning, foot = (robot.joint(f"{side}{name}").child for name in LEG_JOINTS)

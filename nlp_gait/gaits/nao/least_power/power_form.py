@@ -18,8 +18,8 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.power_form import WIDENING, PowerForm, PowerRows
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaits.biped.limits import SCALES
+from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.gaits.nao.least_power.power_instants import PAIRS, PowerInstant, PowerPhase
-from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.robots import Robot
 
 # Derivatives, trajectory, objective and motors for which these formulas are written, with one sample in each interval.
@@ -162,7 +162,7 @@ def _add_pose_rows(out: _Outputs, robot: Robot, values: Mapping[str, float], now
         return values[f"{joint}_rad.lower"], values[f"{joint}_rad.upper"]
 
     for side, squared in now.reaches.items():
-        leg = leg_geometry(robot, side)
+        leg = measure_leg(robot, side)
         low, high = limits(f"{side}KneePitch")
         cosines = math.cos(min(high, math.pi)), math.cos(min(max(low, 0.0), math.pi))
         margin = 1.0 - values["reach_margin"]

@@ -17,7 +17,7 @@ from nlp_gait.gaits.biped.double_support import Point2, support_box
 from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
-from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS
+from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power.world_frame import (
     Frame,
     chain_frames,
@@ -27,7 +27,6 @@ from nlp_gait.gaits.nao.least_power.world_frame import (
     move_wrench,
     upright,
 )
-from nlp_gait.gaits.nao.legs import leg_geometry
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.balance import ground_load
 from nlp_gait.symbolic.dynamics import Wrench
@@ -161,7 +160,7 @@ class PowerInstant:
         self.torques[name] = direction * (gravity + self.rate_squared * inertia)
 
     def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> LegParts:
-        geometry, yaw = leg_geometry(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
+        geometry, yaw = measure_leg(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
         at_hip = add_motions(hip, resting_point(geometry.hip_m))
         frames = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
         apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
@@ -205,8 +204,8 @@ def double_support_instants(
         rule: how the torso's mass is divided.
         cosine: largest one of the knee's angle, see ``leg_frames``.
     """
-    ankles = {side: SX(DM([*xy, leg_geometry(robot, side).ankle_height_m])) for side, xy in soles.items()}
-    feet_y = (leg_geometry(robot, "L").hip_m[1], leg_geometry(robot, "R").hip_m[1])
+    ankles = {side: SX(DM([*xy, measure_leg(robot, side).ankle_height_m])) for side, xy in soles.items()}
+    feet_y = (measure_leg(robot, "L").hip_m[1], measure_leg(robot, "R").hip_m[1])
     weight = robot.mass_kg * GRAVITY
 
     def instant(z: SX, phase: float) -> PowerInstant:
