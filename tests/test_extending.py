@@ -205,7 +205,7 @@ def test_a_question_is_one_folder_and_one_line() -> None:
 
 
 @pytest.mark.slow
-def test_a_change_of_mathematics_goes_through_one_door() -> None:
+def test_mathematics_is_changed_by_derive() -> None:
     """The example of the guide: a price on time, as an added parameter."""
     price = Parameter(name="price_W_s", unit="W/s", default=1.0, description="of a second", minimum=0.0)
     problem = nlp_gait.load("nao-ssp").derive(

@@ -57,7 +57,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/backends/solvers/working_set.py": ("tests/backends/solvers/test_working_set.py",),
     "nlp_gait/simulation/drive.py": ("tests/simulation/test_drive.py", "tests/simulation/test_playback.py"),
     "nlp_gait/simulation/measurements.py": ("tests/simulation/test_measurements.py",),
-    "nlp_gait/user_code.py": ("tests/formulation/test_own_problems.py", "tests/compare/cli/test_own_code.py"),
+    "nlp_gait/user_code.py": ("tests/formulation/test_user_problems.py", "tests/compare/cli/test_user_code.py"),
     "nlp_gait/formulation/locking.py": ("tests/faults/test_together.py",),
     "nlp_gait/gaitbench/instance.py": ("tests/gaitbench/test_instances.py",),
     "nlp_gait/gaitbench/problem.py": ("tests/gaitbench/test_instances.py",),

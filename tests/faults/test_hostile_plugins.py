@@ -176,16 +176,16 @@ def test_what_is_not_there_is_said_before_the_work(tmp_path: Path) -> None:
 def test_naming_is_what_runs_code(tmp_path: Path) -> None:
     """A file of data that names code runs nothing; the same file runs once the code is named."""
     mark = tmp_path / "it-ran"
-    own = tmp_path / "own.py"
+    own = tmp_path / "never_named.py"
     own.write_text(f"from nlp_gait.formulation import load\nopen({str(mark)!r}, 'w').close()\nleg = load('walk12')\n")
     walk = load_object(f"{own}:leg", "problem")
     assert mark.exists()
     mark.unlink()
     result = tmp_path / "best.json"
     x = dict(zip(walk.names, ((walk.lower + walk.upper) / 2).tolist(), strict=True))  # type: ignore[attr-defined]
-    result.write_text(json.dumps({"problem": "other/own.py:leg", "x": x}))
+    result.write_text(json.dumps({"problem": "other/never_named.py:leg", "x": x}))
     refused = nlp_gait("export", result, "--format", "csv", status=1).stderr
-    assert "runs only if you name it: add --code other/own.py:leg" in refused and not mark.exists()
+    assert "runs only if you name it: add --code other/never_named.py:leg" in refused and not mark.exists()
     own.write_text(own.read_text() + "\n# another text\n")
     nlp_gait("export", result, "--format", "csv", "--code", f"{own}:leg")
     assert mark.exists()

@@ -123,7 +123,7 @@ def test_unknown_names_get_the_nearest_ones() -> None:
         (["a", "b"], "x of toy must be numbers, got list"),
     ],
 )
-def test_points_that_are_none_are_refused(x: Any, message: str) -> None:
+def test_invalid_points_are_refused(x: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         toy(corner).check_x(x)
 

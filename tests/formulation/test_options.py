@@ -108,14 +108,14 @@ def test_all_options_are_recorded_in_the_order_of_the_signature(name: str) -> No
     assert list(load(name).options) == list(defaults(name))
 
 
-def test_what_was_chosen_for_a_trajectory_is_recorded() -> None:
+def test_the_samples_of_a_trajectory_are_recorded() -> None:
     """Zero samples leave the choice to the trajectory; asking for what a cubic gets anyway changes nothing."""
     assert load("nao-ssp", trajectory="quintic").options["samples_per_interval"] == 4
     assert load("nao-ssp", samples_per_interval=1).options == load("nao-ssp").options
     assert load("nao-ssp", samples_per_interval=4).options["samples_per_interval"] == 4
 
 
-def test_numbers_of_numpy_mean_what_they_are() -> None:
+def test_numbers_of_numpy_are_accepted() -> None:
     plain = load("nao-ssp", intervals=10, step_length_m=0.07)
     made = load("nao-ssp", intervals=np.int64(10), step_length_m=np.float64(0.07), robot=np.str_("nao-v5"))
     assert made.options == plain.options
@@ -133,7 +133,7 @@ def test_numbers_of_numpy_mean_what_they_are() -> None:
 
 
 @pytest.mark.parametrize("value", [True, np.bool_(True), np.float32("nan"), np.array([0.02]), 0.02 + 0j, "0.02", None])
-def test_what_is_no_number_stays_refused(value: Any) -> None:
+def test_values_that_are_not_numbers_are_refused(value: Any) -> None:
     with pytest.raises(InputError, match="must be a finite number"):
         load("nao-ssp").with_values(**{"swing_height_m.lower": value})
     with pytest.raises(InputError, match="option intervals must be a whole number"):

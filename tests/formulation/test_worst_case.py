@@ -22,7 +22,7 @@ def target(at: float, least: float) -> Mathematics:
     return mathematics
 
 
-def test_the_worst_scenario_is_made_as_good_as_can_be() -> None:
+def test_the_worst_scenario_is_optimised() -> None:
     """Between targets at -1 and 1 x is 0; the strictest limit holds in all scenarios."""
     problem = make_worst_case([toy(target(-1.0, 0.0)), toy(target(1.0, 0.5)), toy(target(0.5, 0.2))])
     found = solve(problem, starts=3)
@@ -39,7 +39,7 @@ def test_one_scenario_is_the_problem_itself() -> None:
     assert alone.objective == pytest.approx(same.objective, abs=1e-9)
 
 
-def test_what_is_maximised_or_different_is_refused() -> None:
+def test_maximised_or_different_scenarios_are_refused() -> None:
     def hill(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
         return -(x**2), ()
 

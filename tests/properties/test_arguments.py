@@ -65,7 +65,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "stagnation": (lambda value: minimized(stagnation=value), (None, 10**40)),
     "time_limit_s": (lambda value: minimized(time_limit_s=value), (None, 1.5, 10**40)),
     "initial": (lambda value: minimized(initial=value), (None,)),
-    "observe": (lambda value: minimized(observe=value), (None, type)),
+    "callback": (lambda value: minimized(callback=value), (None, type)),
 }
 
 

@@ -49,13 +49,13 @@ def test_time_histories_by_name_and_as_a_data_frame(signals: Signals) -> None:
     assert "&lt;knee&gt;" in signals._repr_html_() and "<knee>" not in signals._repr_html_()
 
 
-def test_without_pandas_a_sentence_says_how_to_get_it(signals: Signals, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pandas_the_message_says_how_to_install_it(signals: Signals, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MissingExtraError, match="pip install pandas"):
         signals.to_frame()
 
 
-def test_a_solution_shows_itself_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
+def test_a_solution_displays_a_table_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
     shown = solution._repr_html_()
     assert "hip_height_m" in shown and "W per m" in shown and len(shown) < 5000
     problem = nlp_gait.load("nao-dsp")

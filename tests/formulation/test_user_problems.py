@@ -51,7 +51,7 @@ def test_an_edited_file_and_another_folder_are_other_problems(tmp_path: Path, mo
     assert (load("own.py:leg").value("lambda"), spec.load().value("lambda")) == (0.75, 0.75)
 
 
-def test_a_robot_file_is_read_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_file_is_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     raw = humanoid()
     Path("my.json").write_text(json.dumps(raw))
@@ -108,7 +108,7 @@ def test_a_result_file_runs_no_code_that_was_not_named(tmp_path: Path) -> None:
         ("other = 1", "unknown name in .*own.py 'leg'; .*other"),
     ],
 )
-def test_what_is_wrong_with_the_file_is_said(text: str, message: str, tmp_path: Path) -> None:
+def test_messages_say_what_is_wrong_with_the_file(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(text)
     with pytest.raises(GaitError, match=message) as said:
         load(f"{tmp_path / 'own.py'}:leg")
@@ -132,13 +132,13 @@ def test_what_is_wrong_with_the_file_is_said(text: str, message: str, tmp_path: 
         ({"lower": None}, "'knee': lower, upper or both are required"),
     ],
 )
-def test_a_row_is_refused_by_its_name(change: dict[str, Any], message: str) -> None:
+def test_a_row_is_refused_by_name(change: dict[str, Any], message: str) -> None:
     Constraint(**GOOD)
     with pytest.raises(InputError, match=message):
         Constraint(**{**GOOD, **change})
 
 
-def test_objectives_variables_and_parameters_are_refused_by_theirs() -> None:
+def test_objectives_variables_and_parameters_are_refused_by_name() -> None:
     with pytest.raises(InputError, match="objective must be a scalar MX, got shape \\(3, 1\\)"):
         Assembly(objective=THREE, constraints=(), indexes={})
     with pytest.raises(InputError, match="index 'power_W' must be a scalar MX, got float 1.0"):
@@ -168,7 +168,7 @@ def vars_of(problem: GaitProblem) -> dict[str, Any]:
         (lambda x, y, p, ops: (ca.vertcat(x, y), ()), "must be a scalar"),
     ],
 )
-def test_mathematics_that_no_backend_could_use_is_refused(mathematics: Any, message: str) -> None:
+def test_mathematics_that_backends_cannot_use_is_refused(mathematics: Any, message: str) -> None:
     check_mathematics(toy(corner))
     with pytest.raises(InputError, match=message):
         check_mathematics(toy(mathematics))

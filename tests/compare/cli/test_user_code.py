@@ -1,4 +1,4 @@
-"""One file of a user's own: a problem, an asked algorithm and a plain function, in every command by ``file.py:name``."""
+"""User code: a problem, a search and a plain function in one file, in every command by ``file.py:name``."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_a_changed_problem_has_its_own_functions(how: str) -> None:
     assert f[0] == pytest.approx(5.0)
 
 
-def test_what_is_derived_of_what_is_derived_has_its_own_functions() -> None:
+def test_derivations_can_be_chained() -> None:
     once = built(toy(corner).derive(change=doubled))
     twice = once.derive(change=doubled)
     assert [evaluated(problem, [1.5, 0.0]).cost for problem in (once, twice)] == [5.0, 10.0]
@@ -78,7 +78,7 @@ def test_what_is_derived_of_what_is_derived_has_its_own_functions() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "walk12", "stairs-plan", "stairs-track"])
-def test_time_histories_are_those_of_the_problem_below(name: str) -> None:
+def test_time_histories_are_those_of_the_base_problem(name: str) -> None:
     """With a parameter and a variable more, at the current values of both."""
     problem = load(name)
     changed = with_slack(problem).with_values(price_J_m=3.0)
@@ -106,7 +106,7 @@ def test_start_points_have_the_new_variable_within_its_current_bounds(name: str)
         np.testing.assert_array_equal(x[:-1], problem.start_point(np.random.default_rng(0)))
 
 
-def test_denser_grids_are_derived_too(walk: GaitProblem) -> None:
+def test_denser_grids_are_adapted(walk: GaitProblem) -> None:
     changed = with_slack(walk).with_values(price_J_m=3.0)
     fine, plain = changed.dense(3), walk.dense(3)
     assert fine is not None and plain is not None
@@ -159,12 +159,12 @@ def test_another_objective_has_its_own_name_and_sense() -> None:
     ],
     ids=["a parameter", "two alike", "a bound", "a variable's name", "a variable", "a parameter's name"],
 )
-def test_names_that_stand_twice_are_refused(more: dict[str, Any], twice: str) -> None:
+def test_duplicated_names_are_refused(more: dict[str, Any], twice: str) -> None:
     with pytest.raises(InputError, match=f"problem 'toy': variables or parameters are duplicated: {twice}$"):
         toy(corner).derive(**more)
 
 
-def test_an_added_variable_is_nothing_to_the_parts_of_a_richer_motion() -> None:
+def test_an_added_variable_leaves_a_richer_motion_unchanged() -> None:
     """The swing foot halfway is a function of the phase's own variables alone."""
     plain = load("nao-ssp", trajectory="quintic", samples_per_interval=1)
     changed = with_slack(plain)
