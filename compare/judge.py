@@ -1,7 +1,7 @@
-"""The one judge: whatever a solver claims about x, these are the exact functions' values.
+"""The judge: exact values at a point, whatever a solver claims.
 
-A point is evaluated on the problem's own samples, where its constraints are stated, and again on a dense grid, which shows
-violations between the samples. Where the rows are functions of time, what holds at all times is proven beside.
+A point is evaluated at the problem's samples and again on a dense grid, which shows violations between the samples. For rows that
+are functions of time, it is also proven which are satisfied at every instant.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.proofs.guarantee import Guarantee, guarantee
 
-DENSE_INTERVALS = 1000  # at least this many equal parts on the dense grid
+DENSE_INTERVALS = 1000  # least number of intervals of the dense grid
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,18 +25,18 @@ class Evaluation:
 
     Attributes:
         problem: name.
-        options: what the problem was built with.
+        options: of the problem.
         parameters: values that differ from the defaults.
         x: by variable name.
         objective: name, value and unit.
-        indexes: performance figures on the problem's own samples.
-        constraints: every row, the variables' bounds last.
+        indexes: performance figures at the problem's samples.
+        constraints: all rows, the variables' bounds last.
         violation: total over all rows, each divided by its scale.
         feasible: total violation at most 1e-6.
         dense: the same indexes on the dense grid; None for a problem without samples.
         dense_violations: rows violated on the dense grid, worst first; times are samples of that grid.
-        dense_intervals: equal parts of the dense grid.
-        guaranteed: what is proven between the samples; None for a point that is infeasible on them.
+        dense_intervals: number of intervals of the dense grid.
+        guaranteed: what is proven between the samples; None for an infeasible point.
     """
 
     problem: str
@@ -59,13 +59,13 @@ class Evaluation:
         return find_violated_rows(self.constraints)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain dictionaries, lists and numbers; the robot stands beside the problem's name."""
+        """Return plain data; the robot is next to the problem's name."""
         robot = {"robot": self.options["robot"]} if "robot" in self.options else {}
         return {"schema": 1, "problem": self.problem, **robot, **asdict(self)}
 
 
 def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, float]) -> Evaluation:
-    """Exact values at a point.
+    """Return the exact values at a point.
 
     Args:
         problem: with its current parameter values.

@@ -144,4 +144,4 @@ def _rank(values: Sequence[float], i: int) -> str:
 def _fate(played: SimulatedGait) -> str:
     if played.fell_at_s is not None:
         return f"falls at {played.fell_at_s:.2f} s"
-    return "stays up" if played.way is None else f"walks {100.0 * played.way:.1f} %"
+    return "stays up" if played.walked_share is None else f"walks {100.0 * played.walked_share:.1f} %"

@@ -138,26 +138,13 @@ def _unpack(instance: str, solver: str, entry: dict[str, Any], run: dict[str, An
         x={str(k): value for k, value in enumerate(run["x"])},
         claimed_objective=run["claim"][0],
         claimed_violation=run["claim"][1],
-        verdict=Verdict(
-            objective=math.nan if objective is None else objective,
-            violation=math.inf if violation is None else violation,
-            feasible=feasible,
-            indexes={},
-            dense=None,
-            dense_feasible=None,
-            violated=(),
-            guaranteed=None,
+        verdict=Verdict.make_plain(
+            math.nan if objective is None else objective, math.inf if violation is None else violation, feasible
         ),
         evaluations=run["calls"],
         failed_evaluations=run["failed"],
         iterations=run["iterations"],
         active_constraints=(),
         history=History(evaluations=tuple(evaluations), objective=tuple(values)),
-        time_s=Times(
-            build=math.nan,
-            compile=math.nan,
-            solve=run["solve_s"],
-            objective=math.nan,
-            history=(math.nan,) * len(evaluations),
-        ),
+        time_s=Times.make_unknown(run["solve_s"], (math.nan,) * len(evaluations)),
     )

@@ -48,7 +48,7 @@ def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) ->
                     "Jacobian, (n + 1)(n + 2)/2 for a Hessian. What counts is the exact functions' verdict. The mean rank is "
                     "that of the expected running time over all instances and the targets "
                     + ", ".join(f"{100 * target:g} %" for target in TARGETS)
-                    + " above the best known; equals share a rank, and what nobody reached is left out.",
+                    + " above the best known; equals share a rank, and pairs that no solver reached are left out.",
                 ),
             ),
         ),
@@ -56,7 +56,7 @@ def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) ->
 
 
 def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
-    """Where a solver stands, in sentences."""
+    """Return the result of a solver in sentences."""
     place, standing = board.place(solver), _standing(board, solver)
     duels = board.duels(solver)
     won = sum(duel.better > duel.worse for duel in duels)
@@ -71,35 +71,22 @@ def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
 
 
 def _make_standings_table(board: Leaderboard) -> Table:
-    """Every solver, best mean rank first."""
     rows = [
         (
-            str(place),
-            s.solver,
-            f"{s.mean_rank:.2f}",
-            str(s.solved_rank),
-            f"{100 * s.solved:.1f} %",
-            f"{100 * s.feasible:.0f} %",
+            *(str(place), s.solver, f"{s.mean_rank:.2f}", str(s.solved_rank)),
+            *(f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %"),
             *(f"{reached}/{len(board.comparisons)}" for reached in s.reached),
         )
         for place, s in enumerate(board.standings, start=1)
     ]
-    header = (
-        "place",
-        "solver",
-        "mean rank",
-        "by solved",
-        "solved",
-        "feasible",
-        *(f"to {100 * t:g} %" for t in TARGETS),
-    )
+    targets = (f"to {100 * t:g} %" for t in TARGETS)
+    header = ("place", "solver", "mean rank", "by solved", "solved", "feasible", *targets)
     return text_table(
         header, rows, "Mean rank of the expected running time; instances of which each target was reached"
     )
 
 
 def _make_instances_table(board: Leaderboard, solver: str | None) -> Table:
-    """Every instance: the best solver there, and how far the chosen one comes."""
     header = ["instance", "variables", "best known", "cheapest solver", "its cost"]
     if solver is not None:
         header += ["median gap", "cost", "rank"]
@@ -113,36 +100,20 @@ def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]
     costs = {s.name: s.expected_cost(PER_INSTANCE_TARGET) for s in comparison.solvers}
     cheapest = min(costs, key=lambda name: costs[name])
     known = math.isfinite(costs[cheapest])
-    row = (
-        comparison.problem,
-        str(len(instance.names)),
-        f"{comparison.reference:.6g}",
-        cheapest if known else "-",
-        count(costs[cheapest]),
-    )
+    size, best = str(len(instance.names)), f"{comparison.reference:.6g}"
+    row = (comparison.problem, size, best, cheapest if known else "-", count(costs[cheapest]))
     if solver is None:
         return row
     runs = next(s for s in comparison.solvers if s.name == solver)
     rank = 1 + sum(cost < costs[solver] for cost in costs.values())
-    return (
-        *row,
-        percent(comparison.gap(runs.median_cost)),
-        count(costs[solver]),
-        str(rank) if math.isfinite(costs[solver]) else "-",
-    )
+    place = str(rank) if math.isfinite(costs[solver]) else "-"
+    return (*row, percent(comparison.gap(runs.median_cost)), count(costs[solver]), place)
 
 
 def _make_duels(board: Leaderboard, solver: str) -> Section:
     rows = [
-        (
-            duel.other,
-            str(duel.better),
-            str(duel.worse),
-            str(duel.undecided),
-            f"{duel.mean_a12:.3f}",
-            f"{duel.signed_rank:.2g}",
-        )
-        for duel in board.duels(solver)
+        (d.other, str(d.better), str(d.worse), str(d.undecided), f"{d.mean_a12:.3f}", f"{d.signed_rank:.2g}")
+        for d in board.duels(solver)
     ]
     header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
     return Section(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -13,6 +12,7 @@ import numpy as np
 from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.record_files import RECORDS, read_records
+from compare.study.store import as_json
 from compare.study.task import LABEL, ProblemSpec
 from nlp_gait.backends.identity import hash_json, identify_problem
 from nlp_gait.columns import Table, read_table
@@ -81,7 +81,12 @@ def import_runs(
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run is duplicated")
     known = {} if histories is None else _histories(histories, runs)
-    part, objective = identify_problem(problem), asdict(problem.objective)
+    shared = {
+        "problem": identify_problem(problem),
+        "objective": asdict(problem.objective),
+        "solver": label,
+        "settings": {},
+    }
     records = []
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
@@ -107,18 +112,7 @@ def import_runs(
                 solver=label,
                 run=run,
                 seed=seed,
-                definition=json.loads(
-                    json.dumps(
-                        {
-                            "problem": part,
-                            "objective": objective,
-                            "solver": label,
-                            "settings": {},
-                            "seed": seed,
-                            "imported": {"sha256": hash_json(content)},
-                        }
-                    )
-                ),
+                definition=as_json({**shared, "seed": seed, "imported": {"sha256": hash_json(content)}}),
                 settings={"kind": "imported", "file": finals.name},
                 status=f"imported from {finals.name}",
                 claimed=claim is not None and not row["violation"] > 0.0,
@@ -131,7 +125,7 @@ def import_runs(
                 iterations=0,
                 active_constraints=(),
                 history=history,
-                time_s=Times(build=math.nan, compile=math.nan, solve=seconds[-1], objective=math.nan, history=seconds),
+                time_s=Times.make_unknown(seconds[-1], seconds),
             )
         )
     return records

@@ -64,6 +64,11 @@ class Times:
     objective: float
     history: tuple[float, ...]
 
+    @classmethod
+    def make_unknown(cls, solve: float, history: tuple[float, ...]) -> Times:
+        """Return the times of a run of which only these are known."""
+        return cls(build=math.nan, compile=math.nan, solve=solve, objective=math.nan, history=history)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
@@ -88,6 +93,20 @@ class Verdict:
     dense_feasible: bool | None
     violated: tuple[str, ...]
     guaranteed: Guarantee | None
+
+    @classmethod
+    def make_plain(cls, objective: float = math.nan, violation: float = math.inf, feasible: bool = False) -> Verdict:
+        """Return a verdict of values alone; by default that on a run without a point."""
+        return cls(
+            objective=objective,
+            violation=violation,
+            feasible=feasible,
+            indexes={},
+            dense=None,
+            dense_feasible=None,
+            violated=(),
+            guaranteed=None,
+        )
 
     @classmethod
     def from_evaluation(cls, evaluation: Evaluation) -> Verdict:
@@ -172,16 +191,7 @@ class RunRecord:
             x={},
             claimed_objective=None,
             claimed_violation=None,
-            verdict=Verdict(
-                objective=math.nan,
-                violation=math.inf,
-                feasible=False,
-                indexes={},
-                dense=None,
-                dense_feasible=None,
-                violated=(),
-                guaranteed=None,
-            ),
+            verdict=Verdict.make_plain(),
             evaluations={"f": 0},
             failed_evaluations=0,
             iterations=0,

@@ -18,7 +18,7 @@ from compare.study.task import Task, check_task
 from compare.study.workers import run_jobs
 from nlp_gait.errors import GaitError, InputError, OutputError
 from nlp_gait.files import make_writable_folder, remove_leftovers
-from nlp_gait.interrupts import Interrupted
+from nlp_gait.interrupts import Interrupted, delay_interrupts
 from nlp_gait.notebook import format_html_table
 from nlp_gait.progress import Progress
 
@@ -115,9 +115,10 @@ def run_study(
         on_stored(len(records))
     try:
         for index, record in _run_missing(study, records):
-            if study.folder is not None:
-                _write(record, study.folder, len(records))
-            records[index] = record
+            with delay_interrupts():
+                if study.folder is not None:
+                    _write(record, study.folder, len(records))
+                records[index] = record
             if progress is not None:
                 progress(study.tasks[index], record)
     except KeyboardInterrupt:

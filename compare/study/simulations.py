@@ -30,19 +30,19 @@ REMEDY = "delete it and rerun with --engine"
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedGait:
-    """How one gait fared in the engine, beside what the model says of it.
+    """A gait in the engine and in the model.
 
     Attributes:
         problem: label, as in the record.
         solver: label, likewise.
         run: number, likewise.
-        drive: of the servos.
+        drive: actuator model.
         steps: of a cycle; None for a phase.
         unit: W, mean power over a phase, or J/m, energy of a cycle for each planned metre; mechanical and heat.
-        model: what the model says.
-        engine: what the servos drew; None after a fall.
-        fell_at_s: when; None if it stayed up.
-        way: walked part of the planned way; None for a phase and after a fall.
+        model: value of the model.
+        engine: value of the engine; None after a fall.
+        fell_at_s: time of the fall; None if there was none.
+        walked_share: walked share of the planned distance; None for a phase and after a fall.
     """
 
     problem: str
@@ -54,7 +54,7 @@ class SimulatedGait:
     model: float
     engine: float | None
     fell_at_s: float | None
-    way: float | None
+    walked_share: float | None
 
 
 def simulate_records(
@@ -66,9 +66,9 @@ def simulate_records(
 
     Args:
         folder: of the study.
-        records: whose gaits.
-        drive: of the servos.
-        progress: told of each gait.
+        records: of the gaits.
+        drive: actuator model.
+        progress: receives each gait.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -83,8 +83,8 @@ def simulate_records(
             steps = STEPS if model.repeats else None
             plan = make_plan(result, steps)
             inputs = {**_gait(record), "drive": asdict(drive), "model": f"{_digest(plan, drive)}, {version}"}
-            played = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
-            found.append(decode(SimulatedGait, played))
+            value = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
+            found.append(decode(SimulatedGait, value))
         if progress is not None:
             progress(f"{record.problem} {record.solver}")
     return found
@@ -110,12 +110,12 @@ def load_simulations(folder: Path, records: Sequence[RunRecord]) -> list[Simulat
 def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) -> dict[str, Any]:
     trace = simulate_plan(plan, drive=drive)
     if steps is None:
-        measured, way = measure(plan, trace, drive), None
+        measured, share = measure(plan, trace, drive), None
         model, engine = measured.predicted.total_W, None if measured.fallen else measured.measured.total_W
     else:
         walk = measure_walk(plan, trace, drive, steps)
         model, engine = walk.model_J_per_m, walk.engine_J_per_planned_m
-        way = None if walk.walked_m is None else walk.walked_m / walk.planned_m
+        share = None if walk.walked_m is None else walk.walked_m / walk.planned_m
     return asdict(
         SimulatedGait(
             problem=record.problem,
@@ -127,7 +127,7 @@ def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) ->
             model=model,
             engine=engine,
             fell_at_s=trace.fell_at_s,
-            way=way,
+            walked_share=share,
         )
     )
 
@@ -141,9 +141,8 @@ def _gait(record: RunRecord) -> dict[str, Any]:
 
 
 def _digest(plan: Plan, drive: Drive) -> str:
-    """Of all that is simulated but the drive's set-points, which follow from it and the drive."""
-    text = make_plan_model(plan, drive)
-    digest = hashlib.sha256(text.encode())
+    """Hash of the simulated model and motion; the set-points follow from these and the drive."""
+    digest = hashlib.sha256(make_plan_model(plan, drive).encode())
     for name in ("t", "q", "tau"):
         digest.update(plan.signals.arrays[name].tobytes())
     return digest.hexdigest()

@@ -143,7 +143,7 @@ class Store:
 
         Args:
             name: of the result.
-            inputs: None accepts any.
+            inputs: of the result; None accepts any.
         """
         path = self._path(name, inputs, ".json")
         if path is None or not path.exists():

@@ -109,8 +109,7 @@ def _numbers(array: Array) -> list[float | str]:
 
 
 def _number(value: float) -> float | str:
-    """JSON has no NaN and no infinity: these are text."""
-    return value if math.isfinite(value) else repr(value)
+    return value if math.isfinite(value) else repr(value)  # JSON has no NaN and no infinity
 
 
 def parse_outcome(raw: Mapping[str, Any]) -> Outcome:

@@ -40,7 +40,7 @@ def test_a_study_keeps_its_finished_runs_and_goes_on_when_there_is_room(tmp_path
     records = sorted(tmp_path.glob("kept/records/*/*.json"))
     assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith("nlp-gait: cannot write ") and "No space left on device" in done.stderr
-    assert f"the {len(records)} runs before it are kept" in done.stderr
+    assert f"the {len(records)} runs before it are stored" in done.stderr
     assert 3 < len(records) < 30 and all(read_record(path) for path in records)
     assert not list(tmp_path.rglob("*.tmp*"))
     before = {path: path.read_bytes() for path in records}

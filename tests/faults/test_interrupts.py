@@ -273,8 +273,8 @@ def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkey
     with monkeypatch.context() as patch:
         press_after(patch, GaitProblem, "fix", 2)  # the first one checks what was asked
         assert run(*asked).stderr == (
-            f"nlp-gait: interrupted before there was a result; 0 finished steps are kept in {tmp_path}; the same command "
-            "continues\n"
+            f"nlp-gait: interrupted before there was a result; 0 finished results are stored in {tmp_path}; rerun the command "
+            "to continue\n"
         )
     assert not list(tmp_path.glob("*.*"))
     from matplotlib.figure import Figure

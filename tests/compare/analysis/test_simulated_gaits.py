@@ -17,19 +17,19 @@ from nlp_gait.simulation.drive import DRIVES
 
 
 def played(
-    solver: str, model: float, engine: float | None, *, way: float | None = None, problem: str = "nao-dsp"
+    solver: str, model: float, engine: float | None, *, walked_share: float | None = None, problem: str = "nao-dsp"
 ) -> SimulatedGait:
     return SimulatedGait(
         problem=problem,
         solver=solver,
         run=0,
         drive=DRIVES["feed-forward"],
-        steps=None if way is None else 10,
-        unit="W" if way is None else "J/m",
+        steps=None if walked_share is None else 10,
+        unit="W" if walked_share is None else "J/m",
         model=model,
         engine=engine,
         fell_at_s=1.25 if engine is None else None,
-        way=way,
+        walked_share=walked_share,
     )
 
 
@@ -79,7 +79,7 @@ def test_ranks_are_those_of_the_printed_numbers() -> None:
 
 
 def test_a_table_fits_a_terminal() -> None:
-    rows = [*make_engine_rows([played("pso+ipopt", 19.15, 19.61, way=0.997)]), HEADER]
+    rows = [*make_engine_rows([played("pso+ipopt", 19.15, 19.61, walked_share=0.997)]), HEADER]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
     assert sum(widths) + 3 * len(widths) + 1 <= 80
     assert rows[0][-1] == "walks 99.7 %"

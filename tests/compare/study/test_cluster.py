@@ -22,10 +22,10 @@ from tests.compare.study.test_study import contents
 pytest.importorskip("distributed")
 
 STUDY = StudySettings(
-    problems=(ProblemSpec(name="nao-ssp"),),
+    problems=(ProblemSpec(name="walk12"),),
     solvers=(SolverSpec(name="pso", polish=True), SolverSpec(name="ga")),
     runs=3,
-    stop=Stop(evaluations=500),
+    stop=Stop(evaluations=200),
 )
 
 
