@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -238,10 +239,10 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
 
 def cart_table(files: dict[str, str]) -> Iterator[str]:
     """The textbook's walk on the footsteps of the cheapest cycle at NAO's 0.03 m/s times the root of lambda, and that cycle."""
-    from compare.questions.sweep.study import parse_axis
-    from compare.questions.walk.planners import CART_TABLE, rivals
-    from compare.questions.walk.study import optimal_gaits, played
-    from compare.study.task import ProblemSpec
+    from compare.questions.question import find
+    from compare.questions.sweep import parse_axis
+    from compare.questions.walk.planners import CART_TABLE
+    from compare.questions.walk.walk import CheapestWalk
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.feedback import FEEDBACKS
 
@@ -249,17 +250,17 @@ def cart_table(files: dict[str, str]) -> Iterator[str]:
         "robot", "speed m/s", "step m", "times s", "textbook W, optimum W, saved", "engine", "textbook's notes"
     )
     for name, file in files.items():
-        spec = ProblemSpec(name="humanoid-cycle", options={"robot": file, "objective": "power"})
-        problem = spec.load()
-        (least,) = optimal_gaits(spec, parse_axis(f"speed_m_s={problem.value('speed_m_s')!r}"), starts=1, seed=0)
-        if not least.found.feasible:
-            yield cells(name, f"{least.at:.4f}", "-", "-", least.found.status, "-", "-")
+        problem = nlp_gait.load("humanoid-cycle", robot=file, objective="power")
+        question = CheapestWalk(problem=problem, axis=parse_axis(f"speed_m_s={problem.value('speed_m_s')!r}"), starts=1)
+        (least,) = find(question).gaits
+        if not least.point.feasible:
+            yield cells(name, f"{least.at:.4f}", "-", "-", least.point.status, "-", "-")
             continue
         engine = []
         for feedback, words in ((None, "open loop"), (FEEDBACKS["torso-spring"], "torso-spring")):
             drive = Drive(feedback=feedback)
-            best = played(spec, least, STEPS, drive)
-            (cart,) = rivals(spec, [least], [CART_TABLE], starts=1, seed=0, steps=STEPS, drive=drive)
+            found = find(replace(question, steps=STEPS, drive=drive, planners=[CART_TABLE]))
+            (best,), (cart,) = found
             if cart.walk is None or best.walk is None:
                 break  # no height of the hip reaches
             fell = [walk.measurements.fell_at_s for walk in (cart.walk, best.walk)]
@@ -275,7 +276,7 @@ def cart_table(files: dict[str, str]) -> Iterator[str]:
             name,
             f"{least.at:.4f}",
             f"{least.indexes['step_length_m']:.3f}",
-            " + ".join(f"{least.found.x[key]:.3f}" for key in problem.display.durations),
+            " + ".join(f"{least.point.x[key]:.3f}" for key in problem.display.durations),
             watts(cart.indexes.get("power_W", np.nan), least.indexes["power_W"]),
             "; ".join(engine),
             "; ".join((cart.note, *cart.broken)),

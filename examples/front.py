@@ -9,12 +9,12 @@ front's slope at this point; `nlp-gait pareto` adds NSGA-II and CMOPSO.
 import matplotlib.pyplot as plt
 
 import nlp_gait
-from compare.questions.pareto.competing import competing_objective
-from compare.questions.pareto.front import pareto_front
+from compare.questions.pareto.competing import make_competing_objective
+from compare.questions.pareto.front import solve_front
 
 problem = nlp_gait.load("nao-dsp")
-margin = competing_objective("dbm_y_mean", problem)
-front = pareto_front(problem, margin, points=7, starts=1)
+margin = make_competing_objective("dbm_y_mean", problem)
+front = solve_front(problem, margin, points=7, starts=1)
 for point in front:
     print(f"{1000 * point.value:6.2f} mm: {point.power_W:.4f} W, the next millimetre for {point.price / 1000:.4f} W")
 

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from compare.questions.sweep.report import sweep_answer
-from compare.questions.sweep.study import parse_axis, sweep
-from compare.study.task import ProblemSpec
+import nlp_gait
+from compare.questions.question import find
+from compare.questions.sweep import Sweep, parse_axis
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-spec = ProblemSpec(name="nao-ssp")
-points = sweep(spec, [parse_axis("swing_height_m=0.015:0.028:5")], starts=2)
+question = Sweep(problem=nlp_gait.load("nao-ssp"), axes=[parse_axis("swing_height_m=0.015:0.028:5")], starts=2)
+points = find(question)
 for point in points:
     print(f"{point.at['swing_height_m'] * 1000:.1f} mm: {point.objective:.5f} W, {point.status}")
-print("wrote", *(path.name for path in sweep_answer(points, spec.load(), "ipopt").write(folder)))
+print("wrote", *(path.name for path in question.report(points).write(folder)))
 
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 axes.plot([1000 * point.at["swing_height_m"] for point in points], [point.objective for point in points], "o-")

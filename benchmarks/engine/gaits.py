@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 import nlp_gait
-from compare.questions.sweep.study import Axis
-from compare.questions.walk.study import CYCLE, optimal_gaits, result_of
-from compare.study.task import ProblemSpec
+from compare.questions.question import find
+from compare.questions.sweep import Axis
+from compare.questions.walk.walk import CheapestWalk
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
@@ -34,9 +34,10 @@ DRAWS, BATCH = 100, 20_000  # candidates drawn for random gaits: at most DRAWS b
 @cache
 def optimal_cycles(speeds: Sequence[float] = SPEEDS, **options: Any) -> Mapping[float, Result]:
     """Cheapest cycle at each speed [m/s], as ``nlp-gait walk`` finds it."""
-    spec = ProblemSpec(name=CYCLE, options={"objective": "power", **options})
-    gaits = optimal_gaits(spec, Axis(name="speed_m_s", values=tuple(speeds)), starts=3, seed=0)
-    return {gait.at: result_of(spec, gait.found) for gait in gaits if gait.found.feasible}
+    problem = nlp_gait.load("nao-cycle", objective="power", **options)
+    axis = Axis(name="speed_m_s", values=tuple(speeds))
+    gaits = find(CheapestWalk(problem=problem, axis=axis, starts=3)).gaits
+    return {gait.at: gait.result for gait in gaits if gait.point.feasible}
 
 
 @cache

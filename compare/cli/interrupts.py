@@ -25,7 +25,7 @@ def until_interrupted(
     """
 
     def kept() -> str:
-        return nothing if folder is None else kept_in(folder)
+        return nothing if folder is None else describe_stored(folder)
 
     try:
         return work(), ""
@@ -37,7 +37,7 @@ def until_interrupted(
         end_interrupted(f"interrupted before there was a result; {kept() or 'nothing was written'}")
 
 
-def kept_in(folder: Path) -> str:
+def describe_stored(folder: Path) -> str:
     """Return how many results are stored in a folder, and how to continue."""
     finished = sum(1 for files in ("store/**/*.json", "records/*/*.json") for _ in folder.glob(files))
     return f"{finished} finished results are stored in {folder}; rerun the command to continue"
@@ -49,4 +49,4 @@ def interruptible(folder: Path | None = None) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        end_interrupted(f"interrupted; {'nothing was written' if folder is None else kept_in(folder)}")
+        end_interrupted(f"interrupted; {'nothing was written' if folder is None else describe_stored(folder)}")

@@ -12,7 +12,7 @@ import typer
 
 from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError, describe_type, unknown
-from nlp_gait.formulation import Result
+from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import allow_code, is_reference
@@ -125,8 +125,12 @@ class NamedProblem(ProblemOptions):
     name: ProblemName
 
     def spec(self) -> ProblemSpec:
-        """Return the problem; raises as ``make_spec``."""
+        """Return the problem as plain data; raises as ``make_spec``."""
         return self.make_spec(self.name)
+
+    def load(self) -> GaitProblem:
+        """Return the problem; raises as ``make_spec``."""
+        return self.spec().load()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,8 @@ import metaheuristics
 from compare.analysis.units import with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
-from compare.questions.answer import Answer
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_starts
+from compare.questions.question import Answer
 from compare.report.document import Figure, text_table
 from compare.study.store import Store
 from compare.study.task import describe_problem

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compare.questions.robust.family import Worst
-from compare.questions.robust.playback import played
-from compare.questions.robust.study import Robust
-from compare.study.task import ProblemSpec
+from compare.questions.question import Work
+from compare.questions.robust.robot_box import Worst
+from compare.questions.robust.robust_gait import RobustGait, simulate_robots
+from nlp_gait import load
 
 # Optimum of nao-dsp, and the one that keeps its limits with soles off by 2 mm and masses by 5 %.
 NOMINAL = (0.31, 0.0068288, 6.49e-05, 0.0048554, 0.068276, -0.052914, -0.0217, 2.0)
@@ -19,10 +19,10 @@ CLOSE_M = 0.0003
 
 @pytest.mark.slow
 def test_the_engine_sees_the_margins_of_the_model() -> None:
-    spec = ProblemSpec(name="nao-dsp")
-    names = spec.load().names
+    problem = load("nao-dsp")
+    names = problem.names
     nothing = Worst(violation=0.0, row="", unit="m", corner={}, power_W=0.0)
-    found = Robust(
+    gait = RobustGait(
         name="soles",
         box={"sole_y_m": 0.002},
         corners=({"sole_y_m": 0.002},),
@@ -39,7 +39,7 @@ def test_the_engine_sees_the_margins_of_the_model() -> None:
         worst=nothing,
         random_worst=nothing,
     )
-    nominal, robust = played(spec, found)
+    nominal, robust = simulate_robots(problem, gait, Work())
     assert (nominal.gait, robust.gait) == ("nominal", "robust")
     for run in (nominal, robust):
         assert run.fell_at_s is None

@@ -12,7 +12,7 @@ from compare.cli.command import command
 from compare.cli.common import print_json, progress_bar, say, stdout
 from compare.cli.interrupts import interruptible
 from compare.cli.options import AnyProblem, AsJson, Code, Seed, name_all
-from compare.cli.questions.answers import Output
+from compare.cli.questions.output import Output
 from nlp_gait.errors import InputError
 
 
@@ -64,7 +64,7 @@ def certainty(
             seed=seed,
             progress=advance,
         )
-    output.take(certainty_answer(evidence))
+    output.write(certainty_answer(evidence))
 
 
 def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:

@@ -7,10 +7,8 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import fail, progress_bar, say
-from compare.cli.interrupts import until_interrupted
 from compare.cli.options import NaoPhase, Seed
-from compare.cli.questions.answers import Output
+from compare.cli.questions.output import Output
 
 
 @command
@@ -25,18 +23,6 @@ def motors(
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
     """
-    from compare.questions.motors.report import motors_answer
-    from compare.questions.motors.study import VARIANTS, motor_variants
-    from compare.study.store import Store
+    from compare.questions.motors import Motors
 
-    spec = problem.spec()
-    with progress_bar("variants", len(VARIANTS)) as advance:
-        store = Store(output.out, say)
-        found, stopped = until_interrupted(
-            lambda: motor_variants(spec, starts=starts, seed=seed, store=store, progress=advance),
-            folder=output.out,
-        )
-    output.take(motors_answer(found, spec.load()), stopped, store)
-    failed = [variant for variant in found if not variant.success]
-    if failed:
-        fail("; ".join(f"{variant.name}: {variant.status}" for variant in failed))
+    output.answer(Motors(problem=problem.load(), starts=starts, seed=seed))

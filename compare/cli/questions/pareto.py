@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import progress_bar, say
-from compare.cli.interrupts import interruptible
-from compare.cli.options import AsJson, NamedProblem, Seed
-from compare.cli.questions.answers import Output
+from compare.cli.options import NamedProblem, Seed
+from compare.cli.questions.output import Folder, Output
 from nlp_gait.errors import InputError
 
 SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Output(Output):
+    out: Folder = Path("pareto")
 
 
 @command
@@ -40,8 +44,7 @@ def pareto(
     runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search.")] = 11,
     seed: Seed = 0,
     problem: NamedProblem,
-    out: Annotated[Path, typer.Option(help="Folder; finished results are stored in it.")] = Path("pareto"),
-    as_json: AsJson = False,
+    output: _Output,
 ) -> None:
     """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
 
@@ -50,36 +53,16 @@ def pareto(
     Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --objectives power,dbm_y_mean,speed`
     """
     from compare.questions.pareto.competing import parse_objectives
-    from compare.questions.pareto.report import front_answer
-    from compare.questions.pareto.study import pareto_study, parse_searches
-    from compare.questions.pareto.surface import pareto_surface, surface_answer
-    from compare.study.store import Store
+    from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
+    from compare.questions.pareto.pareto_surface import ParetoSurface
 
     names = parse_objectives(objectives)
     searches = parse_searches(search or SEARCHES)
-    three = len(names) == 2  # beside power
-    if three and search and searches:
+    effort = {"points": points, "starts": starts, "seed": seed}
+    if len(names) == 1:
+        (name,) = names
+        output.answer(ParetoFront(problem=problem.load(), objective=name, searches=searches, runs=runs, **effort))
+        return
+    if search and searches:
         raise InputError("three objectives are traded without searches; leave out --search")
-    output = Output(out=out, as_json=as_json)
-    loaded = problem.spec().load()
-    store = Store(out, say)
-    with interruptible(out), progress_bar("front", None) as advance:
-        if three:
-            surface = pareto_surface(
-                loaded, names, points=points, starts=starts, seed=seed, store=store, progress=advance
-            )
-            answer = surface_answer(surface)
-        else:
-            study = pareto_study(
-                loaded,
-                names[0],
-                points=points,
-                starts=starts,
-                searches=searches,
-                runs=runs,
-                seed=seed,
-                store=store,
-                progress=advance,
-            )
-            answer = front_answer(study, loaded)
-    output.take(answer, store=store)
+    output.answer(ParetoSurface(problem=problem.load(), objectives=(names[0], names[1]), **effort))

@@ -7,10 +7,8 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, progress_bar, say
-from compare.cli.interrupts import until_interrupted
 from compare.cli.options import Evaluations, NamedProblem, Seed
-from compare.cli.questions.answers import Output
+from compare.cli.questions.output import Output
 
 
 @command
@@ -26,34 +24,11 @@ def sweep(
 ) -> None:
     """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
 
-    Called again after a kill or Ctrl-C, it continues where it stopped.
+    Rerun the command to continue after an interruption.
 
     Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
     """
-    from compare.questions.sweep.report import sweep_answer
-    from compare.questions.sweep.study import count_solves, parse_axis
-    from compare.questions.sweep.study import sweep as run_sweep
-    from compare.study.store import Store
-    from compare.study.task import Task
+    from compare.questions.sweep import Sweep, parse_axis
 
-    spec = problem.spec()
-    axes = [parse_axis(text) for text in over]
-    store = Store(output.out, say)
-    with progress_bar("solves", count_solves(axes, algorithm)) as advance:
-        points, stopped = until_interrupted(
-            lambda: run_sweep(
-                spec,
-                axes,
-                algorithm=algorithm,
-                starts=starts,
-                evaluations=evaluations,
-                seed=seed,
-                store=store,
-                progress=advance,
-            ),
-            folder=output.out,
-        )
-    output.take(sweep_answer(points, spec.load(), Task(problem=spec, solver=algorithm).title), store=store)
-    if stopped:
-        not_twice = ", not all of them solved from both sides" if algorithm == "ipopt" else ""
-        end_interrupted(f"{stopped}; these are in {output.out}{not_twice}; the same command continues")
+    axes, effort = [parse_axis(text) for text in over], {"starts": starts, "evaluations": evaluations, "seed": seed}
+    output.answer(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort))

@@ -10,7 +10,7 @@ from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_
 from compare.drawing.labels import axis_label
 from compare.papers.nao_pareto.nao_pareto_findings import NAMES, ParetoFindings, PhaseFindings
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS
-from compare.questions.pareto.report import SEARCH_COLOURS
+from compare.questions.pareto.pareto_front import SEARCH_COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

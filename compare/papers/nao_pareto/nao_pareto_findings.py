@@ -10,12 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, FrontRun, ParetoEffort
-from compare.questions.pareto.compare import Challenge
 from compare.questions.pareto.competing import CompetingObjective
-from compare.questions.pareto.front import FrontPoint, nondominated
-from compare.questions.pareto.knees import Bends, bends
-from compare.questions.pareto.report import SEARCH_NAMES
-from compare.questions.pareto.search import REFERENCE, Scale
+from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_nondominated
+from compare.questions.pareto.pareto_front import SEARCH_NAMES
+from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
 from metaheuristics.array import Array
 from nlp_gait.formulation import GaitProblem
 
@@ -87,7 +85,7 @@ class PhaseFindings:
     @cached_property
     def bends(self) -> Bends:
         """Knees of the front."""
-        return bends(self.front)
+        return find_bends(self.front)
 
     @cached_property
     def budgets(self) -> tuple[int, ...]:
@@ -103,7 +101,7 @@ class PhaseFindings:
         """Return criterion and power [W] of all points at the ends of all runs."""
         scale = Scale(self.first_front)
         F = [run.looks[-1].F for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
-        return scale.back(np.concatenate(F))
+        return scale.undo(np.concatenate(F))
 
     def _measure(self, algorithm: str, budget: int) -> Measures:
         from pymoo.indicators.hv import HV
@@ -115,7 +113,7 @@ class PhaseFindings:
         hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(spread_evenly(true))
         whole = float(hypervolume(true))
         runs = [run for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
-        fronts = [[scale(*first.back(look.F)) for look in run.looks] for run in runs]
+        fronts = [[scale(*first.undo(look.F)) for look in run.looks] for run in runs]
         ends = [run.looks[-1] for run in runs]
         return Measures(
             algorithm=algorithm,
@@ -155,7 +153,7 @@ def collect_points(front: Sequence[FrontPoint], runs: Sequence[FrontRun]) -> lis
     scale = Scale(front)
     found = []
     for run in runs:
-        values, powers = scale.back(run.looks[-1].F)
+        values, powers = scale.undo(run.looks[-1].F)
         for value, power, x in zip(values.tolist(), powers.tolist(), run.looks[-1].X.tolist(), strict=True):
             found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
-    return nondominated(found)
+    return select_nondominated(found)

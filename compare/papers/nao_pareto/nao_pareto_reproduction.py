@@ -29,12 +29,11 @@ from compare.papers.nao_pareto.nao_pareto_runs import (
 )
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction, Verdict
-from compare.questions.pareto.compare import Challenge, challenge
-from compare.questions.pareto.search import REFERENCE
-from compare.questions.pareto.study import pareto_study
+from compare.questions.pareto.pareto_front import ParetoFront
+from compare.questions.pareto.searches import REFERENCE, Challenge, challenge_front
+from compare.questions.question import Work, find
 from compare.report.document import Rows, Value
 from compare.study.store import Computation, Store
-from compare.study.stored_solver import store_runs
 from metaheuristics.multi_objective import constrained_moead, dynamic_nsga3, pymoo
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode
@@ -46,39 +45,32 @@ def run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
 
 
 def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFindings:
-    store = Store(runner.folder / phase, runner.progress)
-    study = pareto_study(
-        make_spec(phase, effort).load(),
-        CRITERION,
-        points=effort.points,
-        starts=effort.starts,
-        searches={},
-        runs=effort.runs,
-        seed=0,
-        store=store,
-        progress=runner.progress,
-    )
+    work = Work(store=Store(runner.folder / phase, runner.progress), progress=runner.progress)
+    problem = make_spec(phase, effort).load()
+    question = ParetoFront(problem=problem, objective=CRITERION, points=effort.points, starts=effort.starts)
+    front, criterion = find(question, work).front, question.criterion
+    problem = criterion.drop_demand(problem)
     results = runner.compute(
-        make_searches(phase, study.front, effort), code=(nao_pareto_runs, constrained_moead, dynamic_nsga3, pymoo)
+        make_searches(phase, front, effort), code=(nao_pareto_runs, constrained_moead, dynamic_nsga3, pymoo)
     )
     runs = tuple(make_run(result) for result in results.values())
-    points = collect_points(study.front, runs)
-    solve = partial(challenge, study.problem, study.criterion, study.front, points, store_runs(store), runner.progress)
+    points = collect_points(front, runs)
+    solve = partial(challenge_front, problem, criterion, front, points, work.solver(), work.progress)
     step = Computation(
         name=f"{phase}-challenge",
         inputs={
-            **fingerprint(study.problem),
+            **fingerprint(problem),
             "criterion": CRITERION,
-            "front": [asdict(point) for point in study.front],
+            "front": [asdict(point) for point in front],
             "points": [asdict(point) for point in points],
         },
         function=lambda: asdict(solve()),
     )
     (answer,) = runner.compute([step], code=()).values()
     return PhaseFindings(
-        problem=study.problem,
-        criterion=study.criterion,
-        first_front=study.front,
+        problem=problem,
+        criterion=criterion,
+        first_front=front,
         answer=decode(Challenge, answer),
         runs=runs,
     )
@@ -120,7 +112,7 @@ def make_tables(findings: ParetoFindings) -> dict[str, Rows]:
 def _make_front_row(phase: PhaseFindings) -> list[Value]:
     low, high, answer = phase.front[0], phase.front[-1], phase.answer
     ends = [low.value, low.power_W, high.value, high.power_W]
-    solved = [answer.points, answer.solved, 100 * answer.least_excess, answer.moved]
+    solved = [answer.points, answer.solved, 100 * answer.least_gap, answer.moved]
     return [phase.problem.name, len(phase.front), *ends, len(phase.bends.knees), *solved]
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from compare.papers.paper_runs import Effort, make_computation
-from compare.questions.pareto.competing import MARGINS, competing_objective
+from compare.questions.pareto.competing import MARGINS, make_competing_objective
 from compare.questions.pareto.front import FrontPoint
-from compare.questions.pareto.search import PowerAndCompeting, Scale
+from compare.questions.pareto.searches import PowerAndCompeting, Scale
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
@@ -91,11 +91,11 @@ def run_search(
 ) -> dict[str, Any]:
     """Return a run as plain data; ``ends`` are criterion and power at those of the front, whose ranges count as 1."""
     problem = spec.load()
-    criterion = competing_objective(CRITERION, problem)
+    criterion = make_competing_objective(CRITERION, problem)
     scale = Scale(
         [FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=()) for value, power in ends]
     )
-    objectives = PowerAndCompeting(compile_objective(criterion.freed(problem), threads=1), criterion, scale)
+    objectives = PowerAndCompeting(compile_objective(criterion.drop_demand(problem), threads=1), criterion, scale)
     snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=run)
     points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
     looks = [

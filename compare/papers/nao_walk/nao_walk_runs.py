@@ -13,8 +13,9 @@ from scipy.integrate import trapezoid
 
 from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, STRETCHED_M, make_footsteps
 from compare.papers.paper_runs import Effort, make_computation
-from compare.questions.sweep.study import Axis
-from compare.questions.walk.study import CYCLE, optimal_gaits
+from compare.questions.question import find
+from compare.questions.sweep import Axis
+from compare.questions.walk.walk import CheapestWalk
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.solve import solve
@@ -28,6 +29,7 @@ from nlp_gait.simulation.measurements import planned_distance, walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
+CYCLE = "nao-cycle"
 SPECS = {  # by source of the heat constant K
     "paper": ProblemSpec(name=CYCLE, options={"objective": "power"}),
     "sheet": ProblemSpec(name=CYCLE, options={"objective": "power", "motors": "heat"}),
@@ -112,14 +114,15 @@ def make_walk_computations(effort: NaoWalkEffort, optima: Mapping[str, Mapping[s
 
 def solve_over_speed(spec: ProblemSpec, speeds: Sequence[float], starts: int) -> list[dict[str, Any]]:
     """Return the cheapest gait at each speed."""
-    gaits = optimal_gaits(spec, Axis(name="speed_m_s", values=tuple(speeds)), starts=starts, seed=0)
+    axis = Axis(name="speed_m_s", values=tuple(speeds))
+    gaits = find(CheapestWalk(problem=spec.load(), axis=axis, starts=starts)).gaits
     return [
         {
             "speed_m_s": gait.at,
-            "feasible": gait.found.feasible,
+            "feasible": gait.point.feasible,
             "cost_of_transport": gait.indexes["cost_of_transport"],
             "energy_J_per_m": gait.indexes["energy_J_per_m"],
-            "x": dict(gait.found.x),
+            "x": dict(gait.point.x),
         }
         for gait in gaits
     ]

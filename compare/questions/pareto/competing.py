@@ -1,4 +1,4 @@
-"""Objectives that compete with power, a balance margin or the walking speed: each as a limit, a number and an expression."""
+"""Objectives that compete with power: a balance margin or the walking speed, as a limit, a number and an expression."""
 
 from __future__ import annotations
 
@@ -32,35 +32,35 @@ class Margin:
         """The limit's name."""
         return f"{self.name}_limit_m"
 
-    def demanded(self, problem: GaitProblem) -> float:
-        """Least value that the problem as it is demands."""
+    def get_demand(self, problem: GaitProblem) -> float:
+        """Return the least value that the problem demands."""
         return problem.value(self.parameter)
 
-    def freed(self, problem: GaitProblem) -> GaitProblem:
-        """The problem with the least demand: zero, which keeps the ZMP within the soles' box."""
+    def drop_demand(self, problem: GaitProblem) -> GaitProblem:
+        """Return the problem with the least demand: zero, which keeps the ZMP within the soles' box."""
         return problem.with_values(**{self.parameter: 0.0})
 
-    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """The problem with a least value."""
+    def demand(self, problem: GaitProblem, least: float) -> GaitProblem:
+        """Return the problem with a least value."""
         return problem.with_values(**{self.parameter: least})
 
-    def value(self, problem: GaitProblem, x: Array) -> float:
-        """Exact value at x (n,)."""
+    def evaluate(self, problem: GaitProblem, x: Array) -> float:
+        """Return the exact value at x (n,)."""
         return build_exact_model(problem).at(x, problem.p).indexes[f"{self.name}_m"]
 
-    def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """(P,) values of candidates (P, n)."""
+    def evaluate_many(self, objective: CompiledObjective, X: Array) -> Array:
+        """Return the values (P,) of candidates (P, n)."""
         margins: Array = objective.constraints(X)[:, _rows(objective.groups, self._group)].min(axis=1)
         return margins
 
-    def expression(self, point: Point, assembly: Assembly) -> MX:
-        """Scalar for the assembly of a problem, of the mean margins only: smooth but for the jump that is smoothed anyway."""
+    def express(self, point: Point, assembly: Assembly) -> MX:
+        """Return a scalar for the assembly of a problem; only the mean margins are smooth enough."""
         if not self.name.endswith("_mean"):
             raise InputError(f"{self.name} has no smooth expression; trade a mean margin: dbm_y_mean, dbm_x_mean")
         return assembly.group(self.name).value
 
-    def price(self, solution: Solution) -> float:
-        """Change of the least power per unit of the demand [W/unit]."""
+    def compute_price(self, solution: Solution) -> float:
+        """Return the change of the least power per unit of the demand [W/unit]."""
         return sum((a.price for a in solution.active_constraints if a.name.partition("[")[0] == self._group), 0.0)
 
     @property
@@ -69,7 +69,7 @@ class Margin:
         return self.name.removesuffix("_min")
 
 
-@lru_cache(maxsize=16)  # searches ask for one point at a time
+@lru_cache(maxsize=16)  # some searches evaluate one point at a time
 def _rows(groups: tuple[str, ...], group: str) -> list[int]:
     return [i for i, name in enumerate(groups) if name == group]
 
@@ -88,33 +88,33 @@ class Speed:
     name: str = SPEED
     unit: str = "m/s"
 
-    def demanded(self, problem: GaitProblem) -> float:
-        """Least value that the problem as it is demands."""
+    def get_demand(self, problem: GaitProblem) -> float:
+        """Return the least value that the problem demands."""
         return self.distance_m / problem.value(f"{self.duration}.upper")
 
-    def freed(self, problem: GaitProblem) -> GaitProblem:
-        """The problem itself: its bound on the duration stays, and no speed is demanded beyond that."""
+    def drop_demand(self, problem: GaitProblem) -> GaitProblem:
+        """Return the problem itself: its bound on the duration stays, and demands no more speed than that."""
         return problem
 
-    def limited(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """The problem with a least value."""
+    def demand(self, problem: GaitProblem, least: float) -> GaitProblem:
+        """Return the problem with a least value."""
         end = f"{self.duration}.upper"
         return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.distance_m / least)})
 
-    def value(self, problem: GaitProblem, x: Array) -> float:
-        """Exact value at x (n,)."""
+    def evaluate(self, problem: GaitProblem, x: Array) -> float:
+        """Return the exact value at x (n,)."""
         return self.distance_m / float(x[problem.variable_index(self.duration)])
 
-    def values(self, objective: CompiledObjective, X: Array) -> Array:
-        """(P,) values of candidates (P, n)."""
+    def evaluate_many(self, objective: CompiledObjective, X: Array) -> Array:
+        """Return the values (P,) of candidates (P, n)."""
         return self.distance_m / X[:, objective.names.index(self.duration)]
 
-    def expression(self, point: Point, assembly: Assembly) -> MX:
-        """Scalar for the assembly of a problem."""
+    def express(self, point: Point, assembly: Assembly) -> MX:
+        """Return a scalar for the assembly of a problem."""
         return self.distance_m / point[self.duration]
 
-    def price(self, solution: Solution) -> float:
-        """Change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = distance / v."""
+    def compute_price(self, solution: Solution) -> float:
+        """Return the change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = distance / v."""
         per_second = sum(
             a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
         )
@@ -122,33 +122,33 @@ class Speed:
 
 
 CompetingObjective = Margin | Speed
-"""A quantity that is to be large, and whose least value can be demanded by a parameter."""
+"""A quantity to be maximised, whose least value can be demanded by a parameter."""
 
 
-def competing_objective(name: str, problem: GaitProblem) -> CompetingObjective:
-    """What a NAO phase trades against power, by name.
+def make_competing_objective(name: str, problem: GaitProblem) -> CompetingObjective:
+    """Return the objective of this name that a NAO phase trades against power.
 
     Raises:
-        UnknownNameError: no such objective.
+        UnknownNameError: an unknown objective.
         InputError: the problem has no power, margins and duration to trade.
     """
     durations = problem.display.durations
     if problem.objective.name != POWER or len(durations) != 1 or problem.display.motion is None:
-        raise InputError(f"{problem.name} trades no power against balance or speed; allowed are nao-ssp and nao-dsp")
+        raise InputError(f"{problem.name} has no power, balance and speed to trade; allowed are nao-ssp and nao-dsp")
     if name in MARGINS:
         return Margin(name=name)
     if name != SPEED:
-        raise unknown("objective beside power", name, (*MARGINS, SPEED))
+        raise unknown("objective next to power", name, (*MARGINS, SPEED))
     middle = (problem.lower + problem.upper) / 2
     hip = problem.signals(middle).arrays["hip"]
     return Speed(duration=durations[0], distance_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
 
 
-def rewarding(problem: GaitProblem, criterion: CompetingObjective) -> GaitProblem:
-    """The problem that minimises power less a reward for the criterion, whose size is the parameter ``reward_W_per_unit``."""
+def add_reward(problem: GaitProblem, criterion: CompetingObjective) -> GaitProblem:
+    """Return the problem that minimises power less a reward for the criterion, of the size ``reward_W_per_unit``."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
-        cost = assembly.objective - point[REWARD] * criterion.expression(point, assembly)
+        cost = assembly.objective - point[REWARD] * criterion.express(point, assembly)
         return replace(assembly, objective=cost)
 
     reward = Parameter(
@@ -163,10 +163,10 @@ def rewarding(problem: GaitProblem, criterion: CompetingObjective) -> GaitProble
 
 
 def parse_objectives(text: str) -> Sequence[str]:
-    """Objectives beside power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
+    """Return the objectives next to power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
 
     Raises:
-        InputError: power is missing, or a name stands twice, or there are fewer than two or more than three.
+        InputError: power is missing, a name is duplicated, or there are fewer than two or more than three.
     """
     names = [part.strip() for part in text.split(",")]
     others = [name for name in names if name != POWER]

@@ -1,4 +1,4 @@
-"""The true front of power against one criterion, by epsilon-constraint: least power for each demanded value of the criterion."""
+"""The true front of power against one criterion: least power for each demanded value of the criterion, and its knees."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compare.questions.pareto.competing import REWARD, CompetingObjective, rewarding
+from compare.questions.pareto.competing import REWARD, CompetingObjective, add_reward
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
 from nlp_gait.backends.solve import make_solution, solve
@@ -24,8 +24,12 @@ LARGEST_TRADE_OFF = 1000.0
 LEAST_POINTS = 5
 # Random starts are tried at every third point of the first, evenly spaced ones.
 CHECK_EVERY = 3
-# Planned at least: IPOPT's functions are worth compiling.
+# So many solves that compiling IPOPT's functions pays.
 SOLVES = 200
+
+# A bend is a knee if the front turns by this much [rad] within this part of its length, the ranges of both objectives being 1.
+LEAST_TURN = np.pi / 12
+WINDOW = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +53,7 @@ class FrontPoint:
     x: tuple[float, ...]
 
 
-def pareto_front(
+def solve_front(
     problem: GaitProblem,
     criterion: CompetingObjective,
     *,
@@ -59,11 +63,11 @@ def pareto_front(
     solver: Solver | None = None,
     progress: Progress = ignore_progress,
 ) -> list[FrontPoint]:
-    """Points of the front, by rising criterion, about evenly spaced along it.
+    """Return points of the front, by rising criterion, about evenly spaced along it.
 
     Half of the points are spaced evenly over the criterion, from its value at the least power to the end of the front; the
-    others halve the longest gaps between neighbours, measured with both ranges as 1. Each is solved from both neighbours and
-    at some from random starts, and the whole is then walked there and back, so that a better local optimum found anywhere
+    others halve the longest gaps between neighbours, measured with both ranges as 1. Each is solved from both neighbours, some
+    also from random starts, and the whole front is then followed forwards and backwards, so that a better local optimum
     spreads as far as it is the better one.
 
     Args:
@@ -73,27 +77,27 @@ def pareto_front(
         starts: random starts at both ends and at every third point.
         seed: of the random starts.
         solver: with its settings; None for IPOPT with its defaults.
-        progress: told what is done.
+        progress: receives a note after each solve.
 
     Raises:
         InputError: too few points, or the least power or the largest criterion cannot be found.
     """
     if points < LEAST_POINTS:
         raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
-    free = criterion.freed(problem)
-    low, high = front_ends(free, criterion, starts, seed, solver)
-    ready = (solver or IpoptSettings()).prepare(free, SOLVES)
+    problem = criterion.drop_demand(problem)
+    low, high = solve_ends(problem, criterion, starts, seed, solver)
+    ready = (solver or IpoptSettings()).prepare(problem, SOLVES)
     rng = np.random.default_rng(seed)
     found: dict[float, list[Outcome]] = {}
 
     def attempt(at: float, x0: Array) -> None:
-        limited = criterion.limited(free, at)
+        limited = criterion.demand(problem, at)
         found.setdefault(at, []).append(ready.run(limited, np.clip(x0, limited.lower, limited.upper)))
 
-    def walk(order: Sequence[float], path_seed: int) -> None:
+    def follow(order: Sequence[float], path_seed: int) -> None:
         path = Continuation(starts=starts, seed=path_seed, solver=solver, solves=SOLVES)
         for at in order:
-            limited = criterion.limited(free, at)
+            limited = criterion.demand(problem, at)
             found[at] = found.get(at, []) + path.run(limited, found.get(at, []))
             progress(f"{criterion.name} {at:.5g} {criterion.unit}")
 
@@ -102,35 +106,39 @@ def pareto_front(
         attempt(at, np.array(point.x))
     for at in grid[::CHECK_EVERY]:
         for _ in range(starts):
-            attempt(at, criterion.limited(free, at).start_point(rng))
+            attempt(at, criterion.demand(problem, at).start_point(rng))
         progress(f"random starts at {criterion.name} {at:.5g} {criterion.unit}")
-    walk(grid, seed)
-    walk(grid[::-1], seed + 1)
+    follow(grid, seed)
+    follow(grid[::-1], seed + 1)
     while len(found) < points:
-        at, neighbours = _largest_gap(found)
-        limited = criterion.limited(free, at)
+        at, neighbours = _find_largest_gap(found)
+        limited = criterion.demand(problem, at)
         warm = (ready.run_from(limited, end) for end in neighbours)
         found[at] = [*found.get(at, []), *(end for end in warm if end is not None)]
         if find_cheapest_feasible(found[at]) is None:
             for end in neighbours:
                 attempt(at, end.x)
         progress(f"{criterion.name} {at:.5g} {criterion.unit}")
-    walk(sorted(found), seed)
-    walk(sorted(found, reverse=True), seed + 1)
-    return nondominated([p for at in sorted(found) if (p := _point(free, criterion, at, found[at])) is not None])
+    follow(sorted(found), seed)
+    follow(sorted(found, reverse=True), seed + 1)
+    return select_nondominated(
+        [p for at in sorted(found) if (p := _make_point(problem, criterion, at, found[at])) is not None]
+    )
 
 
-def point_at(
-    free: GaitProblem, criterion: CompetingObjective, least: float, x0: Array, solver: Solver | None = None
+def solve_point(
+    problem: GaitProblem, criterion: CompetingObjective, least: float, x0: Array, solver: Solver | None = None
 ) -> FrontPoint | None:
-    """Least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
-    limited = criterion.limited(free, least)
+    """Return the least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
+    limited = criterion.demand(problem, least)
     x0 = np.clip(x0, limited.lower, limited.upper)
-    return _point(free, criterion, least, [(solver or IpoptSettings()).prepare(free, SOLVES).run(limited, x0)])
+    return _make_point(
+        problem, criterion, least, [(solver or IpoptSettings()).prepare(problem, SOLVES).run(limited, x0)]
+    )
 
 
-def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
-    """Points by rising criterion without those that another equals or betters in both; of equals the first stays."""
+def select_nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
+    """Return the points, by rising criterion, that no other point equals or betters in both; the first of equal ones stays."""
     kept: list[FrontPoint] = []
     for point in sorted(points, key=lambda p: (-p.value, p.power_W)):
         if not kept or point.power_W < kept[-1].power_W:
@@ -138,24 +146,24 @@ def nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     return kept[::-1]
 
 
-def front_ends(
-    free: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver | None = None
+def solve_ends(
+    problem: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver | None = None
 ) -> tuple[FrontPoint, FrontPoint]:
-    """Least power, and the point beyond which the criterion costs too much."""
-    solution = solve(free, starts=2 * starts, seed=seed, solver=solver)
+    """Return the least power, and the point beyond which the criterion costs too much."""
+    solution = solve(problem, starts=2 * starts, seed=seed, solver=solver)
     if not solution.converged:
-        raise InputError(f"{free.name} has no front: {solution.status}")
-    low = _reached(free, criterion, solution)
+        raise InputError(f"{problem.name} has no front: {solution.status}")
+    low = _make_reached(problem, criterion, solution)
     reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
-    ending = rewarding(free, criterion).with_values(**{REWARD: reward})
+    ending = add_reward(problem, criterion).with_values(**{REWARD: reward})
     solution = solve(ending, starts=2 * starts, seed=seed, solver=solver)
     if not solution.converged:
-        raise InputError(f"the largest {criterion.name} of {free.name} was not found: {solution.status}")
-    return low, _reached(free, criterion, solution)
+        raise InputError(f"the largest {criterion.name} of {problem.name} was not found: {solution.status}")
+    return low, _make_reached(problem, criterion, solution)
 
 
-def _largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome]]:
-    """Middle of the longest gap between neighbours that were solved, and their ends."""
+def _find_largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome]]:
+    """Middle of the longest gap between solved neighbours, and their ends."""
     solved = [(at, end) for at in sorted(found) if (end := find_cheapest_feasible(found[at])) is not None]
     at = np.array([a for a, _ in solved])
     cost = np.array([end.cost for _, end in solved])
@@ -164,25 +172,107 @@ def _largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome
     return float((at[k] + at[k + 1]) / 2), [solved[k][1], solved[k + 1][1]]
 
 
-def _point(
-    free: GaitProblem, criterion: CompetingObjective, at: float, outcomes: Sequence[Outcome]
+def _make_point(
+    problem: GaitProblem, criterion: CompetingObjective, at: float, outcomes: Sequence[Outcome]
 ) -> FrontPoint | None:
-    solution = make_solution(criterion.limited(free, at), outcomes)
+    solution = make_solution(criterion.demand(problem, at), outcomes)
     best = find_cheapest_feasible(outcomes)
     if best is None:
         return None
-    price = math.nan if best.guess is None else criterion.price(solution)
-    return replace(_reached(free, criterion, solution), demanded=at, price=price)
+    price = math.nan if best.guess is None else criterion.compute_price(solution)
+    return replace(_make_reached(problem, criterion, solution), demanded=at, price=price)
 
 
-def _reached(free: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
-    """A solution as a point that demands what it reaches."""
-    x = free.check_x(solution.x)
-    value = criterion.value(free, x)
+def _make_reached(problem: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
+    """Return a solution as a point that demands what it reaches."""
+    x = problem.check_x(solution.x)
+    value = criterion.evaluate(problem, x)
     return FrontPoint(
         demanded=value,
         value=value,
-        power_W=build_exact_model(free).at(x, free.p).cost,
+        power_W=build_exact_model(problem).at(x, problem.p).cost,
         violation=solution.violation,
         x=tuple(x.tolist()),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Knee:
+    """A point at which the front bends away from the better values.
+
+    Attributes:
+        value: of the criterion.
+        power_W: there.
+        price_before: slope just below it [W per unit].
+        price_after: slope just above it [W per unit].
+        turn_deg: by how much the front turns around it, with both ranges as 1 [degree].
+        chord_distance: from the straight line between the front's ends, with both ranges as 1; negative behind it.
+    """
+
+    value: float
+    power_W: float
+    price_before: float
+    price_after: float
+    turn_deg: float
+    chord_distance: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bends:
+    """How a front bends.
+
+    Attributes:
+        knees: bends, by rising criterion.
+        farthest: number of the point farthest from the chord, on its better side.
+        convex: no segment is flatter than the one before it by more than a hundredth of its slope: then there is at most one
+            knee in the sense of the chord.
+    """
+
+    knees: tuple[Knee, ...]
+    farthest: int
+    convex: bool
+
+
+def find_bends(front: Sequence[FrontPoint]) -> Bends:
+    """Return the knees of a front (at least three points, by rising criterion).
+
+    At a knee, the straight lines from the point a twentieth of the front's length before it and to the point as far behind it
+    differ in direction by at least 15 degrees, towards higher prices, both ranges being 1; so a single inaccurate point makes
+    no knee. Of those within a tenth of the length the sharpest counts. The prices come from the multipliers.
+    """
+    value, power = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
+    across, up = np.diff(value) / np.ptp(value), np.diff(power) / np.ptp(power)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(across, up))])
+    scaled = np.column_stack([(value - value[0]) / np.ptp(value), (power - power[0]) / np.ptp(power)])
+    # From the better side: the chord lies above a convex front.
+    chord = (scaled[:, 0] - scaled[:, 1]) / np.sqrt(2)
+    half = WINDOW * along[-1] / 2
+
+    def at(place: Array) -> Array:
+        return np.column_stack([np.interp(place, along, scaled[:, k]) for k in (0, 1)])
+
+    before, after = scaled - at(along - half), at(along + half) - scaled
+    total = np.arctan2(after[:, 1], after[:, 0]) - np.arctan2(before[:, 1], before[:, 0])
+    total[(along < half) | (along > along[-1] - half)] = 0.0
+    free = np.ones(len(front), dtype=bool)
+    knees = []
+    while free.any() and total[free].max() >= LEAST_TURN:
+        centre = int(np.flatnonzero(free)[np.argmax(total[free])])
+        window = np.flatnonzero(np.abs(along - along[centre]) <= half)
+        knees.append(
+            Knee(
+                value=float(value[centre]),
+                power_W=float(power[centre]),
+                price_before=front[max(0, window[0] - 1)].price,
+                price_after=front[min(len(front) - 1, window[-1] + 1)].price,
+                turn_deg=float(np.degrees(total[centre])),
+                chord_distance=float(chord[centre]),
+            )
+        )
+        free &= np.abs(along - along[centre]) > 2 * half
+    slope = up / across
+    return Bends(
+        knees=tuple(sorted(knees, key=lambda knee: knee.value)),
+        farthest=int(np.argmax(chord)),
+        convex=bool(np.all(slope[1:] >= slope[:-1] * 0.99)),
     )

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from compare.questions.motors import study as motors
+from compare.questions import motors
 from compare.questions.pareto import front as pareto_front
-from compare.questions.prices import study as prices
-from compare.questions.robust import study as robust
+from compare.questions.prices import prices
+from compare.questions.robust import robust_gait as robust
 from nlp_gait.backends.solvers.solver import IterationWatch
 from tests.compare.cli.calls import nlp_gait, one_sentence
 
@@ -38,7 +38,7 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
     powers = [point["power_W"] for point in data["front"]]
     assert len(powers) >= 4 and powers == sorted(powers)
     assert data["criterion"] == {"name": "speed", "unit": "m/s"}
-    assert [(row["algorithm"], row["budget"], row["runs"]) for row in data["searches"]] == [("NSGA2", 100, 1)]
+    assert [(row["solver"], row["budget"], row["runs"]) for row in data["searches"]] == [("NSGA2", 100, 1)]
     written = {Path(file).name for file in data["files"]}
     assert written >= {"nao-ssp-front-speed.csv", "nao-ssp-pareto-speed.json"}
     assert all(Path(file).stat().st_size > 0 for file in data["files"])
@@ -51,7 +51,7 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--objectives", "power,dbm_z"], ["unknown objective beside power 'dbm_z'", "dbm_y_mean"]),
+        (["--objectives", "power,dbm_z"], ["unknown objective next to power 'dbm_z'", "dbm_y_mean"]),
         (["--objectives", "power"], ["--objectives takes power and one or two of", "got 'power'"]),
         (["--search", "NSGA2"], ["--search takes NAME=BUDGET,BUDGET", "'NSGA2'"]),
         (["--search", "NSGA3=100"], ["Known: NSGA2, CMOPSO", "'NSGA3'"]),
@@ -134,7 +134,7 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
             press()
         return evaluate(watch, arguments)
 
-    ends = pareto_front.front_ends
+    ends = pareto_front.solve_ends
 
     def found(*arguments: object, **named: object) -> object:
         result = ends(*arguments, **named)  # type: ignore[arg-type]
@@ -142,7 +142,7 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
         return result
 
     monkeypatch.setattr(IterationWatch, "eval", counted)
-    monkeypatch.setattr(pareto_front, "front_ends", found)
+    monkeypatch.setattr(pareto_front, "solve_ends", found)
     steps = tmp_path / "store"
     steps.mkdir()
     (steps / "earlier.json").write_text("{}")
@@ -158,7 +158,7 @@ def test_ctrl_c_in_motors_writes_the_finished_variants(tmp_path: Path, monkeypat
     monkeypatch.setattr(motors, "solve", pressed_in_call(2, motors.solve))
     done = nlp_gait("motors", "nao-ssp", "--intervals", "3", "--starts", "1", "--out", tmp_path, status=130)
     assert (
-        f"interrupted after 1 of 8 variants; what was found is in {tmp_path}; the same command continues\n"
+        f"interrupted after 1 of 8 variants; the results are in {tmp_path}; rerun the command to continue\n"
         in done.stderr
     )
     assert len((tmp_path / "nao-ssp-motors.csv").read_text().splitlines()) == 2
@@ -169,10 +169,10 @@ def test_ctrl_c_before_the_first_result_says_that_nothing_is_kept(
 ) -> None:
     for module in (motors, robust):
         monkeypatch.setattr(module, "solve", press)
-    monkeypatch.setattr(prices, "solved", press)
+    monkeypatch.setattr(prices, "Continuation", press)
     out = ["--out", tmp_path]
     kept = f"finished results are stored in {tmp_path}; rerun the command to continue\n"
     assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("motors", *out, status=130)
-    assert f"after 0 of 3 boxes; 2 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
+    assert f"interrupted; 2 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
     assert f"interrupted; 3 {kept}" in one_sentence("prices", "walk12", *out, status=130)
     assert [path.name for path in tmp_path.iterdir()] == ["store"]

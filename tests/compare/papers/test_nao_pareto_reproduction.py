@@ -38,7 +38,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
 def test_no_point_of_a_search_betters_the_true_front(finished: Finished) -> None:
     findings = finished.findings
     for phase in findings.phases:
-        assert phase.answer.least_excess > -1e-6 and phase.answer.infeasible == 0
+        assert phase.answer.least_gap > -1e-6 and phase.answer.infeasible == 0
         front = np.array([(p.value, p.power_W) for p in phase.front])
         assert np.all(np.diff(front, axis=0) > 0.0)
         for measures in phase.measures.values():

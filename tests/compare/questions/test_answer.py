@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.cli.questions.answers import Output
-from compare.questions.answer import Answer, all_digits, optima_table
+from compare.cli.questions.output import Output
+from compare.questions.question import Answer, make_csv_table, make_optima_table
 from nlp_gait.errors import OutputError
 
 ANSWER = Answer(
@@ -17,9 +17,9 @@ ANSWER = Answer(
     title="walk: the question",
     verdict=("One third is enough.",),
     parts=(
-        "A remark.",
-        optima_table({"first": {"a_m": 1.0 / 3.0}, "second": {"a_m": 2.0}}),
-        all_digits("walk-numbers", ["case", "a_m", "found", "price"], [["first", 1.0 / 3.0, True, None]]),
+        "A note.",
+        make_optima_table({"first": {"a_m": 1.0 / 3.0}, "second": {"a_m": 2.0}}),
+        make_csv_table("walk-numbers", ["case", "a_m", "found", "price"], [["first", 1.0 / 3.0, True, None]]),
     ),
     data={"a_m": 1.0 / 3.0, "bound": math.inf},
     results={"walk-first": {"problem": "walk"}},
@@ -38,9 +38,9 @@ def test_an_answer_is_a_page_a_table_with_every_digit_and_plain_data(tmp_path: P
 
 
 def test_sentences_and_tables_for_people_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Output(out=tmp_path).take(ANSWER)
+    Output(out=tmp_path).write(ANSWER)
     printed = capsys.readouterr().out
-    for words in ("walk: the question", "One third is enough.", "A remark.", "0.33333", "wrote "):
+    for words in ("walk: the question", "One third is enough.", "A note.", "0.33333", "wrote "):
         assert words in printed
     assert "price" not in printed
 
@@ -49,5 +49,5 @@ def test_an_answer_that_cannot_be_written_is_printed(tmp_path: Path, capsys: pyt
     output = Output(out=tmp_path / "gone", as_json=True)
     output.out.rmdir()
     with pytest.raises(OutputError, match="cannot write"):
-        output.take(ANSWER)
+        output.write(ANSWER)
     assert json.loads(capsys.readouterr().out) == {"a_m": 1.0 / 3.0, "bound": None, "files": []}

@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from compare.judge import evaluate
-from compare.questions.motions import study as module
-from compare.questions.motions.report import motions_answer, sentences
-from compare.questions.motions.study import Motion, limit, motions
-from compare.questions.motions.tasks import tasks
+from compare.questions.motions import motion as module
+from compare.questions.motions.motion import Motion, extrapolate, find_start, load_phase, make_tasks
+from compare.questions.motions.motions import Motions, describe_motions
+from compare.questions.question import Work, find
 from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError
@@ -32,33 +32,39 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(folder: Path) -> list[Motion]:
-    return motions(tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0), store=Store(folder))
+def question() -> Motions:
+    return Motions(problem=load_phase("nao-dsp", "nao-v5"), orders=ORDERS, free_orders=(), starts=0)
 
 
-def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: list[Motion]) -> None:
+@pytest.fixture(scope="module")
+def found(folder: Path, question: Motions) -> tuple[Motion, ...]:
+    return find(question, Work(store=Store(folder)))
+
+
+def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: tuple[Motion, ...]) -> None:
     cubic, quintic, coarse = found
-    assert all(motion.success for motion in found)
+    assert all(motion.feasible for motion in found)
     assert quintic.power_W < 0.9 * cubic.power_W
     assert quintic.power_W == pytest.approx(quintic.dense_power_W, rel=0.01)
     assert coarse.power_W == pytest.approx(coarse.dense_power_W, rel=0.1)
     assert (cubic.coefficients, quintic.coefficients) == (0, 14)
 
 
-def test_a_study_continues_from_its_files(folder: Path, found: list[Motion], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_question_continues_from_its_files(
+    folder: Path, question: Motions, found: tuple[Motion, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     def never(*_: Any, **__: Any) -> None:
         raise AssertionError("solved again")
 
     monkeypatch.setattr(module, "solve", never)
     again: list[str] = []
-    study = tasks("nao-dsp", orders=ORDERS, free_orders=(), starts=0)
-    assert motions(study, store=Store(folder), progress=again.append) == found
+    assert find(question, Work(store=Store(folder), progress=again.append)) == found
     assert again == ["planned-cubic-power", "planned-quintic-power", "coarse-quintic-power"]
     with pytest.raises(AssertionError, match="solved again"):
-        motions(study, store=Store(folder), seed=1)
+        find(replace(question, seed=1), Work(store=Store(folder)))
 
 
-def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
+def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...]) -> None:
     command = ["motions", "nao-dsp", "--orders", "cubic,quintic", "--free-orders", "", "--starts", "0"]
     command += ["--out", str(folder)]
     done = RUN.invoke(app, [*command, "--json"])
@@ -74,26 +80,26 @@ def test_table_pictures_and_command(folder: Path, found: list[Motion]) -> None:
     assert "11 samples: quintic" in printed and "never rises" in printed
 
 
-def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: list[Motion]) -> None:
-    *_, task = tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], starts=0)
+def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: tuple[Motion, ...]) -> None:
+    *_, task = make_tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], starts=0)
     problem = ProblemSpec(name=task.problem, options=task.options).load()
     planned = ProblemSpec(name="nao-dsp", options=task.options).load()
-    x0 = module._start(task, problem, found)
+    x0 = find_start(task, problem, found)
     assert x0 is not None
     expected = evaluate(planned, np.array(list(found[1].x.values())))
     assert evaluate(problem, x0).indexes["power_W"] == pytest.approx(expected.indexes["power_W"], rel=1e-9)
 
 
-def test_a_rise_is_said_and_not_hidden(found: list[Motion]) -> None:
+def test_a_rise_is_reported(question: Motions, found: tuple[Motion, ...]) -> None:
     cubic, quintic, coarse = found
     worse = replace(quintic, power_W=cubic.power_W + 0.01)
-    assert "power rises by up to 0.01 W" in sentences([cubic, worse, coarse])[0]
-    assert "-" in motions_answer([cubic, worse], "nao-dsp").parts[0].rows[1][3]
+    assert "power rises by up to 0.01 W" in describe_motions([cubic, worse, coarse])[0]
+    assert "-" in question.report((cubic, worse)).parts[0].rows[1][3]
 
 
 @pytest.mark.parametrize("phase", ["nao-ssp", "nao-dsp"])
 def test_a_study_adds_free_joints_and_smoothness(phase: str) -> None:
-    study = tasks(phase, orders=["cubic", "spline-4"], free_orders=["spline-2"])
+    study = make_tasks(phase, orders=["cubic", "spline-4"], free_orders=["spline-2"])
     assert [(task.kind, task.problem, task.trajectory) for task in study] == [
         ("planned", phase, "cubic"),
         ("planned", phase, "spline-4"),
@@ -116,11 +122,15 @@ def test_a_study_adds_free_joints_and_smoothness(phase: str) -> None:
 )
 def test_other_studies_are_refused(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        tasks(**arguments)
+        make_tasks(**arguments)
 
 
 def test_the_limit_of_a_geometric_sequence_is_exact() -> None:
-    assert limit([3.0, 2.0, 1.5]) == pytest.approx(1.0)
-    assert limit([9.0, 3.0, 2.0, 1.5]) == pytest.approx(1.0)
-    assert limit([3.0, 2.0, 1.0]) is None and limit([3.0, 2.0]) is None and limit([3.0, 2.0, 2.5]) is None
-    assert limit([3.0, 2.0, 1.1]) is None  # would be 8.1 away, nine times as far as the last step
+    assert extrapolate([3.0, 2.0, 1.5]) == pytest.approx(1.0)
+    assert extrapolate([9.0, 3.0, 2.0, 1.5]) == pytest.approx(1.0)
+    assert (
+        extrapolate([3.0, 2.0, 1.0]) is None
+        and extrapolate([3.0, 2.0]) is None
+        and extrapolate([3.0, 2.0, 2.5]) is None
+    )
+    assert extrapolate([3.0, 2.0, 1.1]) is None  # would be 8.1 away, nine times as far as the last step

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.questions.motors import study as motors
+from compare.questions import motors
 
 RUN = CliRunner()
 

@@ -10,14 +10,12 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.questions.pareto.compare import quality
-from compare.questions.pareto.competing import competing_objective, parse_objectives
-from compare.questions.pareto.front import FrontPoint, nondominated, pareto_front
-from compare.questions.pareto.knees import bends
-from compare.questions.pareto.report import front_answer
-from compare.questions.pareto.search import SearchFront
-from compare.questions.pareto.study import ParetoStudy, pareto_study, parse_searches
-from compare.questions.pareto.surface import pareto_surface, surface_answer
+from compare.questions.pareto.competing import make_competing_objective, parse_objectives
+from compare.questions.pareto.front import FrontPoint, find_bends, select_nondominated, solve_front
+from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
+from compare.questions.pareto.pareto_surface import ParetoSurface
+from compare.questions.pareto.searches import SearchFront, compute_qualities
+from compare.questions.question import Work, find
 from compare.study.store import Store
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
@@ -39,7 +37,7 @@ def broken_line(*corners: tuple[float, float]) -> list[FrontPoint]:
 
 
 def test_one_corner_is_one_knee() -> None:
-    found = bends(broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0)))
+    found = find_bends(broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0)))
     assert [knee.value for knee in found.knees] == pytest.approx([0.7])
     assert found.convex
     assert found.knees[0].turn_deg == pytest.approx(
@@ -48,20 +46,20 @@ def test_one_corner_is_one_knee() -> None:
 
 
 def test_two_corners_with_a_flatter_piece_between_are_two_knees_of_a_front_that_is_not_convex() -> None:
-    found = bends(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
+    found = find_bends(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
     assert [knee.value for knee in found.knees] == pytest.approx([0.4, 0.9])
     assert not found.convex
 
 
 def test_an_arc_has_no_knee() -> None:
     angles = np.linspace(0.0, np.pi / 2, 60)
-    found = bends(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles]))
+    found = find_bends(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles]))
     assert found.knees == ()
     assert found.convex
 
 
 def test_dominated_points_go() -> None:
-    kept = nondominated(points([(0.0, 1.0), (0.5, 3.0), (1.0, 2.0), (1.0, 2.5), (2.0, 4.0)]))
+    kept = select_nondominated(points([(0.0, 1.0), (0.5, 3.0), (1.0, 2.0), (1.0, 2.5), (2.0, 4.0)]))
     assert [(p.value, p.power_W) for p in kept] == [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]
 
 
@@ -72,25 +70,25 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
     judged = evaluate(problem, x)
     objective = nlp_gait.compile_objective(problem)
     for margin in ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min"):
-        beside = competing_objective(margin, problem)
-        assert beside.value(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
-        assert beside.values(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
-    speed = competing_objective("speed", problem)
+        beside = make_competing_objective(margin, problem)
+        assert beside.evaluate(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+        assert beside.evaluate_many(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+    speed = make_competing_objective("speed", problem)
     way = 0.06 if name == "nao-ssp" else 0.04  # of the hip, Tables 3 and 5
-    assert speed.value(problem, x) == pytest.approx(way / x[-1])
-    assert speed.limited(problem, 2 * way / x[-1]).upper[-1] == pytest.approx(x[-1] / 2)
+    assert speed.evaluate(problem, x) == pytest.approx(way / x[-1])
+    assert speed.demand(problem, 2 * way / x[-1]).upper[-1] == pytest.approx(x[-1] / 2)
 
 
 def test_prices_are_the_fronts_slopes() -> None:
     problem = nlp_gait.load("nao-ssp", intervals=4)
     for name, at, step in (("dbm_y_mean", 0.02, 1e-4), ("speed", 0.03, 1e-4)):
-        beside = competing_objective(name, problem)
-        free = beside.freed(problem)
-        limited = [beside.limited(free, at + k * step) for k in (-1, 0, 1)]
+        beside = make_competing_objective(name, problem)
+        free = beside.drop_demand(problem)
+        limited = [beside.demand(free, at + k * step) for k in (-1, 0, 1)]
         below, here, above = (nlp_gait.solve(p, starts=1, x0=np.clip(X, p.lower, p.upper)) for p in limited)
         assert below.objective < here.objective < above.objective
         slope = (above.objective - below.objective) / (2 * step)
-        assert beside.price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
+        assert beside.compute_price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
 
 
 def test_objectives_are_parsed() -> None:
@@ -106,13 +104,13 @@ def test_objectives_are_parsed() -> None:
 
 
 def test_what_cannot_be_traded_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match="objective beside power"):
-        competing_objective("dbm_z", nlp_gait.load("nao-ssp"))
-    with pytest.raises(InputError, match="trades no power"):
-        competing_objective("speed", nlp_gait.load("walk12"))
+    with pytest.raises(UnknownNameError, match="objective next to power"):
+        make_competing_objective("dbm_z", nlp_gait.load("nao-ssp"))
+    with pytest.raises(InputError, match="no power, balance and speed to trade"):
+        make_competing_objective("speed", nlp_gait.load("walk12"))
     with pytest.raises(InputError, match="at least 5"):
         problem = nlp_gait.load("nao-ssp")
-        pareto_front(problem, competing_objective("speed", problem), points=2)
+        solve_front(problem, make_competing_objective("speed", problem), points=2)
 
 
 def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothing() -> None:
@@ -120,14 +118,14 @@ def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothi
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
     none = np.empty(0)
     runs = [
-        SearchFront(algorithm="NSGA2", run=0, budget=10, values=values, powers=powers, X=np.zeros((len(front), 1))),
-        SearchFront(algorithm="NSGA2", run=1, budget=10, values=none, powers=none, X=np.empty((0, 1))),
+        SearchFront(solver="NSGA2", run=0, budget=10, values=values, powers=powers, X=np.zeros((len(front), 1))),
+        SearchFront(solver="NSGA2", run=1, budget=10, values=none, powers=none, X=np.empty((0, 1))),
     ]
-    (row,) = quality(front, runs)
+    (row,) = compute_qualities(front, runs)
     assert row.hypervolume == pytest.approx((0.0, 0.5, 1.0))
     assert row.empty == 1
     assert row.igd == pytest.approx((0.0, 0.0, 0.0))
-    assert row.excess == pytest.approx((0.0, 0.0, 0.0))
+    assert row.gap == pytest.approx((0.0, 0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -144,34 +142,21 @@ def small() -> GaitProblem:
     return problem.fix(**{name: value for name, value in fixed.items() if name not in free})
 
 
-def study(problem: GaitProblem, folder: Path, notes: list[str]) -> ParetoStudy:
-    return pareto_study(
-        problem,
-        "dbm_y_mean",
-        points=5,
-        starts=1,
-        searches={"NSGA2": (100, 300)},
-        runs=1,
-        seed=0,
-        store=Store(folder),
-        progress=notes.append,
-    )
-
-
-def test_a_small_front_lies_below_what_searches_find_and_is_kept(small: GaitProblem, folder: Path) -> None:
-    found = study(small, folder, [])
+def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProblem, folder: Path) -> None:
+    question = ParetoFront(problem=small, points=5, starts=1, searches={"NSGA2": (100, 300)}, runs=1)
+    found = find(question, Work(store=Store(folder)))
     values, powers = zip(*((p.value, p.power_W) for p in found.front), strict=True)
     assert list(values) == sorted(values) and list(powers) == sorted(powers)
     assert all(p.violation <= 1e-6 for p in found.front)
     assert found.challenge is not None
     assert found.challenge.infeasible == 0
-    assert found.challenge.least_excess > -1e-3
+    assert found.challenge.least_gap > -1e-3
     assert found.qualities[1].hypervolume[1] > 0.8
-    notes: list[str] = []
-    again = study(small, folder, notes)
-    assert any("stored by an earlier run" in note for note in notes)
+    store = Store(folder)
+    again = find(question, Work(store=store))
+    assert store.summary == "3 of 3 results were stored by an earlier run"
     assert [p.power_W for p in again.front] == list(powers)
-    written = front_answer(found, small).write(folder)
+    written = question.report(found).write(folder)
     with (folder / "nao-ssp-front-dbm_y_mean.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["power_W"]) for row in rows] == list(powers)
@@ -179,9 +164,10 @@ def test_a_small_front_lies_below_what_searches_find_and_is_kept(small: GaitProb
 
 
 def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path) -> None:
-    surface = pareto_surface(small, ["dbm_y_mean", "speed"], points=4, starts=1, seed=0, progress=lambda note: None)
+    question = ParetoSurface(problem=small, objectives=("dbm_y_mean", "speed"), points=4, starts=1)
+    surface = find(question)
     powers = {p.demanded: p.power_W for p in surface.points}
     for (margin, speed), power in powers.items():
         assert all(other >= power * (1 - 1e-6) for (m, s), other in powers.items() if m >= margin and s >= speed)
     assert len(surface.points) + len(surface.infeasible) == 4
-    assert all(path.stat().st_size > 0 for path in surface_answer(surface).write(folder))
+    assert all(path.stat().st_size > 0 for path in question.report(surface).write(folder))

@@ -10,9 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.questions.prices.study import AGREEMENT, prices
-from compare.study.task import ProblemSpec
-from nlp_gait import make_solver
+from compare.questions.prices.price import AGREEMENT
+from compare.questions.prices.prices import Prices
+from compare.questions.question import find
+from nlp_gait import load, make_solver
 from nlp_gait.errors import InputError
 
 RUN = CliRunner()
@@ -41,7 +42,7 @@ def test_the_table_says_units_and_steps(tmp_path: Path) -> None:
 
 
 def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
-    found = prices(ProblemSpec(name="walk12"), starts=2)
+    found = find(Prices(problem=load("walk12"), starts=2))
     errors = [error for price in found.limits for error in (price.error, price.x_error) if error is not None]
     assert len(errors) > 6
     assert max(errors) < AGREEMENT
@@ -52,13 +53,12 @@ def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
 
 
 def test_a_solver_without_multipliers_has_no_prices() -> None:
-    with pytest.raises(InputError, match="need multipliers, which slsqp does not return; solve with ipopt"):
-        prices(ProblemSpec(name="walk12"), starts=2, solver=make_solver("slsqp"))
+    with pytest.raises(InputError, match="need multipliers, which slsqp does not give; solve with ipopt"):
+        find(Prices(problem=load("walk12"), starts=2, solver=make_solver("slsqp")))
 
 
 def test_a_fixed_variable_has_one_price() -> None:
-    spec = ProblemSpec(name="walk12", values={"step_length_m.lower": 0.1, "step_length_m.upper": 0.1})
-    found = prices(spec, starts=2)
+    found = find(Prices(problem=load("walk12").fix(step_length_m=0.1), starts=2))
     price = next(price for price in found.limits if price.name == "step_length_m")
     assert price.x is not None and price.x["step_length_m"] == pytest.approx(1.0)
     assert price.error is not None and price.error < AGREEMENT

@@ -15,8 +15,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from compare.questions import local_optima
-from compare.questions.motors import study as motors
+from compare.questions import local_optima, motors
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json

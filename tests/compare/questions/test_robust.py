@@ -11,18 +11,16 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.questions.robust import study as questions
-from compare.questions.robust.study import boxes
-from compare.study.task import ProblemSpec
+from compare.questions.robust import robust as question
+from compare.questions.robust.robust_gait import make_boxes
 from nlp_gait import load
 from nlp_gait.backends.exact import build_exact_model
 
 RUN = CliRunner()
-SPEC = ProblemSpec(name="nao-ssp")
 
 
 def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(questions, "boxes", lambda *args: {"soles": boxes(*args)["soles"]})
+    monkeypatch.setattr(question, "make_boxes", lambda *args: {"soles": make_boxes(*args)["soles"]})
     command = [
         "robust",
         "nao-ssp",
@@ -39,7 +37,7 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
     assert done.exit_code == 0, done.output
     answer = json.loads(done.stdout)
     (found,) = answer["boxes"]
-    assert found["settled"] and answer["played"] == []
+    assert found["settled"] and answer["simulations"] == []
     # The mean lateral margin counts to the sole's edge: a sole that may be 2 mm off takes these 2 mm.
     assert found["nominal_worst"]["row"] == "dbm_y_mean"
     assert found["nominal_worst"]["violation"] == pytest.approx(0.002, abs=1e-6)
@@ -62,7 +60,7 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
 
 
 def test_boxes_grow_and_name_every_link() -> None:
-    soles, whole, links = boxes(SPEC, 0.05, 0.002).values()
+    soles, whole, links = make_boxes(load("nao-ssp"), 0.05, 0.002).values()
     assert set(soles) < set(whole) and set(soles) < set(links)
     assert links["LThigh.mass"] == 0.05 and whole["mass"] == 0.05 and soles["sole_y_m"] == 0.002
 
@@ -70,4 +68,4 @@ def test_boxes_grow_and_name_every_link() -> None:
 def test_problems_without_a_robot_are_refused(tmp_path: Path) -> None:
     done = RUN.invoke(app, ["robust", "walk12", "--no-simulate", "--out", str(tmp_path)])
     assert done.exit_code == 1
-    assert done.stderr.startswith("nlp-gait: problem 'walk12' has no robot to be uncertain about")
+    assert done.stderr.startswith("nlp-gait: problem 'walk12' has no robot that could be uncertain")

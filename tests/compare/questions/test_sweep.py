@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 
 from compare.drawing.labels import axis_label, quantity
-from compare.questions.sweep.report import sweep_answer, sweep_figure
-from compare.questions.sweep.study import Axis, SweepPoint, count_solves, parse_axis, sweep
-from compare.study.task import ProblemSpec
+from compare.questions.question import Work, find
+from compare.questions.sweep import Axis, Sweep, SweepPoint, parse_axis, plot_sweep
+from nlp_gait import load
 from nlp_gait.errors import InputError, UnknownNameError
 
-SSP, DSP = ProblemSpec(name="nao-ssp"), ProblemSpec(name="nao-dsp")
 # Verified with two independent implementations to five digits, except 0.8 s: 2.282582 W by IPOPT and by differential evolution.
 SWING_W = {0.015: 0.84587, 0.018: 0.85426, 0.022: 0.86616, 0.024: 0.87244, 0.026: 0.87871, 0.028: 0.88497}
 DURATIONS_W = {0.8: 2.28258, 1.0: 2.02695, 1.5: 1.57457, 4.0: 0.84587}
@@ -45,51 +44,56 @@ def test_what_is_no_axis_is_refused(text: str) -> None:
 
 
 def test_true_price_of_a_higher_swing_foot() -> None:
-    points = sweep(SSP, [Axis(name="swing_height_m", values=tuple(SWING_W))], starts=1)
+    axis = Axis(name="swing_height_m", values=tuple(SWING_W))
+    points = find(Sweep(problem=load("nao-ssp"), axes=[axis], starts=1))
     assert {p.at["swing_height_m"]: p.objective for p in points} == pytest.approx(SWING_W, abs=AGREEMENT_W)
     assert all(p.feasible and p.x["swing_height_m"] == p.at["swing_height_m"] for p in points)
 
 
 def test_true_price_of_time() -> None:
     """Followed upwards alone, the path is on a local optimum of 2.079 W at 1 s."""
-    points = sweep(SSP, [Axis(name="single_support_time_s", values=tuple(DURATIONS_W))], starts=1)
+    axis = Axis(name="single_support_time_s", values=tuple(DURATIONS_W))
+    points = find(Sweep(problem=load("nao-ssp"), axes=[axis], starts=1))
     assert {p.at["single_support_time_s"]: p.objective for p in points} == pytest.approx(DURATIONS_W, abs=AGREEMENT_W)
 
 
 def test_another_nlp_solver_walks_the_grid_too() -> None:
     axes = [Axis(name="swing_height_m", values=(0.015, 0.018))]
     calls: list[str] = []
-    points = sweep(SSP, axes, algorithm="slsqp", starts=1, progress=calls.append)
-    assert len(calls) == count_solves(axes, "slsqp") == 4
+    question = Sweep(problem=load("nao-ssp"), axes=axes, algorithm="slsqp", starts=1)
+    points = find(question, Work(progress=calls.append))
+    assert len(calls) == question.total == 4
     assert [p.objective for p in points] == pytest.approx([SWING_W[0.015], SWING_W[0.018]], abs=AGREEMENT_W)
 
 
 def test_grid_of_two_axes_over_a_search(tmp_path: Path) -> None:
     axes = [Axis(name="hip_height_m", values=(0.3, 0.31)), Axis(name="heat_loss_W_per_Nm2", values=(0.02, 0.03))]
     calls: list[str] = []
-    points = sweep(DSP, axes, algorithm="pso", evaluations=300, progress=calls.append)
-    assert len(calls) == len(points) == count_solves(axes, "pso") == 4
-    assert count_solves(axes, "ipopt") == 8
+    question = Sweep(problem=load("nao-dsp"), axes=axes, algorithm="pso", evaluations=300)
+    points = find(question, Work(progress=calls.append))
+    assert len(calls) == len(points) == question.total == 4
+    assert Sweep(problem=load("nao-dsp"), axes=axes).total == 8
     assert [tuple(p.at.values()) for p in points] == [(0.3, 0.02), (0.3, 0.03), (0.31, 0.02), (0.31, 0.03)]
     assert [p.x["hip_height_m"] for p in points] == [0.3, 0.3, 0.31, 0.31]
-    written = sweep_answer(points, DSP.load(), "pso").write(tmp_path)
+    written = question.report(points).write(tmp_path)
     assert sorted(path.suffix for path in written) == [".csv", ".html", ".json", ".md", ".png", ".svg"]
     assert all(path.stat().st_size > 0 for path in written)
 
 
 def test_errors_come_before_the_work() -> None:
+    problem = load("nao-ssp")
     with pytest.raises(UnknownNameError, match="swing_height_m"):
-        sweep(SSP, [Axis(name="swing_heigth_m", values=(0.02,))])
+        Sweep(problem=problem, axes=[Axis(name="swing_heigth_m", values=(0.02,))])
     with pytest.raises(InputError, match="bounds"):
-        sweep(SSP, [Axis(name="swing_height_m", values=(0.02, 0.2))])
+        Sweep(problem=problem, axes=[Axis(name="swing_height_m", values=(0.02, 0.2))])
     with pytest.raises(InputError, match="once"):
-        sweep(SSP, [Axis(name="swing_height_m", values=(0.02,))] * 2)
+        Sweep(problem=problem, axes=[Axis(name="swing_height_m", values=(0.02,))] * 2)
     with pytest.raises(UnknownNameError, match="algorithm"):
-        sweep(SSP, [Axis(name="swing_height_m", values=(0.02,))], algorithm="psa")
+        Sweep(problem=problem, axes=[Axis(name="swing_height_m", values=(0.02,))], algorithm="psa")
 
 
 def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
-    problem = SSP.load()
+    problem = load("nao-ssp")
     x = problem.by_name(problem.lower)
     points = [
         SweepPoint(
@@ -108,13 +112,14 @@ def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
             (0.09, 1.7, False, "in the way: dbm_y_mean (by 0.04 m)"),
         )
     ]
-    sweep_answer(points, problem, "ipopt").write(tmp_path)
+    axis = Axis(name="dbm_y_mean_limit_m", values=(0.02, 0.03, 0.09))
+    Sweep(problem=problem, axes=[axis]).report(points).write(tmp_path)
     table = tmp_path / "nao-ssp-sweep-dbm_y_mean_limit_m-ipopt.csv"
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [row["feasible"] for row in rows] == ["true", "true", "false"]
     assert [float(row["power_W"]) for row in rows] == [0.8459, 0.9, 1.7]
     assert rows[2]["status"] == "in the way: dbm_y_mean (by 0.04 m)"
-    (axes,) = sweep_figure(points, problem, "ipopt").axes
+    (axes,) = plot_sweep(points, problem, "ipopt").axes
     line, cross = axes.lines
     assert [math.isnan(y) for y in line.get_ydata()] == [False, False, True]
     assert list(cross.get_xdata()) == [0.09]

@@ -1,0 +1,99 @@
+"""Options and output of the commands that answer a question."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, stdout
+from compare.cli.interrupts import describe_stored
+from compare.cli.options import RESULTS, AsJson
+from nlp_gait.files import make_writable_folder
+from nlp_gait.interrupts import Interrupted, defer_interrupts
+
+if TYPE_CHECKING:
+    from compare.questions.question import Answer, Question
+
+Folder = Annotated[Path, typer.Option(help="Folder for report, tables, figures, data and stored results.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """Folder of the answer, and how it is printed."""
+
+    out: Folder = RESULTS
+    as_json: AsJson = False
+
+    def __post_init__(self) -> None:
+        """Require a writable folder before the work."""
+        make_writable_folder(self.out)
+
+    def answer(self, question: Question[Any]) -> None:
+        """Answer a question, continuing from stored results; write and print the answer, also a partial one after Ctrl-C.
+
+        Raises:
+            OutputError: a file cannot be written; the answer is printed nevertheless.
+        """
+        from compare.questions.question import Work
+        from compare.study.store import Store
+
+        findings, stopped, notes = None, "", 0
+        with progress_bar(question.counts, question.total) as advance:
+
+            def progress(note: str) -> None:
+                nonlocal notes
+                notes += 1
+                advance(note)
+
+            try:
+                store = Store(self.out, say)
+                store.report_changes(question.name, question.problem, **question.inputs)
+                for found in question.find(Work(store=store, progress=progress)):
+                    findings = found
+            except KeyboardInterrupt as interrupt:
+                total = question.total
+                stopped = "interrupted" if total is None else f"interrupted after {notes} of {total} {question.counts}"
+                if isinstance(interrupt, Interrupted):
+                    stopped = interrupt.sentence
+        if findings is None:
+            end_interrupted(f"{stopped}; {describe_stored(self.out)}")
+        if store.summary:
+            say(store.summary)
+        self.write(question.report(findings), stopped)
+        failures = question.failures(findings)
+        if failures:
+            fail("; ".join(failures))
+
+    def write(self, answer: Answer, stopped: str = "") -> None:
+        """Write an answer and print it, as a JSON object or as tables and sentences.
+
+        Args:
+            answer: of a question.
+            stopped: where the work was interrupted; the command ends with this message.
+
+        Raises:
+            OutputError: a file cannot be written; the answer is printed nevertheless.
+        """
+        written: list[Path] = []
+        with defer_interrupts() as pressed:
+            try:
+                written = answer.write(self.out)
+            finally:
+                print_result(self.as_json, answer.data, written, lambda: _print(answer))
+        if stopped or pressed():
+            message = stopped or "interrupted at the end"
+            end_interrupted(f"{message}; the results are in {self.out}; rerun the command to continue")
+
+
+def _print(answer: Answer) -> None:
+    """Print sentences and tables, without those for other programs."""
+    from compare.report.document import Table, iterate_leaves
+
+    for part in (answer.title, *answer.verdict, *iterate_leaves(answer.parts)):
+        if isinstance(part, str):
+            stdout.print(part, soft_wrap=True)
+        elif isinstance(part, Table) and not part.name:
+            print_table(part.caption, tuple(part.columns), [[cell.text for cell in row] for row in part.cells])

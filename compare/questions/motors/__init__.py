@@ -1,1 +1,0 @@
-"""What do the real motors change?"""

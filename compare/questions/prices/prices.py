@@ -1,0 +1,250 @@
+"""What each limit costs the optimum, and which error of the robot's data would change it most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+
+from compare.analysis.units import heading, with_unit
+from compare.drawing.figures import new_figure, style
+from compare.drawing.labels import name_in_words
+from compare.questions.perturbed_problem import perturb_robot
+from compare.questions.prices.price import (
+    Price,
+    change_parameter,
+    parse_price,
+    price_parameters,
+    price_robot,
+    verify_price,
+)
+from compare.questions.question import Answer, Question, Work, make_csv_table
+from compare.report.document import Figure, Part, Table, Value, text_table
+from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
+from nlp_gait.backends.optima.optimum import find_optimum
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem
+
+# A limit whose natural step changes the optimum by less than this share costs nothing.
+FREE = 1e-9
+SHOWN = 10  # bars of each kind
+LISTED = 12  # rows of the robot's table; the CSV file has all
+UP, DOWN = "#D55E00", "#0072B2"
+# Scales at which most bars are small numbers.
+PREFIXED = {"W": ("mW", 1e3), "J": ("J", 1.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundPrices:
+    """Prices at the optimum of a problem.
+
+    Attributes:
+        objective: at the optimum.
+        x: by variable name.
+        limits: parameters with a price, most expensive step first.
+        free: number of parameters without one.
+        robot: quantities of the robot, largest change first; empty if the problem has no robot.
+        weak: bounds that are active without a price, or nearly active: there, derivatives are one-sided.
+        dependent: number of active constraints that follow from others.
+        residual: of the first-order conditions.
+        reason: why there are no derivatives; None if there are.
+    """
+
+    objective: float
+    x: Mapping[str, float]
+    limits: tuple[Price, ...]
+    free: int
+    robot: tuple[Price, ...]
+    weak: tuple[str, ...]
+    dependent: int
+    residual: float
+    reason: str | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prices(Question[FoundPrices]):
+    """What does each limit cost, and each error of the robot's masses, leg lengths and soles?
+
+    Attributes:
+        starts: random starts.
+        seed: of the starts.
+        checks: how many of the robot's quantities, largest change first, are verified by solving again; all parameters are.
+        solver: one with multipliers; its optimum is refined by IPOPT.
+    """
+
+    name: ClassVar[str] = "prices"
+
+    starts: int = 10
+    seed: int = 0
+    checks: int = 3
+    solver: Solver | None = None
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """See ``Question``."""
+        return {**self._solving, "checks": self.checks}
+
+    @property
+    def _solving(self) -> dict[str, Any]:
+        solver = self.solver or IpoptSettings()
+        return {"starts": self.starts, "seed": self.seed, "solver": solver.name, "settings": solver.to_dict()}
+
+    def find(self, work: Work) -> Iterator[FoundPrices]:
+        """See ``Question``; InputError if there is no optimum, the solver has no multipliers, or the problem is too large."""
+        problem = self.problem
+        work.progress("solving")
+        near = find_cheapest_feasible(
+            Continuation(starts=self.starts, seed=self.seed, solver=work.solver(self.solver)).run(problem)
+        )
+        if near is None:
+            raise InputError(
+                f"{problem.name}: none of {self.starts} starts converged to a feasible point, so there is nothing to "
+                "differentiate; try more --starts, or relax the limits that `nlp-gait solve` names"
+            )
+        optimum = find_optimum(problem, near)
+        inputs = {**fingerprint(problem), **self._solving}
+        parameters: list[Price] = []
+        robot: list[Price] = []
+
+        def verify(price: Price, change: Callable[[Price, float], GaitProblem | None]) -> Price:
+            def compute() -> dict[str, Any]:
+                work.progress(f"solving again with another {price.name}")
+                return verify_price(optimum, near, price, partial(change, price)).to_json()
+
+            return parse_price(work.store.compute("check-{key}", {**inputs, "quantity": price.name}, compute))
+
+        def compute_robot() -> list[dict[str, Any]]:
+            return [price.to_json() for price in price_robot(optimum, work.progress)]
+
+        if optimum.reason is None:
+            parameters = _rank(price_parameters(optimum))
+            if problem.display.robot is not None:
+                robot = _rank([parse_price(raw) for raw in work.store.compute("robot-{key}", inputs, compute_robot)])
+        limits = [price for price in parameters if abs(price.per_step) > FREE * max(abs(optimum.objective), FREE)]
+
+        def perturb(price: Price, change: float) -> GaitProblem:
+            return perturb_robot(problem, {price.name: price.value + change})
+
+        yield FoundPrices(
+            objective=optimum.objective,
+            x=problem.by_name(optimum.x),
+            limits=tuple(verify(price, partial(change_parameter, problem)) for price in limits),
+            free=len(parameters) - len(limits),
+            robot=(*(verify(price, perturb) for price in robot[: self.checks]), *robot[self.checks :]),
+            weak=optimum.weak,
+            dependent=optimum.dependent,
+            residual=optimum.residual,
+            reason=optimum.reason,
+        )
+
+    def report(self, findings: FoundPrices) -> Answer:
+        """See ``Question``."""
+        problem, stem = self.problem, f"{self.problem.name}-prices"
+        objective, ranges = problem.objective, problem.by_name(problem.scale)
+        steps = (heading(words, objective.unit) for words in ("by the slope", "- step", "+ step"))
+        header = ("quantity", "step", *steps, "error of slope, x*", "x* moves most in", "line [steps]")
+
+        def make_table(prices: Sequence[Price], title: str) -> list[Part]:
+            return [text_table(header, [_make_row(price, ranges) for price in prices], title)] if prices else []
+
+        parts: list[Part] = [
+            *make_table(
+                findings.limits,
+                "What holds it back: change of the optimum for one step upwards of a limit or coefficient",
+            ),
+            f"{findings.free} other parameters cost nothing here",
+            *make_table(
+                findings.robot[:LISTED],
+                "Which error of the robot would change it most, with unchanged limits "
+                f"(first {LISTED} of {len(findings.robot)})",
+            ),
+            f"The first-order conditions are satisfied to {findings.residual:.1e}; {findings.dependent} of the active "
+            "constraints follow from others. x* moves along a line only within the range of the last column: beyond it, "
+            "another kink or limit takes over.",
+            "The slope is the derivative of the optimum with respect to the quantity, from the multipliers; next to it are the "
+            "changes found by solving again one step lower and one step higher. The line is the straight line on which x* "
+            "moves, in steps of the quantity; dbm is the dynamic balance margin, the distance of the zero-moment point from "
+            "the edge of the soles.",
+        ]
+        if findings.weak:
+            parts.append(f"Active without a price, so that derivatives are one-sided: {', '.join(findings.weak)}")
+        if findings.limits or findings.robot:
+            shown = "Cost of one natural step of each limit, and effect of errors of the robot."
+            parts.append(Figure(name=stem, caption=shown, drawing=plot_prices(findings, problem)))
+        about = {"objective_name": objective.name, "unit": objective.unit, "sense": objective.sense}
+        return Answer(
+            stem=stem,
+            title=f"{problem.name}: what each limit costs",
+            verdict=(f"{objective.name} {with_unit(findings.objective, objective.unit)}, to {objective.sense}",),
+            parts=[*parts, _make_csv(stem, findings)],
+            data={"problem": problem.name, **about, **asdict(findings)},
+        )
+
+
+def _rank(prices: Sequence[Price]) -> list[Price]:
+    return sorted(prices, key=lambda price: -abs(price.per_step))
+
+
+def _make_row(price: Price, ranges: Mapping[str, float]) -> tuple[str, ...]:
+    move = price.find_largest_move(ranges)
+    moves = "no derivative" if price.x is None else "-" if move is None else f"{move[0]} {move[1]:+.3g}"
+    down, up = (value / price.step for value in price.reach)
+    steps, errors = ("-", "-"), "-"
+    if price.one_step is not None:
+        steps = tuple("none" if value is None else f"{value:+z.5f}" for value in price.one_step)  # type: ignore[assignment]
+        errors = ", ".join("-" if error is None else f"{error:.0e}" for error in (price.error, price.x_error))
+    return (price.name, price.words, f"{price.per_step:+z.5f}", *steps, errors, moves, f"{down:+.2g} to {up:+.2g}")
+
+
+def _make_csv(stem: str, findings: FoundPrices) -> Table:
+    """All quantities, with the derivatives of objective and x*."""
+    header = [
+        *("kind", "quantity", "unit", "value", "slope", "natural_step", "change_per_step", "resolved_slope"),
+        *("one_step_less", "one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in findings.x)),
+    ]
+    rows: list[list[Value]] = [
+        [
+            *(kind, price.name, price.unit, price.value, price.slope, price.step, price.per_step, price.resolved),
+            *(price.one_step or (None, None)),
+            *price.reach,
+            *(None if price.x is None else price.x[name] for name in findings.x),
+        ]
+        for kind, prices in (("limit", findings.limits), ("robot", findings.robot))
+        for price in prices
+    ]
+    return make_csv_table(stem, header, rows)
+
+
+def plot_prices(findings: FoundPrices, problem: GaitProblem) -> Drawing:
+    """Plot the effect of a natural step of each limit and of errors of the robot as bars."""
+    titles = ("raising a limit", "another robot with the same limits")
+    groups = [
+        (prices, title) for prices, title in zip((findings.limits, findings.robot), titles, strict=True) if prices
+    ]
+    objective = problem.objective
+    unit, scale = PREFIXED.get(objective.unit, (objective.unit, 1.0))
+    with style():
+        height = 1.0 + 0.24 * max(min(SHOWN, len(prices)) for prices, _ in groups)
+        figure = new_figure(3.6 * len(groups), height)
+        for axes, (prices, title) in zip(figure.subplots(1, len(groups), squeeze=False)[0], groups, strict=True):
+            _plot_bars(axes, prices[:SHOWN], scale)
+            axes.set_title(title)
+            axes.set_xlabel(heading(f"change of {objective.name}", unit))
+    return figure
+
+
+def _plot_bars(axes: Axes, prices: Sequence[Price], scale: float) -> None:
+    values = [scale * price.per_step for price in prices]
+    places = range(len(prices))
+    axes.barh(places, values, color=[UP if value > 0.0 else DOWN for value in values])
+    axes.set_yticks(places, [f"{name_in_words(price.name, price.unit)}, {price.words}" for price in prices])
+    axes.invert_yaxis()
+    axes.axvline(0.0, color="0.3", linewidth=0.6)
+    axes.grid(visible=False, axis="y")

@@ -1,0 +1,150 @@
+"""A question about a problem: its inputs, its stored results, and its answer as a report, tables and JSON.
+
+A new question is one file with a subclass of ``Question``, and a command that declares its options.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, Generic, TypeVar
+
+from compare.report.document import Document, Table, Value, text_table
+from compare.report.writing import write_document
+from compare.study.store import Store
+from compare.study.stored_solver import store_runs
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.decoding import decode
+from nlp_gait.files import replace_nan, write_json
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.progress import Progress, ignore_progress
+
+T = TypeVar("T")
+F = TypeVar("F")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Work:
+    """How a question stores its results and reports its progress; by default it does neither.
+
+    Attributes:
+        store: of finished results.
+        progress: receives a note after each step.
+    """
+
+    store: Store = field(default_factory=Store)
+    progress: Progress = ignore_progress
+
+    def solver(self, solver: Solver | None = None) -> Solver:
+        """Return a solver that stores its finished runs; None for IPOPT with its defaults."""
+        return store_runs(self.store, solver)
+
+    def compute(
+        self,
+        kind: Callable[..., T],
+        name: str,
+        inputs: Mapping[str, Any],
+        function: Callable[[], T],
+        code: Sequence[ModuleType] = (),
+    ) -> T:
+        """Return the stored data class of a kind, or compute and store it; arguments as for ``Store.compute``."""
+
+        def plain() -> Any:
+            return replace_nan(asdict(function()))  # type: ignore[call-overload]
+
+        return decode(kind, self.store.compute(name, inputs, plain, code=code))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Question(ABC, Generic[F]):
+    """A question about a problem, whose findings are of type F; its fields are its inputs.
+
+    Attributes:
+        problem: with its current parameter values.
+        name: of the question and its command.
+        counts: what the progress counts.
+    """
+
+    name: ClassVar[str]
+    counts: ClassVar[str] = "steps"
+
+    problem: GaitProblem
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Inputs next to the problem, as plain data."""
+        return {item.name: getattr(self, item.name) for item in fields(self) if item.name != "problem"}
+
+    @property
+    def total(self) -> int | None:
+        """Number of progress notes; None if unknown."""
+        return None
+
+    @abstractmethod
+    def find(self, work: Work) -> Iterator[F]:
+        """Yield the findings whenever a report can be made of them; the last ones are complete.
+
+        Raises:
+            InputError: an input is not allowed, or there is nothing to report.
+            KeyboardInterrupt: Ctrl-C; what was yielded before is valid.
+        """
+
+    @abstractmethod
+    def report(self, findings: F) -> Answer:
+        """Return the answer."""
+
+    def failures(self, findings: F) -> list[str]:
+        """Return what failed, which ends the command with status 1."""
+        return []
+
+
+def find(question: Question[F], work: Work | None = None) -> F:
+    """Return the complete findings of a question; raises as ``Question.find``."""
+    *_, findings = question.find(work or Work())
+    return findings
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer(Document):
+    """A report with its data. Named tables are written as CSV files and are not printed.
+
+    Attributes:
+        stem: file name of the report and the data, without suffix.
+        data: the whole answer as plain data.
+        results: gaits or certificates for other commands, by file name without suffix.
+    """
+
+    stem: str
+    data: Mapping[str, Any]
+    results: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write report, tables, figures, results and data, and return their paths.
+
+        Raises:
+            OutputError: a file cannot be written.
+        """
+        written = write_document(folder, self, self.stem)
+        for name, data in {**self.results, self.stem: self.data}.items():
+            written.append(folder / f"{name}.json")
+            write_json(written[-1], replace_nan(data))
+        return written
+
+
+def make_table(caption: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
+    """Return a table of texts with a row for each item; each column maps an item to its cell."""
+    return text_table(tuple(columns), [[cell(item) for cell in columns.values()] for item in items], caption)
+
+
+def make_csv_table(name: str, header: Sequence[str], rows: Sequence[Sequence[Value]]) -> Table:
+    """Return a table that is written to a CSV file with all digits, and rounded in the report."""
+    return Table(name=name, columns=dict.fromkeys(header, ".6g"), rows=rows, caption=f"As in {name}.csv, rounded")
+
+
+def make_optima_table(optima: Mapping[str, Mapping[str, float]]) -> Table:
+    """Return a table of optima, given as x by variable name under their headings, with a row for each variable."""
+    rows = [(name, *(f"{x[name]:.5g}" for x in optima.values())) for name in next(iter(optima.values()))]
+    return text_table(("variable", *optima), rows, "Optima")

@@ -1,0 +1,231 @@
+"""A gait that keeps its limits for all masses and soles within their tolerances, and its simulation on the worst robots.
+
+The uncertain robots form a box: each mass within a share, each sole within a distance. A scenario problem over a few of its
+corners is solved; then the corner that is worst for each limit, by the rows' derivatives, is added, until no corner found in this
+way violates a limit or costs more.
+
+Source:
+    Mutapcic, Boyd (2009), Cutting-set methods for robust convex optimization with pessimizing oracles, used here on a problem
+    that is not convex: the corners are evaluated exactly, but it is not proven that the box contains no worse point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from compare.questions.perturbed_problem import rebuild
+from compare.questions.question import Work
+from compare.questions.robust.robot_box import Box, Corner, RobotBox, Worst
+from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.formulation.solution import Solution
+from nlp_gait.formulation.worst_case import make_worst_case
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.measurements import average_pressure
+from nlp_gait.simulation.plan import SIDES, Plan, make_plan
+from nlp_gait.simulation.simulate import simulate_plan
+
+ROUNDS = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustGait:
+    """A gait that keeps its limits in a box of robots.
+
+    Attributes:
+        name: of the box, in words.
+        box: half-widths by quantity.
+        corners: changes of the robots in the scenario problem; the first is the nominal one, without changes.
+        robots: their names.
+        rounds: number of searches for worse corners.
+        settled: the last round found no worse corner.
+        status: of the last solution.
+        nominal_x: optimum for the nominal robot alone.
+        nominal_W: its power there.
+        nominal_worst: its worst case over the corners.
+        x: robust optimum.
+        power_W: with the nominal robot.
+        worst_W: in the worst corner: the minimised objective.
+        worst: its worst case over the corners.
+        random_worst: over random corners that are not in the scenario problem.
+    """
+
+    name: str
+    box: Mapping[str, float]
+    corners: tuple[Mapping[str, float], ...]
+    robots: tuple[str, ...]
+    rounds: int
+    settled: bool
+    status: str
+    nominal_x: Mapping[str, float]
+    nominal_W: float
+    nominal_worst: Worst
+    x: Mapping[str, float]
+    power_W: float
+    worst_W: float
+    worst: Worst
+    random_worst: Worst
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedGait:
+    """One gait on one robot, open loop.
+
+    Attributes:
+        gait: ``"nominal"`` or ``"robust"``.
+        robot: its name, with its changes.
+        fell_at_s: None if it stayed up.
+        largest_tilt_deg: of the torso.
+        margin_m: mean lateral distance of the engine's centre of pressure, averaged over one period of the set-points, to the
+            nearer edge of the supporting soles.
+        predicted_margin_m: the same of the planned ZMP on this robot, over the same instants.
+    """
+
+    gait: str
+    robot: str
+    fell_at_s: float | None
+    largest_tilt_deg: float
+    margin_m: float
+    predicted_margin_m: float
+
+
+def make_boxes(problem: GaitProblem, mass: float, sole_m: float) -> dict[str, Box]:
+    """Return boxes of growing uncertainty by name: soles alone, with the whole robot's mass, with each link's mass.
+
+    Args:
+        problem: with a robot.
+        mass: tolerance, as a share.
+        sole_m: tolerance of the soles' position [m].
+
+    Raises:
+        InputError: the problem has no robot.
+    """
+    robot = problem.display.robot
+    if robot is None:
+        raise InputError(f"problem {problem.name!r} has no robot that could be uncertain; the NAO problems have one")
+    soles = {"sole_x_m": sole_m, "sole_y_m": sole_m}
+    return {
+        "soles": soles,
+        "soles, mass of the whole": {"mass": mass, **soles},
+        "soles, mass of each link": {**{f"{link}.mass": mass for link in robot.links}, **soles},
+    }
+
+
+def solve_robust(
+    problem: GaitProblem, name: str, box: Box, *, starts: int, seed: int, samples: int, work: Work
+) -> RobustGait:
+    """Return the robust optimum over a box of robots.
+
+    Args:
+        problem: of NAO.
+        name: of the box.
+        box: half-widths by the robot's quantity.
+        starts: random starts of the nominal problem.
+        seed: of the starts and of the random corners.
+        samples: random corners on which the robust optimum is evaluated.
+        work: stores the result.
+
+    Raises:
+        InputError: there is no feasible gait.
+    """
+    inputs = {
+        **fingerprint(problem),
+        "box": dict(box),
+        "name": name,
+        "starts": starts,
+        "seed": seed,
+        "samples": samples,
+    }
+    function = partial(_solve_robust, problem, name, box, starts, seed, samples, work)
+    return work.compute(RobustGait, "box-{key}", inputs, function)
+
+
+def _solve_robust(
+    problem: GaitProblem, name: str, box: Box, starts: int, seed: int, samples: int, work: Work
+) -> RobustGait:
+    robots, solver = RobotBox(problem, box), work.solver()
+    work.progress(f"{name}: nominal optimum")
+    nominal = _require(solve(problem, starts=starts, seed=seed, solver=solver), "the nominal problem")
+    nominal_x = x = problem.check_x(nominal.x)
+    corners: list[Corner] = [robots.centre]
+    robust, settled, rounds = nominal, False, 0
+    for rounds in range(1, ROUNDS + 1):
+        work.progress(f"{name}: round {rounds}, {len(corners)} scenarios")
+        worse = robots.find_worse_corners(x, corners, float(robust.objective))
+        if not worse:
+            settled = True
+            break
+        corners += worse
+        robust = solve(make_worst_case([robots.problem(corner) for corner in corners]), x0=x, solver=solver)
+        _require(robust, f"{len(corners)} scenarios together ({name})")
+        x = problem.check_x(robust.x)
+    rng = np.random.default_rng(seed)
+    random = [tuple(rng.choice((-1, 1), len(box)).tolist()) for _ in range(samples)]
+    work.progress(f"{name}: {samples} random corners")
+    return RobustGait(
+        name=name,
+        box=dict(box),
+        corners=tuple(robots.changes(corner) for corner in corners),
+        robots=tuple(robots.name_robot(corner) for corner in corners),
+        rounds=rounds,
+        settled=settled,
+        status=robust.status,
+        nominal_x=nominal.x,
+        nominal_W=nominal.objective,
+        nominal_worst=robots.find_worst(nominal_x, corners),
+        x=robust.x,
+        power_W=robots.evaluate(robots.centre, x).cost,
+        worst_W=robust.objective,
+        worst=robots.find_worst(x, corners),
+        random_worst=robots.find_worst(x, random or corners),
+    )
+
+
+def _require(solution: Solution, what: str) -> Solution:
+    if not solution.converged:
+        raise InputError(f"{what}: {solution.status}; a smaller uncertainty or more --starts may help")
+    return solution
+
+
+def simulate_robots(problem: GaitProblem, gait: RobustGait, work: Work) -> Iterator[SimulatedGait]:
+    """Simulate the nominal and the robust gait on every robot of the scenario problem (extra ``sim``).
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+    """
+    for robot in gait.robots:
+        for kind, x in (("nominal", gait.nominal_x), ("robust", gait.x)):
+            perturbed = rebuild(problem, robot=robot)
+            inputs = {**fingerprint(perturbed), "gait": kind, "x": dict(x)}
+            yield work.compute(SimulatedGait, "play-{key}", inputs, partial(_simulate, perturbed, robot, kind, x))
+            work.progress(f"{kind} gait on {robot[:40]}")
+
+
+def _simulate(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -> SimulatedGait:
+    plan, drive = make_plan(Result(problem=problem, x=problem.check_x(x))), Drive()
+    trace = simulate_plan(plan, drive=drive)
+    during = trace.t <= plan.duration_s
+    return SimulatedGait(
+        gait=gait,
+        robot=robot,
+        fell_at_s=trace.fell_at_s,
+        largest_tilt_deg=math.degrees(float(trace.tilt.max())),
+        margin_m=lateral_margin(plan, average_pressure(trace, drive.period_s)[during, 1]),
+        predicted_margin_m=lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
+    )
+
+
+def lateral_margin(plan: Plan, y: Array) -> float:
+    """Return the mean distance of lateral positions (T,) [m] to the nearer side of the supporting soles [m]."""
+    feet = [
+        (plan.at(f"{side}_foot", np.zeros(1))[0, 1], plan.robot.feet[side]) for side in SIDES if side in plan.supports
+    ]
+    left, right = max(y + foot.left_m for y, foot in feet), min(y - foot.right_m for y, foot in feet)
+    return float(np.nanmean(np.minimum(left - y, y - right)))

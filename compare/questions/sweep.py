@@ -1,0 +1,314 @@
+"""A problem solved over a grid of parameter values or fixed variables."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property, partial
+from typing import Any, ClassVar, cast
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+
+from compare.analysis.units import with_unit
+from compare.drawing.figures import COLOURS, new_figure, style
+from compare.drawing.labels import axis_label, quantity, units_of
+from compare.questions.question import Answer, Question, Work, make_csv_table
+from compare.report.document import Figure, Table, Value, text_table
+from compare.study.record import RunRecord, parse_record
+from compare.study.run_task import run_task, try_task
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
+from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import Solution
+from nlp_gait.interrupts import Interrupted, remember_interrupts
+
+MOST_POINTS = 10_000  # of an axis, and of the whole grid
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """A parameter's values, or the values at which a variable is fixed."""
+
+    name: str
+    values: tuple[float, ...]
+
+
+def parse_axis(text: str) -> Axis:
+    """Return the axis ``name=low:high:count`` or ``name=v1,v2,...``.
+
+    Raises:
+        InputError: another text, or too many points.
+    """
+    name, _, values = text.partition("=")
+    try:
+        if ":" in values:
+            low, high, count = values.split(":")
+            if int(count) > MOST_POINTS:
+                raise InputError(f"--over takes at most {MOST_POINTS} points per axis, got {text!r}")
+            numbers = np.linspace(float(low), float(high), int(count)).tolist()
+        else:
+            numbers = [float(value) for value in values.split(",")]
+    except ValueError:
+        numbers = []
+    if not name or not numbers or not np.all(np.isfinite(numbers)):
+        raise InputError(f"--over takes NAME=LOW:HIGH:COUNT or NAME=V1,V2,..., got {text!r}")
+    return Axis(name=name, values=tuple(numbers))
+
+
+def place(problem: GaitProblem, at: Mapping[str, float]) -> GaitProblem:
+    """Return the problem at one point of the grid: with these parameter values and fixed variables."""
+    fixed = {name: value for name, value in at.items() if name in problem.names}
+    return problem.with_values(**{name: at[name] for name in at if name not in fixed}).fix(**fixed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepPoint:
+    """Result at one point of the grid.
+
+    Attributes:
+        at: value of each axis.
+        objective: exact value, in the problem's sense.
+        feasible: a feasible optimum was found.
+        status: in words; without a feasible point it names the violated constraints.
+        x: by variable name.
+        violation: exact total violation.
+        evaluations: calls of f.
+        time_s: wall time [s].
+    """
+
+    at: Mapping[str, float]
+    objective: float
+    feasible: bool
+    status: str
+    x: Mapping[str, float]
+    violation: float
+    evaluations: int
+    time_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sweep(Question[list[SweepPoint]]):
+    """How does the optimum move with one or more parameters?
+
+    An NLP solver follows the grid forwards and backwards, so that each point is a neighbour of the last and starts from it; a
+    search starts afresh at each. Infeasible points are part of the result, with the violated constraints.
+
+    Attributes:
+        axes: at least one.
+        algorithm: an NLP solver or a search algorithm.
+        starts: random starts of an NLP solver at both ends of its path, and where no neighbour helps.
+        evaluations: budget of a search, and of a run of SLSQP.
+        seed: of starts and searches.
+    """
+
+    name: ClassVar[str] = "sweep"
+    counts: ClassVar[str] = "solves"
+
+    axes: Sequence[Axis]
+    algorithm: str = IPOPT
+    starts: int = 5
+    evaluations: int = 10_000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Validate the grid and the algorithm.
+
+        Raises:
+            UnknownNameError: an axis is neither a variable nor a parameter; an unknown algorithm.
+            InputError: a value is not allowed, an axis is duplicated, or the grid has too many points.
+        """
+        names = [axis.name for axis in self.axes]
+        if len(set(names)) < len(names):
+            raise InputError(f"each axis must be named once, got {', '.join(names)}")
+        points = math.prod(len(axis.values) for axis in self.axes)
+        if points > MOST_POINTS:
+            spans = " x ".join(f"{len(axis.values)} of {axis.name}" for axis in self.axes)
+            raise InputError(
+                f"a sweep takes at most {MOST_POINTS} points in all, got {spans} = {points}; take fewer of each"
+            )
+        check_task(self._tasks[0])
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """See ``Question``."""
+        return {**super().inputs, "axes": {axis.name: list(axis.values) for axis in self.axes}}
+
+    @property
+    def total(self) -> int:
+        """See ``Question``: an NLP solver solves twice at each point of the grid."""
+        return math.prod(len(axis.values) for axis in self.axes) * (2 if self.algorithm in GRADIENT_SOLVERS else 1)
+
+    def find(self, work: Work) -> Iterator[list[SweepPoint]]:
+        """See ``Question``; the points are in row-major order of the axes."""
+        path, tasks = self._path, self._tasks
+        ends: Sequence[Solution | RunRecord | None]
+        interrupt = None
+        try:
+            if tasks[0].is_search:
+                ends = _run_searches(tasks, work)
+            else:
+                ends = solve_both_ways(
+                    [task.problem.load() for task in tasks],
+                    starts=self.starts,
+                    seed=self.seed,
+                    solver=work.solver(tasks[0].make_solver()),
+                    progress=lambda: work.progress(""),
+                )
+        except Interrupted as error:
+            ends, interrupt = cast("list[Solution | RunRecord | None]", error.partial), error
+            if not tasks[0].is_search:
+                interrupt = Interrupted(f"{error.sentence}, not all of them solved in both directions", None)
+        found = {
+            tuple(at.values()): _make_point(at, end) for at, end in zip(path, ends, strict=False) if end is not None
+        }
+        grid = [found[at] for at in itertools.product(*(axis.values for axis in self.axes)) if at in found]
+        if grid:
+            yield grid
+        if interrupt is not None:
+            raise interrupt
+
+    @cached_property
+    def _path(self) -> list[dict[str, float]]:
+        """All points of the grid so that neighbours in the list are neighbours on the grid."""
+        points: list[dict[str, float]] = [{}]
+        for axis in self.axes:
+            points = [
+                {**point, axis.name: value}
+                for row, point in enumerate(points)
+                for value in (axis.values if row % 2 == 0 else axis.values[::-1])
+            ]
+        return points
+
+    @cached_property
+    def _tasks(self) -> list[Task]:
+        stop = Stop(evaluations=self.evaluations)
+        problems = [ProblemSpec(name=place(self.problem, at)) for at in self._path]
+        return [Task(problem=problem, solver=self.algorithm, stop=stop, seed=self.seed) for problem in problems]
+
+    def report(self, findings: list[SweepPoint]) -> Answer:
+        """See ``Question``."""
+        problem, objective, axes = self.problem, self.problem.objective, tuple(findings[0].at)
+        solver = Task(problem=ProblemSpec(name=problem), solver=self.algorithm).title
+        stem = f"{problem.name}-sweep-{'-'.join(axes)}-{solver}"
+        rows = [
+            (
+                *(f"{value:g}" for value in point.at.values()),
+                with_unit(point.objective if point.feasible else None, objective.unit),
+                point.status,
+            )
+            for point in findings
+        ]
+        shown = "Optimum over the first axis; crosses where no feasible point was found."
+        return Answer(
+            stem=stem,
+            title=f"{problem.name} by {solver}",
+            parts=(
+                text_table((*axes, objective.name, "status"), rows, "Optima"),
+                Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem, solver)),
+                _make_csv(stem, findings, problem),
+            ),
+            data={"problem": problem.name, "points": [asdict(point) for point in findings]},
+        )
+
+
+def _run_searches(tasks: Sequence[Task], work: Work) -> list[RunRecord]:
+    """Records along the path; an interrupt carries those that are finished."""
+    records: list[RunRecord] = []
+    try:
+        for task in tasks:
+            record = work.store.compute("search-{key}", task.definition(), partial(_run_search, task))
+            records.append(parse_record(record))
+            work.progress("")
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted after {len(records)} of {len(tasks)} points", records) from None
+    return records
+
+
+def _run_search(task: Task) -> dict[str, Any]:
+    with remember_interrupts() as check:
+        record = try_task(task) if task.is_user_code else run_task(task)
+        check()
+    return record.to_json()
+
+
+def _make_point(at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:
+    if isinstance(end, Solution):
+        return SweepPoint(
+            at=at,
+            objective=end.objective,
+            feasible=end.converged,
+            status=end.status,
+            x=end.x,
+            violation=end.violation,
+            evaluations=end.evaluations.f,
+            time_s=end.time_s.solve,
+        )
+    verdict = end.verdict
+    return SweepPoint(
+        at=at,
+        objective=verdict.objective,
+        feasible=verdict.feasible,
+        status=end.status if verdict.feasible else f"infeasible: {'; '.join(verdict.violated)}",
+        x=end.x,
+        violation=verdict.violation,
+        evaluations=end.evaluations["f"],
+        time_s=end.time_s.solve,
+    )
+
+
+def _make_csv(stem: str, points: Sequence[SweepPoint], problem: GaitProblem) -> Table:
+    axes, unit = list(points[0].at), problem.objective.unit
+    # A variable may be an axis too; its column then has the exact value of the axis.
+    columns = [name for name in problem.names if name not in axes]
+    objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
+    taken = {*axes, *columns}
+    verdict, cost = (
+        [f"run_{name}" if name in taken else name for name in names]  # a user's problem may have a variable time_s
+        for names in ((objective, "feasible", "violation"), ("evaluations", "time_s", "status"))
+    )
+    rows: list[list[Value]] = [
+        [
+            *(*point.at.values(), point.objective, point.feasible, point.violation),
+            *(point.x[name] for name in columns),
+            *(point.evaluations, f"{point.time_s:.4f}", point.status),
+        ]
+        for point in points
+    ]
+    return make_csv_table(stem, [*axes, *verdict, *columns, *cost], rows)
+
+
+def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem, solver: str) -> Drawing:
+    """Plot the optimum over the first axis, with a line for each combination of the others; infeasible points as crosses."""
+    first, *others = points[0].at
+    units, objective = units_of(problem), problem.objective
+    lines = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
+    with style():
+        shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(lines)))
+        figure = new_figure(4.2 if not others else 6.3, 3.0)
+        axes = figure.subplots()
+        for key, shade in zip(lines, shades, strict=True):
+            line = [point for point in points if tuple(point.at[name] for name in others) == key]
+            label = ", ".join(quantity(name, units[name], value) for name, value in zip(others, key, strict=True))
+            values = [point.objective if point.feasible else np.nan for point in line]
+            colour = shade if others else COLOURS.get(solver, shade)
+            axes.plot([point.at[first] for point in line], values, "o-", color=colour, label=label or solver)
+        mark_values(axes, sorted({point.at[first] for point in points if not point.feasible}), "infeasible")
+        axes.set_xlabel(axis_label(first, units[first]))
+        axes.set_ylabel("least " * (objective.sign > 0) + axis_label(objective.name, objective.unit))
+        figure.legend(loc="outside right upper") if others else axes.legend()
+    return figure
+
+
+def mark_values(
+    axes: Axes, values: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", height: float = 0.03
+) -> None:
+    """Mark values of x at a share of the axes' height."""
+    if values:
+        transform = axes.get_xaxis_transform()
+        axes.plot(values, np.full(len(values), height), marker, color=colour, label=label, transform=transform)

@@ -1,1 +1,0 @@
-"""How does the optimum move with one or two parameters?"""
