@@ -77,7 +77,7 @@ def test_certainty_prints_one_object_and_writes_its_files(tmp_path: Path) -> Non
 
 def test_a_certificate_without_time_for_a_finite_bound_says_so(tmp_path: Path) -> None:
     done = nlp_gait(*CERTAINTY, "--time-limit", "1e-9", "--out", tmp_path)
-    assert "Proven: nothing: the time limit came before a finite bound" in done.stdout
+    assert "Proven: nothing: the time limit was reached before a finite bound" in done.stdout
     data = json.loads((tmp_path / "walk12-certainty.json").read_text())
     assert data["certificate"]["bound"] is None and data["certificate"]["closed"] is False
 

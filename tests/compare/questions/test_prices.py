@@ -53,7 +53,7 @@ def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
 
 
 def test_a_solver_without_multipliers_has_no_prices() -> None:
-    with pytest.raises(InputError, match="need multipliers, which slsqp does not give; solve with ipopt"):
+    with pytest.raises(InputError, match="need multipliers, which slsqp does not return; solve with ipopt"):
         find(Prices(problem=load("walk12"), starts=2, solver=make_solver("slsqp")))
 
 
