@@ -1,1 +1,1 @@
-"""What guarantees rest on: sound enclosures, narrow bounds, verdicts between samples, proofs that end."""
+"""Checks and proofs behind the guarantees: sound enclosures, narrow bounds, verdicts between samples, certificates."""

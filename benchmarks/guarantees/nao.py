@@ -1,9 +1,9 @@
 """Proofs of NAO's phases: a certificate for an instance of GaitBench, or the bound that was reached.
 
-``python -m benchmarks.guarantees.nao OUT TOLERANCE [--instance ID ...] [--hours HOURS] [--part PART]`` writes them, of all
-instances that have bounds of their power unless some are named; one that is there already is kept, and what was killed goes on.
-Without the time to close, the open part stays in OUT and its bound is printed. With a part the bounds of the variables are this
-part of their ranges around the best known gait.
+``python -m benchmarks.guarantees.nao OUT TOLERANCE [--instance ID ...] [--hours HOURS] [--part PART]`` writes them, by default for
+all instances with a least-power form. Existing certificates are skipped; a killed proof continues. If the time is not enough, the
+open part stays in OUT and its bound is printed. With a part, the bounds of the variables are this part of their ranges around the
+best known gait.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ REPORT_S = 30.0
 
 
 def instance_problem(id: str) -> tuple[GaitProblem, Array]:
-    """The problem from which an instance is made, what it holds constant in bounds that are equal, and its best known x."""
+    """Return the problem of an instance, with its fixed variables in equal bounds, and its best known x."""
     definition = get_definition(id)
     problem = nlp_gait.load(definition.problem, **definition.options).with_values(**definition.values)
     free = iter(load_facts()[id].best_x)
@@ -37,25 +37,27 @@ def instance_problem(id: str) -> tuple[GaitProblem, Array]:
 
 
 def prove(out: Path, id: str, tolerance: float, hours: float, part: float | None) -> None:
-    """Write the certificate of an instance, or print how far it came."""
+    """Write the certificate of an instance, or print the bound so far."""
     stem = f"{id}-{100 * tolerance:g}-percent" + (f"-around-{part:.3g}" if part else "")
     if (out / f"{stem}.json").exists():
-        print(f"{stem} is there")
+        print(f"{stem} exists")
         return
     problem, x = instance_problem(id)
-    problem, told = problem if part is None else narrow_around(problem, x, part), time.perf_counter()
+    problem, reported = problem if part is None else narrow_around(problem, x, part), time.perf_counter()
 
     def progress(note: str) -> None:
-        nonlocal told
-        if time.perf_counter() - told > REPORT_S:
-            told = time.perf_counter()
+        nonlocal reported
+        if time.perf_counter() - reported > REPORT_S:
+            reported = time.perf_counter()
             print(note, flush=True)
 
-    kept = out / f".{stem}.open.npz"
-    found = certify(problem, x, tolerance=tolerance, time_limit_s=3600.0 * hours, progress=progress, checkpoint=kept)
+    checkpoint = out / f".{stem}.open.npz"
+    found = certify(
+        problem, x, tolerance=tolerance, time_limit_s=3600.0 * hours, progress=progress, checkpoint=checkpoint
+    )
     if found.closed:
         write_json(out / f"{stem}.json", make_certificate_file(problem, found).to_json())
-        kept.unlink()
+        checkpoint.unlink()
     print(
         f"{stem}: f {found.objective:.7g}, proven {found.bound:.7g}, {found.boxes:,} boxes, {found.left:,} left, "
         f"{found.cpu_s:.1f} s of CPU, {found.time_s:.1f} s",

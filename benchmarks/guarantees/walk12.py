@@ -1,7 +1,7 @@
-"""Proofs that end: a certificate for each lambda of the 12-joint walk.
+"""Proofs for the 12-joint walk: a certificate for each lambda of Table III.
 
-``python -m benchmarks.guarantees.walk12 OUT [TOLERANCE ...]`` writes them. The lambdas are those of Table III; a certificate
-that is there already is kept, and what was killed goes on.
+``python -m benchmarks.guarantees.walk12 OUT [TOLERANCE ...]`` writes them. Existing certificates are skipped; a killed proof
+continues.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LIMIT_S = 24 * 3600.0
 
 
 def main() -> None:
-    """Prove what is not proven yet, the wide tolerances first."""
+    """Write the missing certificates, those of wide tolerances first."""
     out = Path(sys.argv[1])
     out.mkdir(parents=True, exist_ok=True)
     for tolerance in [float(text) for text in sys.argv[2:]] or TOLERANCES:
