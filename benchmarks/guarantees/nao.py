@@ -1,9 +1,9 @@
 """Proofs of NAO's phases: a certificate for an instance of GaitBench, or the bound that was reached.
 
-``python -m benchmarks.guarantees.nao OUT TOLERANCE [--instance ID ...] [--hours HOURS] [--part PART]`` writes them, by default for
-all instances with a least-power form. Existing certificates are skipped; a killed proof continues. If the time is not enough, the
-open part stays in OUT and its bound is printed. With a part, the bounds of the variables are this part of their ranges around the
-best known gait.
+``python -m benchmarks.guarantees.nao OUT TOLERANCE [--instance ID ...] [--hours HOURS] [--part PART]`` writes them, by default
+for all instances with a least-power form. Existing certificates are skipped; a killed proof continues. If the time is not enough,
+the open part stays in OUT and its bound is printed. With a part, the bounds of the variables are this part of their ranges around
+the best known gait.
 """
 
 from __future__ import annotations
