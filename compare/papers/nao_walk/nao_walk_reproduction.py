@@ -143,7 +143,7 @@ def _make_joints(findings: NaoWalkFindings) -> Rows:
         for gait, found in findings.joints.items()
         for where in ("model", "engine")
         if where == "model" or found["fell_at_s"] is None
-        for heat in HEATS
+        for heat in SPECS
     ]
 
 

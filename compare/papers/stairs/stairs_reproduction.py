@@ -280,7 +280,7 @@ REPRODUCTION = Reproduction(
         other_starts=1,
         poses=3,
         plan_intervals=16,
-        ideal_intervals=14,
+        ideal_intervals=10,
     ),
     run=run_stairs,
     values=compute_values,

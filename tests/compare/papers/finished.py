@@ -8,7 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
+from matplotlib.figure import Figure
+
 from compare.papers import load_reproduction
+from compare.report import writing
 
 
 @dataclass(kw_only=True)
@@ -28,11 +32,22 @@ class Finished:
         return (self.folder / "report.md").read_text()
 
 
-def reproduce(paper: str, folder: Path) -> Finished:
-    """Run in this process: workers would build every problem again."""
+def reproduce(paper: str, folder: Path, *, coarse: bool = False) -> Finished:
+    """Run in this process, since workers would build every problem again; coarse pictures are drawn once and small."""
     finished, reproduction = Finished(paper=paper, folder=folder), load_reproduction(paper)
-    finished.findings = reproduction.reproduce(folder, reproduction.quick, finished.progress.append, jobs=1)
+    with pytest.MonkeyPatch.context() as patch:
+        if coarse:
+            patch.setattr(writing, "save", save_coarsely)
+        finished.findings = reproduction.reproduce(folder, reproduction.quick, finished.progress.append, jobs=1)
     return finished
+
+
+def save_coarsely(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
+    figure.set_layout_engine("none")
+    figure.savefig(png, dpi=20)
+    svg.write_text("<svg>" + 1000 * " " + "</svg>", encoding="utf-8")
+    return png, svg
 
 
 def recompute(finished: Finished, stop_at: str = "figures") -> list[str]:

@@ -18,7 +18,7 @@ from tests.compare.papers.finished import Finished, check_report, recompute, rep
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return reproduce("nao-pareto", tmp_path_factory.mktemp("nao-pareto"))
+    return reproduce("nao-pareto", tmp_path_factory.mktemp("nao-pareto"), coarse=True)
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from tests.compare.papers.finished import Finished, check_report, recompute, rep
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return reproduce("nao", tmp_path_factory.mktemp("nao"))
+    return reproduce("nao", tmp_path_factory.mktemp("nao"), coarse=True)
 
 
 def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:

@@ -107,7 +107,7 @@ def test_the_report_from_end_to_end_and_again(tmp_path: Path, monkeypatch: pytes
     findings, calls = make_findings(), []
 
     def replace_run(name: str, result: Any) -> None:
-        def compute(*_: Any) -> Any:
+        def compute(*_: Any, **__: Any) -> Any:
             calls.append(name)
             return result
 

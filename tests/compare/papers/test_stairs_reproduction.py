@@ -12,7 +12,7 @@ from tests.compare.papers.finished import Finished, check_report, reproduce
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return reproduce("stairs", tmp_path_factory.mktemp("stairs"))
+    return reproduce("stairs", tmp_path_factory.mktemp("stairs"), coarse=True)
 
 
 def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
