@@ -1,4 +1,4 @@
-"""Changed mathematics: never an old function, and all that a problem can do goes on."""
+"""Derived problems: new functions, and everything else that a problem provides still works."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every problem can do: parameters, bounds, fixed variables, names, and refusals in words."""
+"""Every problem: parameters, bounds, fixed variables, names and messages."""
 
 from __future__ import annotations
 

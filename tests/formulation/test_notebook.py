@@ -1,4 +1,4 @@
-"""What results say of themselves: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
+"""Display of results: one line in a terminal, a small table in a notebook, data frames, and the balance margin."""
 
 from __future__ import annotations
 

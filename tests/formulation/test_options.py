@@ -1,4 +1,4 @@
-"""A problem records the options that it was made with: they make the same problem again."""
+"""A problem records its options, and loading it with them gives the same problem."""
 
 from __future__ import annotations
 

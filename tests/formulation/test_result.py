@@ -1,4 +1,4 @@
-"""Files that hold a gait."""
+"""Files with a gait."""
 
 import json
 

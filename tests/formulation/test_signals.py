@@ -1,4 +1,4 @@
-"""Time histories say what each of their columns is, or they are refused."""
+"""Time histories describe all their columns, or they are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Problems of one's own by name, and mistakes in them met as they are made, by the name of the row."""
+"""User-defined problems by name; mistakes in them are reported when they are made, with the name of the row."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def test_an_edit_of_their_file_recomputes_their_runs(mine: Path) -> None:
 
     def again() -> list[str]:
         done = nlp_gait(*call, "--jobs", "1", "--out", "study")
-        return [line for line in done.stderr.splitlines() if "made again" in line]
+        return [line for line in done.stderr.splitlines() if "recomputed" in line]
 
     assert again() == [] and len(list(Path("study").glob("records/two_link/*.json"))) == 7
     assert again() == []
@@ -87,4 +87,4 @@ def test_a_study_file_names_them_and_a_folder_does_not(mine: Path) -> None:
     Path("moved.py").rename("my.py")
     code = ["--code", "my.py:two_link", "--code", "my.py:Shrinking"]
     done = nlp_gait("compare", "--resume", "--out", "study", "--jobs", "1", *code)
-    assert "made again" not in done.stderr
+    assert "recomputed" not in done.stderr
