@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +20,18 @@ from compare.analysis.statistics.run_length import (
     make_curve,
     relative_gap,
 )
+from compare.study.definition import describe_edition, select_shared
 from compare.study.record import RunRecord
+from nlp_gait.backends.identity import hash_json
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors
 from nlp_gait.formulation import Objective
 
 DEFAULT_WEIGHTING = Weighting()
+# An edition's name is a label, so that files can be named after it.
+NOT_IN_LABELS = re.compile(r"[^A-Za-z0-9._+: -]")
+LONGEST = 30
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,3 +171,35 @@ def read_objective(record: RunRecord) -> Objective:
     """
     with convert_errors(f"record of {record.solver}, run {record.run}", InputError):
         return decode(Objective, record.definition.get("objective"), "objective")
+
+
+def label_editions(records: Sequence[RunRecord]) -> list[RunRecord]:
+    """Rename records whose problem or solver differs from the latest one of that name: ``pso (evaluations 500)``.
+
+    The definition of the first record keeps the name; ``read_records`` puts the latest first.
+    """
+    first: dict[str, dict[str, Any]] = {}
+    named: dict[tuple[str, str], str] = {}
+    found = []
+    for record in records:
+        whole = select_shared(record.definition)
+        problem = _name(record.problem, {"problem": whole["problem"], "solver": ""}, first, named)
+        solver = _name(f"{problem}\0{record.solver}", whole, first, named).partition("\0")[2]
+        found.append(replace(record, problem=problem, solver=solver))
+    return found
+
+
+def _name(
+    label: str, definition: Mapping[str, Any], first: dict[str, dict[str, Any]], named: dict[tuple[str, str], str]
+) -> str:
+    """Return a label with the differences from the first definition of that label."""
+    key = label, hash_json(definition)
+    if key not in named:
+        name = label
+        if label in first:
+            difference = NOT_IN_LABELS.sub("", describe_edition(definition, first[label]))[:LONGEST]
+            name = f"{label} ({difference})"
+            name = name if name not in named.values() else f"{label} ({key[1][:8]})"
+        first.setdefault(label, dict(definition))
+        named[key] = name
+    return named[key]

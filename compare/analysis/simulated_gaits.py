@@ -12,7 +12,7 @@ from compare.study.record import RunRecord
 from compare.study.simulations import SimulatedGait
 from nlp_gait.simulation.drive import Drive
 
-HEADER = ("solver", "model", "engine", "error", "rank", "engine's", "fate")
+GAIT_HEADER = ("solver", "model", "engine", "error", "rank", "engine's", "fate")
 DIGITS = "#.4g"  # of energies; ranks use the printed numbers, as the engine resolves no finer differences
 FEWEST = 3  # gaits for a rank correlation
 
@@ -104,7 +104,7 @@ def group_by_problem(plays: Sequence[SimulatedGait]) -> dict[str, list[Simulated
 
 
 def make_engine_rows(plays: Sequence[SimulatedGait]) -> list[tuple[str, ...]]:
-    """Return rows of text under ``HEADER`` for gaits of one problem, the model's best first."""
+    """Return rows of text under ``GAIT_HEADER`` for gaits of one problem, the model's best first."""
     ordered = sorted(plays, key=lambda played: (played.model, played.solver))
     model = [round_as_printed(played.model) for played in ordered]
     engine = [math.inf if played.engine is None else round_as_printed(played.engine) for played in ordered]

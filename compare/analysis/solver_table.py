@@ -1,9 +1,9 @@
-"""The table of solvers: claims, verdicts of the judge, costs."""
+"""The table of solvers: claims, verdicts of the judge, costs, failed runs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -11,6 +11,7 @@ from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.statistics.inference import bootstrap_interval
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import seconds, with_unit
+from compare.study.record import RunRecord
 
 ROUNDING = 1e-12  # a share below this is shown as zero
 HEADER = (
@@ -139,3 +140,42 @@ def percent(share: float | None) -> str:
 def count(number: float) -> str:
     """Format a number of evaluations; a dash if it is infinite."""
     return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """Failed runs of one solver on one problem.
+
+    Attributes:
+        problem: title.
+        solver: title.
+        failed: number of runs without a point.
+        runs: number of runs.
+        reason: status of the first.
+    """
+
+    problem: str
+    solver: str
+    failed: int
+    runs: int
+    reason: str
+
+    @property
+    def sentence(self) -> str:
+        """The failures as one sentence."""
+        return (
+            f"{self.problem}, {self.solver}: {self.failed} of {self.runs} runs have no result; the first {self.reason}"
+        )
+
+
+def find_failures(records: Sequence[RunRecord]) -> list[Failure]:
+    """Return the solvers with failed runs, in the order of their records."""
+    found = []
+    for problem, solver in dict.fromkeys((record.problem, record.solver) for record in records):
+        own = [record for record in records if (record.problem, record.solver) == (problem, solver)]
+        failed = [record for record in own if not record.x]
+        if failed:
+            found.append(
+                Failure(problem=problem, solver=solver, failed=len(failed), runs=len(own), reason=failed[0].status)
+            )
+    return found

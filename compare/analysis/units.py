@@ -1,4 +1,4 @@
-"""Format numbers with units, and lists, for tables, figures and sentences.
+"""Format numbers with units, and lists, for tables, figures and sentences; natural steps of quantities.
 
 The unit of a pure number is "1" and is not shown.
 """
@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
+
+from nlp_gait.formulation import Parameter
 
 
 def number(value: float, digits: str) -> str:
@@ -43,3 +46,35 @@ def join_words(parts: Iterable[str]) -> str:
     """Join words: ``a``, ``a and b``, ``a, b and c``."""
     *most, last = [*parts] or [""]
     return f"{', '.join(most)} and {last}" if most else last
+
+
+class NaturalStep(NamedTuple):
+    """A change of a quantity, in its own unit, and its description."""
+
+    size: float
+    words: str
+
+
+BY_UNIT = {
+    "m": NaturalStep(1e-3, "1 mm"),
+    "rad": NaturalStep(math.radians(1.0), "1 degree"),
+    "Nm": NaturalStep(0.1, "0.1 Nm"),
+    "N": NaturalStep(1.0, "1 N"),
+    "s": NaturalStep(0.1, "0.1 s"),
+    "m/s": NaturalStep(1e-3, "1 mm/s"),
+    "rad/s": NaturalStep(0.1, "0.1 rad/s"),
+    "rad/s^2": NaturalStep(1.0, "1 rad/s^2"),
+    "1": NaturalStep(0.01, "0.01"),
+}
+SHARE = 0.05  # of the value, where the unit has no step
+MASS = NaturalStep(SHARE, f"{100 * SHARE:g} %")
+LENGTH = BY_UNIT["m"]
+
+
+def choose_natural_step(parameter: Parameter, value: float) -> NaturalStep:
+    """Return the step of a parameter at its current value."""
+    if parameter.unit in BY_UNIT:
+        return BY_UNIT[parameter.unit]
+    if value:
+        return NaturalStep(SHARE * abs(value), MASS.words)
+    return NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")

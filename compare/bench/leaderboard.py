@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns, compare_problems
-from compare.analysis.statistics.distribution import ECDF_TARGETS
 from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
-from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import load_baseline
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench

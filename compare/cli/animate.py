@@ -30,7 +30,7 @@ def animate(
     Example: `nlp-gait animate best.json --out walk.gif` after `nlp-gait solve nao-ssp --out best.json`
     """
     from compare.drawing.animation import draw_frames, write_contact_sheet
-    from compare.drawing.skeletons import make_skeleton
+    from compare.drawing.gait_figure import make_skeleton
     from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
     loaded = stored.load()

@@ -139,7 +139,7 @@ def compare(
 
 def end_if_none_left(records: Sequence[RunRecord]) -> None:
     """Report failed runs on stderr, and end with status 1 if a solver has no result on some problem."""
-    from compare.analysis.failures import find_failures
+    from compare.analysis.solver_table import find_failures
 
     without_result = []
     for failure in find_failures(records):
@@ -173,8 +173,7 @@ HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best 
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Print the table of solvers for each problem, titled by the problem unless a title is given."""
     from compare.analysis.comparison import compare_problems
-    from compare.analysis.failures import find_failures
-    from compare.analysis.solver_table import HEADER, format_cells, summarise
+    from compare.analysis.solver_table import HEADER, find_failures, format_cells, summarise
     from compare.analysis.verdict import describe_proof
 
     for comparison in compare_problems(records):

@@ -40,7 +40,7 @@ def import_results(
 
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
-    from compare.analysis.editions import label_editions
+    from compare.analysis.comparison import label_editions
     from compare.report import write_report
     from compare.study.import_runs import import_runs
     from compare.study.manifest import read_manifest

@@ -97,7 +97,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
             f"humanoid-dsp and humanoid-cycle with --robot {name}"
         )
     if target is not None:
-        from compare.drawing.robot_figure import plot_robot
+        from compare.drawing.robot_figures import plot_robot
 
         print_written(*plot_robot(body.biped, target.with_suffix("")))
 

@@ -56,7 +56,7 @@ def report(
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
     """
-    from compare.analysis.editions import label_editions
+    from compare.analysis.comparison import label_editions
     from compare.analysis.statistics.run_length import Weighting
     from compare.report import rebuild_report
     from compare.study.record_files import read_records
@@ -110,7 +110,7 @@ def plain_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
 def print_simulations(simulated: Sequence[SimulatedGait]) -> None:
     """Print a table per problem, and the agreement of engine and model."""
     from compare.analysis.simulated_gaits import (
-        HEADER,
+        GAIT_HEADER,
         describe_drive,
         group_by_problem,
         make_engine_rows,
@@ -118,7 +118,7 @@ def print_simulations(simulated: Sequence[SimulatedGait]) -> None:
     )
 
     for problem, own in group_by_problem(simulated).items():
-        print_table(f"{problem} simulated: {describe_drive(own[0].drive)}", HEADER, make_engine_rows(own))
+        print_table(f"{problem} simulated: {describe_drive(own[0].drive)}", GAIT_HEADER, make_engine_rows(own))
         stdout.print(measure_agreement(own).describe())
     if simulated:
         stdout.print(ENGINE_TABLE)

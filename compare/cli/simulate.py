@@ -63,7 +63,7 @@ def simulate(
     `nlp-gait simulate best.json --video walk.mp4`,
     `nlp-gait simulate best.json --beside other.json --video both.gif --speed 0.25`
     """
-    from compare.drawing.simulation_figure import plot_simulation
+    from compare.drawing.robot_figures import plot_simulation
     from nlp_gait.export.formats import write_npz
     from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
     from nlp_gait.formulation.result import load_result

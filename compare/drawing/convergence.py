@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.distribution import compute_band
+from compare.analysis.statistics.run_length import compute_band
 from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.distribution import ECDF_TARGETS, ecdf, performance_profile
-from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS, ecdf, performance_profile
 from compare.drawing.convergence import clip_percent, plot_by_cost
 from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,20 @@ FAINTEST = 0.25  # opacity of the first pose; the last one has 1
 WIDTH_IN, ROW_IN = 7.4, 2.1
 MOST_BESIDE = 6  # gaits in a row of stick figures
 CURVES = {"power": "mechanical power [W]", "margin": "balance margin [mm]"}
+
+
+@lock_casadi
+def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
+    """Skeleton of a gait at about the given number of samples a second.
+
+    Raises:
+        InputError: the problem has no motion to draw.
+    """
+    problem = result.problem
+    if problem.display.skeleton is None:
+        raise InputError(f"problem {problem.name!r} has no skeleton to draw")
+    drawn = problem.display.skeleton(sample_signals(result, 1.0 / frames_per_s), problem.parameter_values)
+    return replace(drawn, title=problem.title)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""The section of a report on one problem."""
+"""The section of a report on one problem: tables, figures, gaits, the engine, tests, constraints, failures."""
 
 from __future__ import annotations
 
@@ -6,23 +6,32 @@ import math
 from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.natural_steps import BY_UNIT
 from compare.analysis.published import make_published_rows
-from compare.analysis.significance import compare_pairs
+from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.analysis.solver_table import HEADER, SolverSummary, count, format_cells, summarise
 from compare.analysis.statistics.run_length import TARGETS
-from compare.analysis.units import heading, seconds
+from compare.analysis.units import BY_UNIT, heading, seconds
+from compare.analysis.verdict import compare_pairs
 from compare.drawing.convergence import SMALLEST_GAP, plot_convergence
 from compare.drawing.distributions import plot_ecdf, plot_final_gaps
-from compare.report.document import Figure, Section, text_table
-from compare.report.engine_section import engine_section
-from compare.report.gait_section import make_gaits_part
-from compare.study.record import RunRecord
+from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
+from compare.report.document import Figure, Part, Prose, Section, text_table
+from compare.study.record import RunRecord, load_gait
 from compare.study.simulations import SimulatedGait
+from nlp_gait.errors import GaitError
 from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
+HOW = Prose(
+    "The best gaits of this study have not been simulated in a physics engine. `nlp-gait report DIR --engine` simulates those "
+    "that can be (extra `sim`) and adds their energy, fate and rank to this report."
+)
+CAPTION = (
+    "Best gait of each solver: six poses at equidistant times, later ones darker (left blue, right orange). Mechanical "
+    "power is the sum of |torque x rate| over the joints. The balance margin is the distance of the zero-moment point from the "
+    "nearest edge of the support polygon, negative outside of it."
+)
 
 
 def problem_section(comparison: Comparison, plays: Sequence[SimulatedGait] = ()) -> Section:
@@ -220,3 +229,51 @@ def _p(value: float) -> str:
 
 def _seconds(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "-"
+
+
+def engine_section(plays: Sequence[SimulatedGait]) -> Section | None:
+    """Return the section on every solver's best gait in the engine, for each drive; None without simulations."""
+    if not plays:
+        return None
+    parts: list[Part] = []
+    for drive in dict.fromkeys(played.drive for played in plays):
+        alike = [played for played in plays if played.drive == drive]
+        parts.append(text_table(GAIT_HEADER, make_engine_rows(alike), f"Best gaits; {describe_drive(drive)}"))
+        parts.append(measure_agreement(alike).describe())
+    steps = plays[0].steps
+    figure = (
+        "mean power over the phase"
+        if steps is None
+        else f"energy for each planned metre over {steps} steps, every second one mirrored"
+    )
+    return Section(
+        title="In the physics engine",
+        parts=(
+            f"Every solver's best gait, simulated open loop in MuJoCo. Model and engine: {figure}, mechanical and heat. The "
+            "model's value and rank refer to the planned motion on a dense grid. Ranks use the printed digits; a gait "
+            "that falls has none. For a cycle that does not fall, the walked share of the planned distance is given.",
+            *parts,
+        ),
+    )
+
+
+def make_gaits_part(comparison: Comparison) -> Figure | str | None:
+    """Return the best gait of each solver as a figure, a sentence if they cannot be drawn, or None without any gait."""
+    best = [solver.best for solver in comparison.solvers]
+    records = [record for record in best if record is not None]
+    if not records:
+        return None
+    try:
+        gaits = {record.solver: _gait(record) for record in records}
+    except GaitError as error:
+        return f"The gaits are not drawn: {error}."
+    found = {title: gait for title, gait in gaits.items() if gait is not None}
+    if not any(gait.skeleton is not None or gait.power is not None for gait in found.values()):
+        return None
+    return Figure(name=f"{make_file_name(comparison.problem)}-gaits", caption=CAPTION, drawing=plot_gaits(found))
+
+
+def _gait(record: RunRecord) -> GaitCurves | None:
+    """Return a record's gait, or None for a problem without time histories."""
+    gait = load_gait(record)
+    return None if gait.problem.display.motion is None else prepare_gait(gait)

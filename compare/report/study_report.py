@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems
-from compare.analysis.editions import label_editions
+from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import write_verdict
 from compare.drawing.distributions import list_expected_costs, plot_performance_profile
-from compare.report.csv_files import write_csv_files
 from compare.report.document import Document, Figure, Section
-from compare.report.engine_section import HOW
 from compare.report.method_section import method_section
-from compare.report.problem_section import problem_section
-from compare.report.writing import write_document
+from compare.report.problem_section import HOW, problem_section
+from compare.report.writing import write_csv_files, write_document
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
 from compare.study.record_files import read_records

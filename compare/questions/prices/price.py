@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.natural_steps import LENGTH, MASS, NaturalStep, choose_natural_step
+from compare.analysis.units import LENGTH, MASS, NaturalStep, choose_natural_step
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from nlp_gait.backends.optima.optimum import SHARP, Optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compare.analysis.simulated_gaits import (
-    HEADER,
+    GAIT_HEADER,
     compute_agreement,
     describe_drive,
     group_by_problem,
@@ -79,8 +79,8 @@ def test_ranks_are_those_of_the_printed_numbers() -> None:
 
 
 def test_a_table_fits_a_terminal() -> None:
-    rows = [*make_engine_rows([played("pso+ipopt", 19.15, 19.61, walked_share=0.997)]), HEADER]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
+    rows = [*make_engine_rows([played("pso+ipopt", 19.15, 19.61, walked_share=0.997)]), GAIT_HEADER]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(GAIT_HEADER))]
     assert sum(widths) + 3 * len(widths) + 1 <= 80
     assert rows[0][-1] == "walks 99.7 %"
 

@@ -10,15 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from compare.analysis.statistics.distribution import ECDF_TARGETS, compute_band, ecdf, performance_profile
 from compare.analysis.statistics.inference import a12, bootstrap_interval, holm, rank_sum, rank_sum_normal, signed_rank
 from compare.analysis.statistics.run_length import (
+    ECDF_TARGETS,
     TARGETS,
     Curve,
     Weighting,
+    compute_band,
+    ecdf,
     expected_running_time,
     find_best_known,
     make_curve,
+    performance_profile,
     relative_gap,
 )
 from nlp_gait.formulation import Objective

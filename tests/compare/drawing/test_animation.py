@@ -6,7 +6,7 @@ from PIL import Image
 
 import nlp_gait
 from compare.drawing.animation import draw_frames, write_contact_sheet
-from compare.drawing.skeletons import make_skeleton
+from compare.drawing.gait_figure import make_skeleton
 from nlp_gait.formulation import Result, problem_names
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)

@@ -9,7 +9,7 @@ import pytest
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.drawing.gait_figure import CURVES
 from compare.report.document import Figure
-from compare.report.gait_section import make_gaits_part
+from compare.report.problem_section import make_gaits_part
 from tests.compare.records import DSP_X, record, study
 
 

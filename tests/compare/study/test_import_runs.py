@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.analysis.comparison import compare_problems
-from compare.analysis.editions import label_editions
+from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.solver_table import format_cells, summarise
 from compare.judge import evaluate
 from compare.report import rebuild_report
