@@ -2,7 +2,7 @@
 
     python -m benchmarks.engine [TABLE ...]
 
-About half an hour for all on one core; each table says above it what it shows. Nothing is tuned per gait or speed.
+About half an hour for all on one core; each table has a title. Nothing is tuned per gait or speed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
 
 
 def main() -> None:
-    """Print as the lines come."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.engine", description=__doc__.splitlines()[0])
     parser.add_argument("tables", nargs="*", metavar="TABLE", help=f"{', '.join(TABLES)} (default: all)")
     named = parser.parse_args().tables or list(TABLES)

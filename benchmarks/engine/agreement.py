@@ -1,4 +1,4 @@
-"""How far the engine confirms what the model plans."""
+"""Agreement of the engine with the model."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from nlp_gait.simulation.simulate import simulate_plan
 STEPS, MANY_STEPS = 10, 30
 RANDOM = 30
 held = partial(Drive, feed_forward="none")
-# From the drive of earlier versions to the present one.
+# From simple to complete drives.
 WATERFALL = {
-    "held for 40 ms, nothing fed forward": DRIVES["held"],
+    "held for 40 ms, no feed-forward": DRIVES["held"],
     "held for 10 ms": held(interpolation="held"),
     "linear, 40 ms": held(period_s=0.04),
     "linear, 10 ms": held(),
@@ -47,47 +47,63 @@ KINDS: dict[str, dict[str, str]] = {
 }
 
 
-def walked(result: Result, steps: int, drive: Drive | None = None, sole: str = "rectangle") -> Walk:
-    """A cycle played for so many steps."""
+def simulate_walk(result: Result, steps: int, drive: Drive | None = None, sole: str = "rectangle") -> Walk:
+    """Simulate several steps of a cycle and measure them."""
     drive, plan = drive or Drive(), make_plan(result, steps)
     return measure_walk(plan, simulate_plan(plan, drive=drive, sole=sole), drive, steps)
 
 
 def waterfall() -> Iterator[str]:
-    """From the old drive to the new one: cheapest cycles at .05 and .08 m/s, ten steps."""
+    """Drives from simple to complete: cheapest cycles at .05 and .08 m/s, ten steps."""
     yield header(
-        "set-points and feed-forward", "m/s", "J per planned m", "model", "J per walked m", "way", "early ms", "mm/s"
+        "set-points and feed-forward",
+        "m/s",
+        "J per planned m",
+        "model",
+        "J per walked m",
+        "distance",
+        "early ms",
+        "mm/s",
     )
     for label, drive in WATERFALL.items():
         for speed in (0.05, 0.08):
-            walk = walked(optimal_cycles()[speed], STEPS, drive)
+            walk = simulate_walk(optimal_cycles()[speed], STEPS, drive)
             m = walk.measurements
             yield cells(
                 label,
                 f"{speed:g}",
-                *energies(walk),
+                *format_energies(walk),
                 f"{1e3 * (m.earliest_landing_s or 0.0):.0f}",
                 f"{1e3 * (m.landing_speed_m_s or 0.0):.0f}",
             )
 
 
-def energies(walk: Walk) -> tuple[str, ...]:
-    """Per planned metre in engine and model [J], per walked metre [J], share of the way."""
+def format_energies(walk: Walk) -> tuple[str, ...]:
+    """Format joules per planned metre of engine and model, joules per walked metre, and the share of the distance."""
     if walk.engine_J_per_planned_m is None or walk.walked_m is None:
         return (f"falls in step {walk.steps_done + 1}", f"{walk.model_J_per_m:.2f}", "-", "-")
     per_walked = "-" if walk.engine_J_per_m is None else f"{walk.engine_J_per_m:.2f}"
-    way = f"{walk.walked_m / walk.planned_m:.4f}"
-    return (f"{walk.engine_J_per_planned_m:.2f}", f"{walk.model_J_per_m:.2f}", per_walked, way)
+    share = f"{walk.walked_m / walk.planned_m:.4f}"
+    return (f"{walk.engine_J_per_planned_m:.2f}", f"{walk.model_J_per_m:.2f}", per_walked, share)
 
 
 def speeds() -> Iterator[str]:
     """Cheapest cycles at nine speeds, ten steps, and how fast they are simulated."""
     yield header(
-        "m/s", "J per planned m", "model", "J per walked m", "way", "error", "net W, model", "CoP mm", "tilt deg", "s/s"
+        "m/s",
+        "J per planned m",
+        "model",
+        "J per walked m",
+        "distance",
+        "error",
+        "net W, model",
+        "CoP mm",
+        "tilt deg",
+        "s/s",
     )
     for speed, result in optimal_cycles().items():
         began = time.perf_counter()
-        walk = walked(result, STEPS)
+        walk = simulate_walk(result, STEPS)
         m, took = walk.measurements, time.perf_counter() - began
         simulated = STEPS * sum(
             result.x[result.problem.variable_index(name)] for name in result.problem.display.durations
@@ -95,7 +111,7 @@ def speeds() -> Iterator[str]:
         error = (walk.engine_J_per_planned_m or np.nan) / walk.model_J_per_m - 1.0
         yield cells(
             f"{speed:g}",
-            *energies(walk),
+            *format_energies(walk),
             f"{error:+.1%}",
             f"{m.measured.signed_W:.3f}, {m.predicted.signed_W:.3f}",
             f"{1e3 * (m.pressure_rms_m or np.nan):.1f}",
@@ -106,20 +122,20 @@ def speeds() -> Iterator[str]:
 
 def far() -> Iterator[str]:
     """Thirty steps at three speeds."""
-    yield header("m/s", "J per planned m", "model", "J per walked m", "way", "drift mm", "heading deg")
+    yield header("m/s", "J per planned m", "model", "J per walked m", "distance", "drift mm", "heading deg")
     for speed in (0.02, 0.05, 0.1):
-        walk = walked(optimal_cycles()[speed], MANY_STEPS)
+        walk = simulate_walk(optimal_cycles()[speed], MANY_STEPS)
         drift, heading = (
             "-" if value is None else f"{value:.2f}"
             for value in (None if walk.drift_m is None else 1e3 * walk.drift_m, walk.heading_deg)
         )
-        yield cells(f"{speed:g}", *energies(walk), drift, heading)
+        yield cells(f"{speed:g}", *format_energies(walk), drift, heading)
 
 
 def ranking() -> Iterator[str]:
     """Thirty random feasible gaits of the cycle and of each phase: does the engine rank them as the model does?
 
-    The papers limit no torque, and a random gait may ask for more than a drive's limits let it give: "beyond limit".
+    The papers have no torque limits, and a random gait may need more than a drive's limit: "beyond limit".
     """
     yield header(
         "problem", "drive", "beyond limit", "fall", "Spearman", "error, mean", "largest", "model W, least to most"
@@ -128,7 +144,7 @@ def ranking() -> Iterator[str]:
         problem = nlp_gait.load(label.split(",")[0], **options)
         gaits = random_gaits(problem, RANDOM)
         for name, drive in RANKED.items():
-            found = [_played(gait, drive) for gait in gaits]
+            found = [_simulate(gait, drive) for gait in gaits]
             up = [m for m in found if not m.fallen]
             model, engine = (np.array([getattr(m, which).total_W for m in up]) for which in ("predicted", "measured"))
             errors = engine / model - 1.0
@@ -144,14 +160,14 @@ def ranking() -> Iterator[str]:
             )
 
 
-def load_published() -> Iterator[str]:
+def published() -> Iterator[str]:
     """Optima and the paper's gaits: model and engine, in watts."""
     yield header(
         "gait", "model W", "engine W", "held drive W", "net W, model", "CoP mm", "middle", "slip mm", "landing mm"
     )
     for name in PAPER:
         for label, gait in phase_gaits(name).items():
-            m, old = _played(gait, Drive()), _played(gait, DRIVES["held"])
+            m, old = _simulate(gait, Drive()), _simulate(gait, DRIVES["held"])
             landing = ", ".join(f"{1e3 * at.error_m:.1f}" for at in m.landings.values()) or "-"
             yield cells(
                 f"{name}, {label}{', **falls**' if m.fallen else ''}",
@@ -164,6 +180,6 @@ def load_published() -> Iterator[str]:
             )
 
 
-def _played(result: Result, drive: Drive) -> Measurements:
+def _simulate(result: Result, drive: Drive) -> Measurements:
     plan = make_plan(result)
     return measure(plan, simulate_plan(plan, drive=drive), drive)

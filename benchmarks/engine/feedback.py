@@ -1,4 +1,4 @@
-"""What balance feedback buys where the world or the robot is not as planned, and what hangs on its settings."""
+"""Effects of balance feedback if the world or the robot differs from the plan, and effects of its settings."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ IMPULSE = 1.0  # [N s]
 CONDITIONS: Mapping[str, Conditions] = {
     "as planned": Conditions(),
     **{
-        f"floor rises 3 degrees {way}": Conditions(slope_rad=(x * SLOPE, y * SLOPE))
-        for way, (x, y) in DIRECTIONS.items()
+        f"floor rises 3 degrees {direction}": Conditions(slope_rad=(x * SLOPE, y * SLOPE))
+        for direction, (x, y) in DIRECTIONS.items()
     },
     "friction 0.4": Conditions(friction=0.4),
     "mass +5 %": Conditions(mass_factor=1.05),
-    "servo stiffness -30 %": Conditions(stiffness_factor=0.7),
-    "servo stiffness +30 %": Conditions(stiffness_factor=1.3),
+    "drive stiffness -30 %": Conditions(stiffness_factor=0.7),
+    "drive stiffness +30 %": Conditions(stiffness_factor=1.3),
     **{
-        f"push of {IMPULSE:g} N s {way}": Conditions(push=Push(impulse_Ns=(x * IMPULSE, y * IMPULSE)))
-        for way, (x, y) in DIRECTIONS.items()
+        f"push of {IMPULSE:g} N s {direction}": Conditions(push=Push(impulse_Ns=(x * IMPULSE, y * IMPULSE)))
+        for direction, (x, y) in DIRECTIONS.items()
     },
 }
 DEFAULT = Feedback()
@@ -48,7 +48,7 @@ VARIANTS: Mapping[str, Feedback | None] = {
     "growth without limit": replace(DEFAULT, growth_limit=1e3),
 }
 FEW_STEPS = 4
-HARD = ("as planned", "floor rises 3 degrees backward", "servo stiffness -30 %", f"push of {IMPULSE:g} N s left")
+HARD = ("as planned", "floor rises 3 degrees backward", "drive stiffness -30 %", f"push of {IMPULSE:g} N s left")
 
 
 def walked(steps: int, conditions: Conditions, feedback: Feedback | None) -> Walk:
@@ -57,22 +57,22 @@ def walked(steps: int, conditions: Conditions, feedback: Feedback | None) -> Wal
     return measure_walk(plan, simulate_plan(plan, conditions, drive), drive, steps)
 
 
-def told(walk: Walk) -> tuple[str, str, str]:
-    """Steps done, energy, and the share of the way."""
-    energy, way = walk.engine_J_per_planned_m, walk.walked_m
+def format_walk(walk: Walk) -> tuple[str, str, str]:
+    """Format steps done, energy, and the share of the distance."""
+    energy, distance = walk.engine_J_per_planned_m, walk.walked_m
     return (
         f"{walk.steps_done} of {walk.steps}",
         "-" if energy is None else f"{energy:.1f}",
-        "-" if way is None else f"{way / walk.planned_m:.3f}",
+        "-" if distance is None else f"{distance / walk.planned_m:.3f}",
     )
 
 
 def disturbed() -> Iterator[str]:
     """Ten steps of the cheapest cycle at 0.05 m/s, in open loop and with balance feedback: J per planned metre."""
-    columns = ("steps", "J/m", "way")
+    columns = ("steps", "J/m", "distance")
     yield header("condition", *(f"open loop: {columns[0]}", *columns[1:]), *(f"feedback: {columns[0]}", *columns[1:]))
     for label, conditions in CONDITIONS.items():
-        yield cells(label, *(text for own in (None, DEFAULT) for text in told(walked(STEPS, conditions, own))))
+        yield cells(label, *(text for own in (None, DEFAULT) for text in format_walk(walked(STEPS, conditions, own))))
 
 
 def settings() -> Iterator[str]:
@@ -80,4 +80,4 @@ def settings() -> Iterator[str]:
     yield header("feedback", *HARD)
     for label, feedback in VARIANTS.items():
         walks = [walked(FEW_STEPS, CONDITIONS[name], feedback) for name in HARD]
-        yield cells(label, *(f"{told(walk)[1]}, {walk.measurements.largest_tilt_deg:.1f} deg" for walk in walks))
+        yield cells(label, *(f"{format_walk(walk)[1]}, {walk.measurements.largest_tilt_deg:.1f} deg" for walk in walks))

@@ -1,4 +1,4 @@
-"""Gaits that are played: optimal cycles, the papers' gaits and our optima, random feasible ones."""
+"""Gaits to simulate: optimal cycles, the papers' gaits and our optima, random feasible ones."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ PAPER = {
     },
 }
 SPEEDS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1)  # [m/s]
-DRAWS, BATCH = 100, 20_000  # candidates drawn for random gaits: at most DRAWS batches
+DRAWS, BATCH = 100, 20_000  # candidates of random gaits: at most DRAWS batches
 
 
 @cache
 def optimal_cycles(speeds: Sequence[float] = SPEEDS, **options: Any) -> Mapping[float, Result]:
-    """Cheapest cycle at each speed [m/s], as ``nlp-gait walk`` finds it."""
+    """Return the cheapest cycle at each speed [m/s], as ``nlp-gait walk``."""
     problem = nlp_gait.load("nao-cycle", objective="power", **options)
     axis = Axis(name="speed_m_s", values=tuple(speeds))
     gaits = find(CheapestWalk(problem=problem, axis=axis, starts=3)).gaits
@@ -42,14 +42,14 @@ def optimal_cycles(speeds: Sequence[float] = SPEEDS, **options: Any) -> Mapping[
 
 @cache
 def optimum(name: str, **options: Any) -> Result:
-    """Best of five starts of IPOPT."""
+    """Return the best of five starts of IPOPT."""
     problem = nlp_gait.load(name, **options)
     solution = nlp_gait.solve(problem, starts=5, seed=0)
     return Result(problem=problem, x=problem.check_x(solution.x))
 
 
 def phase_gaits(name: str) -> dict[str, Result]:
-    """Optimum of a phase, in double support also with the lever rule, and the paper's gaits."""
+    """Return the optimum of a phase, in double support also with the lever rule, and the paper's gaits."""
     problem = nlp_gait.load(name)
     found = {"optimum": optimum(name)}
     if name == "nao-dsp":
@@ -58,7 +58,7 @@ def phase_gaits(name: str) -> dict[str, Result]:
 
 
 def random_gaits(problem: GaitProblem, count: int, seed: int = 0) -> list[Result]:
-    """Uniformly drawn points within the bounds, of which the feasible are kept.
+    """Draw points uniformly within the bounds and return feasible ones.
 
     Raises:
         InputError: too few were feasible.
@@ -72,5 +72,5 @@ def random_gaits(problem: GaitProblem, count: int, seed: int = 0) -> list[Result
         if len(found) >= count:
             return found[:count]
     raise InputError(
-        f"{len(found)} of {DRAWS * BATCH} random gaits of {problem.name!r} are feasible, of {count} asked for"
+        f"{len(found)} of {DRAWS * BATCH} random gaits of {problem.name!r} are feasible, of {count} required"
     )

@@ -2,10 +2,10 @@
 
 
 def cells(*texts: str) -> str:
-    """One row."""
+    """Return a row."""
     return f"| {' | '.join(texts)} |"
 
 
 def header(*names: str) -> str:
-    """Names of the columns and the line below them."""
+    """Return the names of the columns and the line below."""
     return f"{cells(*names)}\n{cells(*['---'] * len(names))}"

@@ -29,8 +29,8 @@ VARIANTS = {
     "default": Drive(),
     **{f"largest torque at {error:g} rad": Drive(full_error_rad=error) for error in (0.16, 0.04)},
     **{f"damping / stiffness {seconds:g} s": Drive(time_constant_s=seconds) for seconds in (0.01, 0.05)},
-    "velocity fed forward": Drive(feed_forward="velocity"),
-    "nothing fed forward": Drive(feed_forward="none"),
+    "velocity feed-forward only": Drive(feed_forward="velocity"),
+    "no feed-forward": Drive(feed_forward="none"),
 }
 
 # Radius of a point mass [m], and the sole's share of the foot's mass.
@@ -40,7 +40,15 @@ SPHERES = {"SPHERE_RADIUS": (0.01, 0.03), "SOLE_SHARE": (0.03, 0.3)}
 def walk12() -> Iterator[str]:
     """The 12-joint walk, ten steps: the paper's gaits (Tables III and IV), our optima, a circle."""
     yield header(
-        "gait", "ZMP in the sole, share", "fate", "steps", "way", "tilt, first step", "CoP mm", "model J/m", "engine"
+        "gait",
+        "ZMP in the sole, share",
+        "result",
+        "steps",
+        "distance",
+        "tilt, first step",
+        "CoP mm",
+        "model J/m",
+        "engine",
     )
     for label, result in walks().items():
         plan = make_plan(result, STEPS)
@@ -51,7 +59,7 @@ def walk12() -> Iterator[str]:
         yield cells(
             label,
             f"{_stable_share(result):.2f}",
-            fate(m),
+            describe_result(m),
             f"{found.steps_done}",
             "-" if found.walked_m is None else f"{found.walked_m / found.planned_m:.2f}",
             f"{math.degrees(float(trace.tilt[first].max())):.1f}",
@@ -63,14 +71,14 @@ def walk12() -> Iterator[str]:
 
 def stairs() -> Iterator[str]:
     """One step up: plans, tracked steps and the ideal; energies in J, |torque x rate|."""
-    yield header("gait", "fate", "model J", "engine J", "tilt deg", "slip mm", "CoP mm", "middle", "landing mm")
+    yield header("gait", "result", "model J", "engine J", "tilt deg", "slip mm", "CoP mm", "middle", "landing mm")
     for label, result in climbs():
         plan = make_plan(result)
         m = measure(plan, simulate_plan(plan), Drive())
         landing = 1e3 * m.landings["right"].error_m
         yield cells(
             label,
-            fate(m),
+            describe_result(m),
             f"{m.predicted.mechanical_W * plan.duration_s:.1f}",
             "-" if m.fallen else f"{m.measured.mechanical_W * plan.duration_s:.1f}",
             f"{m.largest_tilt_deg:.1f}",
@@ -87,10 +95,10 @@ def other_gains() -> Iterator[str]:
     yield header(
         "variant",
         "stairs-plan J",
-        "fate",
+        "result",
         "CoP, middle mm",
         *(f"walk12, {printed.step_time_s:g} s: steps" for printed in (fast, slow)),
-        "way",
+        "distance",
         "J per planned m",
     )
 
@@ -100,7 +108,7 @@ def other_gains() -> Iterator[str]:
         return cells(
             label,
             "-" if m.fallen else f"{m.measured.mechanical_W * climb.duration_s:.1f}",
-            fate(m),
+            describe_result(m),
             f"{1e3 * (m.pressure_middle_rms_m or np.nan):.1f}",
             f"{first.steps_done}",
             f"{second.steps_done}",
@@ -121,7 +129,7 @@ def other_gains() -> Iterator[str]:
 
 @contextmanager
 def spheres(name: str, value: float) -> Iterator[None]:
-    """Another way to make bodies of the 12-joint biped's point masses."""
+    """Other bodies of the 12-joint biped's point masses."""
     before = getattr(walk12_display, name)
     setattr(walk12_display, name, value)
     walk12_display.make_rigid_bodies.cache_clear()
@@ -132,7 +140,7 @@ def spheres(name: str, value: float) -> Iterator[None]:
         walk12_display.make_rigid_bodies.cache_clear()
 
 
-def fate(m: Measurements) -> str:
+def describe_result(m: Measurements) -> str:
     """In two words."""
     return "stays up" if m.fell_at_s is None else f"falls at {m.fell_at_s:.1f} s"
 

@@ -1,4 +1,4 @@
-"""What the inertia of the motors' rotors does to a walk, planned without it and with it."""
+"""Effect of the inertia of the motors' rotors on a walk, planned without it and with it."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def rotors() -> Iterator[str]:
 
 
 def energies(plan: Plan, armatures_kgm2: dict[str, float]) -> tuple[str, str]:
-    """The model's and the engine's, whose robot has these rotors whatever was planned [J per planned metre]."""
-    played = replace(plan, robot=replace(plan.robot, armatures_kgm2=armatures_kgm2))
-    walk = measure_walk(played, simulate_plan(played), Drive(), STEPS)
+    """Format the energies of the model and of the engine with these rotors [J per planned metre]."""
+    simulated = replace(plan, robot=replace(plan.robot, armatures_kgm2=armatures_kgm2))
+    walk = measure_walk(simulated, simulate_plan(simulated), Drive(), STEPS)
     energy = walk.engine_J_per_planned_m
     return f"{walk.model_J_per_m:.2f}", "falls" if energy is None else f"{energy:.2f}"

@@ -1,11 +1,11 @@
-"""What hangs on the assumptions, and what a gait survives."""
+"""Effects of the assumptions, and disturbances that a gait survives."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from benchmarks.engine.agreement import STEPS, energies, walked
+from benchmarks.engine.agreement import STEPS, format_energies, simulate_walk
 from benchmarks.engine.gaits import PAPER, optimal_cycles, optimum, phase_gaits
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.simulation import measurements, mjcf
@@ -48,7 +48,7 @@ def gains() -> Iterator[str]:
         f"nao-cycle at {SPEED:g} m/s: J per planned m",
         "model",
         "per walked m",
-        "way",
+        "distance",
     )
     cycle = optimal_cycles()[SPEED]
     plans = [make_plan(optimum(name)) for name in PAPER]
@@ -56,7 +56,7 @@ def gains() -> Iterator[str]:
     def row(label: str, drive: Drive, sole: str = "rectangle") -> str:
         powers = [measure(plan, simulate_plan(plan, drive=drive, sole=sole), drive) for plan in plans]
         phases = [f"{m.measured.total_W:.4f}{', falls' if m.fallen else ''}" for m in powers]
-        return cells(label, *phases, *energies(walked(cycle, STEPS, drive, sole)))
+        return cells(label, *phases, *format_energies(simulate_walk(cycle, STEPS, drive, sole)))
 
     for label, drive in VARIANTS.items():
         yield row(label, drive)

@@ -113,10 +113,10 @@ def check_inertias(robot: str, links: Sequence[Link]) -> None:
     far = sorted((name for name in ratios if ratios[name] > FAR_RATIO), key=lambda name: -ratios[name])
     if len(ratios) < LEAST_LINKS or max(ratios.values()) > GREATEST_JOINT_RATIO or 2 * len(far) < len(ratios):
         return
-    shown = ", ".join(f"{name} {ratios[name]:.2f}" for name in far[:3])
+    listed = ", ".join(f"{name} {ratios[name]:.2f}" for name in far[:3])
     raise RobotDataError(
         f"robot {robot!r}: the inertia tensors look as if taken about the joints, not about the centres of mass: none of its "
-        f"{len(ratios)} links is farther from its joint than its matter is spread (ratios {shown}, ...; a rod has 3, by the "
+        f"{len(ratios)} links is farther from its joint than its matter is spread (ratios {listed}, ...; a rod has 3, by the "
         'wrong tensor 0.75). If so, write "inertia_about": "joint" into the robot file and they are shifted; if they are '
         'right, write "inertia_about": "com"'
     )

@@ -70,7 +70,7 @@ class Sole(NamedTuple):
 
 
 class Legs(NamedTuple):
-    """The two legs of a robot, left and right or the other way round.
+    """The two legs of a robot, in any order.
 
     Attributes:
         feet: links.
@@ -266,8 +266,8 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) ->
     contradicted = abs(lead) >= CLEAR_LEAD_M and lead * knees[0] < 0
     if knees[0] * knees[1] <= 0 or contradicted:
         raise RobotDataError(
-            f"robot {robot!r}: knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles do not agree on which way "
-            'is forward; write "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
+            f"robot {robot!r}: knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles contradict each other; "
+            'write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
         )
     return FORWARD_ANGLES[f"{'' if knees[0] > 0 else '-'}{'xy'[axis]}"]
 

@@ -205,9 +205,9 @@ def _read(name_or_path: str) -> RobotFile:
         raise unknown("robot", name_or_path, robot_names())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
     file = read_dataclass(RobotFile, path, "robot file", error=RobotDataError)
-    beside = [model for ending in MODEL_ENDINGS if os.path.isfile(model := path.with_suffix(ending))]
-    if file.extends is None and file.root is None and beside:
-        return replace(file, extends=beside[0].name)
+    models = [model for ending in MODEL_ENDINGS if os.path.isfile(model := path.with_suffix(ending))]
+    if file.extends is None and file.root is None and models:
+        return replace(file, extends=models[0].name)
     return file
 
 

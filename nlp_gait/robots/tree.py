@@ -83,11 +83,11 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
 def weld(robot: Robot, joints: Collection[str]) -> Robot:
     """Return the robot with some joints locked at zero: their child links become part of the parents."""
     links = dict(robot.links)
-    kept = dict(robot.joints)
+    remaining = dict(robot.joints)
     # From the leaves inwards, so that a welded child already contains its own welded children.
     by_depth = sorted(joints, key=lambda name: -len(robot.path_to_root(robot.joint(name).child)))
     for name in by_depth:
-        joint = kept.pop(name)
+        joint = remaining.pop(name)
         child = Mass.from_link(links.pop(joint.child)).move(np.array(joint.origin_m))
         total = combine_masses([Mass.from_link(links[joint.parent]), child])
         links[joint.parent] = Link(
@@ -96,9 +96,9 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
             com_m=_vector(total.com_m),
             inertia_com_kgm2=inertia_moments(total.tensor_kgm2),
         )
-        for other in [j for j in kept.values() if j.parent == joint.child]:
-            kept[other.name] = replace(other, parent=joint.parent, origin_m=plus(joint.origin_m, other.origin_m))
-    return replace(robot, links=links, joints=kept)
+        for other in [j for j in remaining.values() if j.parent == joint.child]:
+            remaining[other.name] = replace(other, parent=joint.parent, origin_m=plus(joint.origin_m, other.origin_m))
+    return replace(robot, links=links, joints=remaining)
 
 
 def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:

@@ -188,8 +188,8 @@ def _slip(plan: Plan, simulation: Simulation) -> float:
     moved = [feet[side] for side in plan.supports]
     if not moved:  # both feet swing: their supports begin and end
         for side, path in feet.items():
-            resting_point = np.concatenate([[0], plan.stands(side, simulation.t), [0]])
-            starts, ends = (np.flatnonzero(np.diff(resting_point) == change) for change in (1, -1))
+            standing = np.concatenate([[0], plan.stands(side, simulation.t), [0]])
+            starts, ends = (np.flatnonzero(np.diff(standing) == change) for change in (1, -1))
             moved += [path[start:end] for start, end in zip(starts, ends, strict=True)]
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
 

@@ -58,7 +58,7 @@ class Plan:
 
     @cached_property
     def supports(self) -> tuple[str, ...]:
-        """Sides whose sole stands still throughout."""
+        """Sides whose sole never moves."""
         return tuple(side for side in SIDES if np.ptp(self.signals.arrays[f"{side}_foot"], axis=0).max() < STANDING)
 
     def stands(self, side: str, times: Array) -> Array:
@@ -142,7 +142,7 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
 
     Args:
         result: of a problem with a simulation model.
-        steps: number of consecutive steps; by default one phase or one cycle, whatever the gait is.
+        steps: number of consecutive steps; by default one phase or one cycle.
 
     Raises:
         InputError: the problem has no simulation model, the gait cannot be repeated or has samples that are not finite, or there

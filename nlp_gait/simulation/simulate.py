@@ -96,7 +96,7 @@ class Simulation:
         q: (T, J) joint angles, columns as in the plan [rad].
         qd: (T, J) [rad/s].
         torque: (T, J) of the drives [Nm].
-        set_points: (T, J) of the drives, including what is fed forward [rad].
+        set_points: (T, J) of the drives, including the feed-forward [rad].
         torso: (T, 3) its origin [m].
         tilt: (T,) angle between the torso's axis and its planned direction [rad].
         heading: (T,) angle of the torso's forward axis about the floor's normal, positive to the left [rad].

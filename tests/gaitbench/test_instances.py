@@ -96,8 +96,8 @@ def test_violation_is_the_sum_of_rows_and_bounds(id: str) -> None:
     assert G.shape[1] == len(instance.row_names) == len(set(instance.row_names))
     outside = instance.best_x.copy()
     outside[0] = instance.upper[0] + (instance.upper[0] - instance.lower[0])
-    excess = instance(outside[None])[1][0] - np.maximum(instance.rows(outside[None]), 0.0).sum()
-    assert excess == pytest.approx(1.0)
+    beyond_bounds = instance(outside[None])[1][0] - np.maximum(instance.rows(outside[None]), 0.0).sum()
+    assert beyond_bounds == pytest.approx(1.0)
     outside[0] = np.nan
     assert np.isinf(instance(outside[None])).all()
 
@@ -130,7 +130,7 @@ def test_the_unit_cube_is_the_same_problem() -> None:
     assert unit(unit.best_x[None])[0][0] == pytest.approx(instance.best_known, rel=1e-12)
 
 
-def test_what_is_held_is_no_variable() -> None:
+def test_a_constant_is_not_a_variable() -> None:
     """A phase of one second: the time is gone from x, and the same power comes out as with it."""
     instance = gaitbench.load("ssp-v5-time10")
     free = gaitbench.load("ssp-v5")
@@ -139,16 +139,16 @@ def test_what_is_held_is_no_variable() -> None:
     position = free.names.index("single_support_time_s")
     np.testing.assert_allclose(instance(X)[0], free(np.insert(X, position, 1.0, axis=1))[0], rtol=1e-13)
     whole = np.insert(X, position, 1.0, axis=1)[0]
-    for held_constant, found in ((instance, X[0]), (free, whole)):
-        assert held_constant.gait_problem.name == "gaitbench"
+    for constant, found in ((instance, X[0]), (free, whole)):
+        assert constant.gait_problem.name == "gaitbench"
         np.testing.assert_allclose(
-            held_constant.gait_problem.signals(found).arrays["tau"], free.gait_problem.signals(whole).arrays["tau"]
+            constant.gait_problem.signals(found).arrays["tau"], free.gait_problem.signals(whole).arrays["tau"]
         )
     dense = instance.gait_problem.dense(2)
     assert dense is not None and dense.names == instance.names
 
 
-def test_bounds_of_what_is_held_are_no_values_any_more() -> None:
+def test_bounds_of_a_constant_are_removed() -> None:
     walk = load("walk12").with_values(**{"step_length_m.lower": 0.06, "lambda": 0.3})
     found = hold_constant(walk, {"step_length_m": 0.1})
     assert dict(found.values) == {"lambda": 0.3} and found.value("step_length_m") == 0.1

@@ -32,5 +32,5 @@ def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest
 
 
 def test_the_page_shows_every_adapter() -> None:
-    shown = "\n".join(BLOCKS)
-    assert all(f'.to("{name}")' in shown for name in ADAPTERS)
+    code = "\n".join(BLOCKS)
+    assert all(f'.to("{name}")' in code for name in ADAPTERS)

@@ -48,9 +48,9 @@ def test_tensors_about_the_joints_are_found_and_shifted_on_request(tmp_path: Pat
     wrong = about_joints(make())
     with pytest.raises(
         RobotDataError, match=r"look as if taken about the joints.*none of its 25 links.*\"joint\""
-    ) as said:
+    ) as error:
         load_robot(written(tmp_path, wrong))
-    assert "l_ankle 0.93" in str(said.value)
+    assert "l_ankle 0.93" in str(error.value)
     shifted = load_robot(written(tmp_path, wrong | {"inertia_about": "joint"}))
     right = load_robot(written(tmp_path, make()))
     for name, link in right.links.items():
@@ -59,7 +59,7 @@ def test_tensors_about_the_joints_are_found_and_shifted_on_request(tmp_path: Pat
         )
 
 
-def test_who_says_that_they_are_right_is_believed(tmp_path: Path) -> None:
+def test_a_statement_that_they_are_right_is_accepted(tmp_path: Path) -> None:
     wrong = about_joints(nao())
     robot = load_robot(written(tmp_path, wrong | {"inertia_about": "com"}))
     assert six(robot.links["LThigh"].inertia_matrix) == wrong["links"]["LThigh"]["inertia_com_kgm2"]

@@ -1,4 +1,4 @@
-"""What is found in a URDF by itself: feet, soles, forward, sides; what is passed over with a warning; what is asked for."""
+"""Robots from a URDF alone: inferred feet, soles, forward and sides; warnings, repairs and errors."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     return load_robot(crooked(tmp_path_factory.mktemp("crooked")))
 
 
-def beside(path: str, **record: object) -> str:
-    """Write the robot file beside a URDF."""
-    own = record  # schema, and what it extends, go without saying
+def override(path: str, **record: object) -> str:
+    """Write the robot file next to a URDF."""
+    own = record  # schema and extends are optional
     Path(path).with_suffix(".json").write_text(json.dumps(own), encoding="utf-8")
     return path
 
@@ -59,7 +59,7 @@ def test_a_biped_is_its_legs_and_one_body_in_a_posture(robot: Robot) -> None:
     assert base.com_m[0] == pytest.approx(2 * (ARM_KG + HAND_KG) * arm[0] / base.mass_kg)
 
 
-def test_what_was_passed_over_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_what_is_ignored_is_reported(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     text = crooked_urdf().replace('<joint name="A_knee"', '<joint dont_collapse="true" name="A_knee"')
     with caplog.at_level(logging.WARNING, logger="nlp_gait"):
         found = load_robot(crooked(tmp_path, text))
@@ -78,7 +78,7 @@ def test_images_are_found_where_names_mislead(robot: Robot) -> None:
 
 @pytest.mark.parametrize("turn", [90, 180, 270])
 def test_a_root_that_looks_elsewhere_is_turned(tmp_path: Path, robot: Robot, turn: int) -> None:
-    """A base above the torso, on which it stands turned about z: the same robot comes out."""
+    """A base above the torso, turned about z: the result is the same robot."""
     angle = float(np.radians(turn))
     text = crooked_urdf().replace(
         "</robot>",
@@ -94,8 +94,8 @@ def test_a_root_that_looks_elsewhere_is_turned(tmp_path: Path, robot: Robot, tur
         np.testing.assert_allclose(found.links[name].inertia_matrix, robot.links[name].inertia_matrix, atol=1e-12)
 
 
-def test_the_file_beside_says_what_it_knows_better(tmp_path: Path) -> None:
-    path = beside(
+def test_the_robot_file_overrides_the_urdf(tmp_path: Path) -> None:
+    path = override(
         crooked(tmp_path),
         feet={"left": {"link": "A_ankle_roll_link", "front_m": 0.2}, "right": {"link": "B_ankle_roll_link"}},
         posture_rad={"A_shoulder": 1.0},
@@ -123,7 +123,7 @@ def test_a_mesh_is_needed_only_where_a_sole_comes_from_it(tmp_path: Path) -> Non
     (folder / "sole.stl").unlink()
     extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
     feet = {side: {"link": f"{letter}_ankle_roll_link", **extents} for side, letter in (("left", "A"), ("right", "B"))}
-    assert load_robot(beside(path, feet=feet)).feet["right"].back_m == 0.05
+    assert load_robot(override(path, feet=feet)).feet["right"].back_m == 0.05
 
 
 def change(old: str, new: str) -> Callable[[str], str]:
@@ -134,14 +134,17 @@ def change(old: str, new: str) -> Callable[[str], str]:
     return changed
 
 
-ASKED = [
+INCOMPLETE = [
     (change("<collision>", "<visual>"), r"not a URDF|is not valid XML"),
     (
         lambda text: crooked_urdf(sole=False),
         r"'A_ankle_roll_link' has no collision shape .* write its sole into the JSON",
     ),
     (change('size="0.17 0.09 0.02"', 'size="0.17 0.001 0.02"'), r"no flat sole; write its sole"),
-    (change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'), r"knees .* do not agree on which way is forward"),
+    (
+        change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'),
+        r"knees .* contradict each other; write the forward direction",
+    ),
     (change('<joint name="A_knee" type="revolute">', '<joint name="A_knee" type="fixed">'), r"no feet found"),
     (
         change('<mass value="1.1"/>', '<mass value="0"/>'),
@@ -150,15 +153,15 @@ ASKED = [
 ]
 
 
-@pytest.mark.parametrize(("damage", "message"), ASKED, ids=[message[:30] for _, message in ASKED])
-def test_what_cannot_be_known_is_asked_for(tmp_path: Path, damage: Callable[[str], str], message: str) -> None:
+@pytest.mark.parametrize(("damage", "message"), INCOMPLETE, ids=[message[:30] for _, message in INCOMPLETE])
+def test_what_cannot_be_inferred_is_an_error(tmp_path: Path, damage: Callable[[str], str], message: str) -> None:
     with pytest.raises(RobotDataError, match=message):
         load_robot(crooked(tmp_path, damage(crooked_urdf())))
 
 
-def test_what_matters_is_repaired_where_that_is_asked_for(tmp_path: Path) -> None:
+def test_what_matters_is_repaired_on_request(tmp_path: Path) -> None:
     text = crooked_urdf().replace('<mass value="1.1"/>', '<mass value="0"/>')
-    robot = load_robot(beside(crooked(tmp_path, text), unphysical="repair"))
+    robot = load_robot(override(crooked(tmp_path, text), unphysical="repair"))
     assert 0.0 < robot.links["A_knee_link"].mass_kg < 1e-4
     assert sum("repaired as requested" in note for note in robot.notes) == 2
 
@@ -166,7 +169,7 @@ def test_what_matters_is_repaired_where_that_is_asked_for(tmp_path: Path) -> Non
 def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
     feet = {"left": {"link": "B_ankle_roll_link"}, "right": {"link": "A_ankle_roll_link"}}
     with pytest.raises(RobotDataError, match=r"named the left foot, but it is to the right"):
-        load_robot(beside(crooked(tmp_path), feet=feet))
+        load_robot(override(crooked(tmp_path), feet=feet))
 
 
 @pytest.mark.parametrize(
@@ -177,13 +180,13 @@ def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
         ({"tail": 0.1}, r"names 'tail', which is not a joint"),
     ],
 )
-def test_a_posture_that_cannot_be_is_refused(tmp_path: Path, posture: dict[str, float], message: str) -> None:
+def test_an_impossible_posture_is_refused(tmp_path: Path, posture: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        make_biped(load_robot(beside(crooked(tmp_path), posture_rad=posture)))
+        make_biped(load_robot(override(crooked(tmp_path), posture_rad=posture)))
 
 
 def test_five_joints_are_no_leg(tmp_path: Path) -> None:
     extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
     feet = {side: {"link": f"{x}_ankle_pitch_link", **extents} for side, x in (("left", "A"), ("right", "B"))}
     with pytest.raises(GaitError, match=r"left leg must have 6 turning joints .* got 5"):
-        make_biped(load_robot(beside(crooked(tmp_path), feet=feet)))
+        make_biped(load_robot(override(crooked(tmp_path), feet=feet)))

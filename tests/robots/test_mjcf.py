@@ -84,12 +84,12 @@ def test_the_engines_warnings_go_where_they_went_before(path: str, tmp_path: Pat
     """Else later ones would be written to a file in the user's folder."""
     robot = tmp_path / "robot.xml"
     robot.write_text("<mujoco><worldbody/>" if spoilt else Path(path).read_text(encoding="utf-8"), encoding="utf-8")
-    said: list[str] = []
-    mujoco.set_mju_user_warning(said.append)
+    texts: list[str] = []
+    mujoco.set_mju_user_warning(texts.append)
     try:
         with nullcontext() if not spoilt else pytest.raises(RobotDataError):
             load_robot(str(robot))
-        assert mujoco.get_mju_user_warning() == said.append
+        assert mujoco.get_mju_user_warning() == texts.append
     finally:
         mujoco.set_mju_user_warning(None)
 

@@ -88,7 +88,7 @@ def test_every_quantity_can_be_changed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "error", "said"),
+    ("changes", "error", "message"),
     [
         ({"weight": 1.1}, UnknownNameError, "quantity of robot nao-v5"),
         ({"LTigh.mass": 1.1}, UnknownNameError, "LThigh.mass"),
@@ -98,8 +98,8 @@ def test_every_quantity_can_be_changed() -> None:
         ({"sole_x_m": 0.2}, RobotDataError, "back_m must be >= 0"),
     ],
 )
-def test_impossible_changes_are_refused(changes: dict[str, float], error: type[Exception], said: str) -> None:
-    with pytest.raises(error, match=said):
+def test_impossible_changes_are_refused(changes: dict[str, float], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
         perturb(NAO, changes)
 
 

@@ -1,4 +1,4 @@
-"""Robots from URDF files: the same robot as from JSON whatever frames it is written in, and a message for what is wrong."""
+"""Robots from URDF files: the same robot as from JSON in any frames, and a message for each fault."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def assert_same(one: Robot, other: Robot) -> None:
 
 
 def stored(folder: Path, tree: ElementTree.Element | str, robot: object = None) -> str:
-    """Path of a URDF, with its robot file beside it."""
+    """Path of a URDF, with its robot file next to it."""
     path = folder / "robot.urdf"
     path.write_text(tree if isinstance(tree, str) else ElementTree.tostring(tree, encoding="unicode"), encoding="utf-8")
     written(folder, partner(nao(), "robot.urdf") if robot is None else robot)

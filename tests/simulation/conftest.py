@@ -1,4 +1,4 @@
-"""Gaits that the tests play."""
+"""Gaits to simulate."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What the servos are told: set-points between which it is linear or held, shifted by what is fed forward."""
+"""Set-points of drives: linear or held between two of them, shifted by the feed-forward."""
 
 from dataclasses import FrozenInstanceError, replace
 
@@ -15,18 +15,18 @@ TIMES = np.linspace(0.0, 1.0, 2001)[:-1]
 
 
 def planned(name, times):
-    """A sine, its rate, and torques that are told from it by their scale."""
+    """A sine, its rate, and torques of another scale."""
     phase = np.array([0.0, 1.0])
     waves = {"q": np.sin(times[:, None] + phase), "qd": np.cos(times[:, None] + phase)}
     return waves[name] if name in waves else 3.0 * np.cos(2.0 * times[:, None] + phase)
 
 
-def told(**settings):
+def set_points(**settings):
     return Drive(**settings).set_points(planned, TIMES, JOINTS)
 
 
 def test_linear_set_points_lie_on_the_chords_and_held_ones_on_steps():
-    linear, held = (told(period_s=0.04, feed_forward="none", interpolation=name) for name in ("linear", "held"))
+    linear, held = (set_points(period_s=0.04, feed_forward="none", interpolation=name) for name in ("linear", "held"))
     knots = np.arange(26) * 0.04
     for column in range(2):
         on_chords = np.interp(TIMES, knots, planned("q", knots)[:, column])
@@ -36,13 +36,13 @@ def test_linear_set_points_lie_on_the_chords_and_held_ones_on_steps():
 
 
 def test_a_servo_without_error_gives_the_planned_torque():
-    """Stiffness (set-point - angle) - damping rate is the torque that was fed forward, at every set-point."""
+    """Stiffness (set-point - angle) - damping rate is the torque of the feed-forward, at every set-point."""
     drive = Drive()
     at = np.round(np.arange(100) * 0.01 / 0.0005).astype(int)
     stiffness, damping = (np.array([f(joint) for joint in JOINTS]) for f in (drive.stiffness, drive.damping))
     q, qd, tau = (planned(name, TIMES[at]) for name in ("q", "qd", "tau"))
-    np.testing.assert_allclose(stiffness * (told()[at] - q) - damping * qd, tau, atol=1e-9)
-    only_velocity = stiffness * (told(feed_forward="velocity")[at] - q) - damping * qd
+    np.testing.assert_allclose(stiffness * (set_points()[at] - q) - damping * qd, tau, atol=1e-9)
+    only_velocity = stiffness * (set_points(feed_forward="velocity")[at] - q) - damping * qd
     np.testing.assert_allclose(only_velocity, 0.0, atol=1e-9)
 
 

@@ -45,13 +45,13 @@ def plan() -> Plan:
     return make_plan(Result(problem=problem, x=problem.check_x(CHEAPEST)), STEPS)
 
 
-def played(plan: Plan, feedback: Feedback | None, conditions: Conditions | None = None) -> Simulation:
+def simulate(plan: Plan, feedback: Feedback | None, conditions: Conditions | None = None) -> Simulation:
     return simulate_plan(plan, conditions, Drive(feedback=feedback))
 
 
 @pytest.mark.slow
 def test_without_springs_it_is_open_loop_to_the_last_bit(plan: Plan) -> None:
-    weightless, alone = played(plan, Feedback().with_strength(0.0)), played(plan, None)
+    weightless, alone = simulate(plan, Feedback().with_strength(0.0)), simulate(plan, None)
     for name in ("q", "torque", "set_points", "feet"):
         np.testing.assert_array_equal(getattr(weightless, name), getattr(alone, name))
 
@@ -59,7 +59,7 @@ def test_without_springs_it_is_open_loop_to_the_last_bit(plan: Plan) -> None:
 @pytest.mark.slow
 def test_downhill_it_saves_energy_and_keeps_the_torso_upright(plan: Plan) -> None:
     def energy_and_tilt(feedback: Feedback | None) -> tuple[float, float]:
-        trace = played(plan, feedback, DOWNHILL)
+        trace = simulate(plan, feedback, DOWNHILL)
         walk = measure_walk(plan, trace, Drive(feedback=feedback), STEPS)
         assert walk.engine_J_per_planned_m is not None
         return walk.engine_J_per_planned_m, walk.measurements.largest_tilt_deg
@@ -71,16 +71,16 @@ def test_downhill_it_saves_energy_and_keeps_the_torso_upright(plan: Plan) -> Non
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_walk_and_noise_and_delay_act(plan: Plan) -> None:
-    first, again = played(plan, Feedback()), played(plan, Feedback())
+    first, again = simulate(plan, Feedback()), simulate(plan, Feedback())
     np.testing.assert_array_equal(first.q, again.q)
     others = (replace(Feedback(), seed=1), Feedback().with_noise(0.0), replace(Feedback(), delay_s=0.02))
     for other in others:
-        assert np.abs(played(plan, other).q[: len(first.q)] - first.q).max() > 1e-5
+        assert np.abs(simulate(plan, other).q[: len(first.q)] - first.q).max() > 1e-5
 
 
 @pytest.mark.slow
 def test_the_load_passes_from_foot_to_foot(plan: Plan) -> None:
-    """In single support one foot has it all; in between, the point that divides the way between them is nearest to the ZMP."""
+    """In single support one foot has it all; in between, the point that divides their distance is nearest to the ZMP."""
     single, double, period = 0.4, 0.56565, 0.96565
     shares = compute_load_shares(plan, np.array([0.2, single + 0.25 * double, single + 0.75 * double, period + 0.2]))
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)

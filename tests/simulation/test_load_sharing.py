@@ -1,4 +1,4 @@
-"""Load shared anew in a given motion: against SciPy at single instants, Pinocchio, the lever rule, and its own limits."""
+"""Load sharing in a given motion: against SciPy at single instants, Pinocchio, the lever rule, and its own limits."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def test_what_cannot_be_shared_is_said(plan: Plan, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-def test_the_command_plays_it(tmp_path: Path) -> None:
+def test_the_command_shares_load(tmp_path: Path) -> None:
     """Power that the model predicts falls, more so where load may jump."""
     pytest.importorskip("mujoco")
     problem = load("nao-dsp", torso_share="lever")

@@ -76,11 +76,11 @@ def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> Non
 def test_the_ideal_step_is_played_through_its_own_instants(ideal: Result) -> None:
     own, plan = ideal.problem.signals(ideal.x), make_plan(ideal)
     per_interval = (len(plan.signals.arrays["t"]) - 1) // (len(own.arrays["t"]) - 1)
-    played = {name: array[::per_interval] for name, array in plan.signals.arrays.items()}
-    np.testing.assert_allclose(played["t"], own.arrays["t"], atol=1e-12)
+    simulated = {name: array[::per_interval] for name, array in plan.signals.arrays.items()}
+    np.testing.assert_allclose(simulated["t"], own.arrays["t"], atol=1e-12)
     knee, joint = plan.joints.index("RKnee"), own.joints.index("knee")
-    np.testing.assert_allclose(played["q"][:-1, knee], own.arrays["q"][:-1, joint], atol=1e-12)
-    np.testing.assert_allclose(played["tau"][:-1, knee], own.arrays["tau"][:-1, joint], atol=AGREEMENT_NM)
+    np.testing.assert_allclose(simulated["q"][:-1, knee], own.arrays["q"][:-1, joint], atol=1e-12)
+    np.testing.assert_allclose(simulated["tau"][:-1, knee], own.arrays["tau"][:-1, joint], atol=AGREEMENT_NM)
 
 
 @pytest.mark.parametrize("x", WALKS)

@@ -1,4 +1,4 @@
-"""Gaits played in the engine."""
+"""Gaits in the engine."""
 
 import dataclasses
 import math
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco")
-pytestmark = pytest.mark.slow  # each gait is played in the engine
+pytestmark = pytest.mark.slow  # each gait is simulated
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
@@ -24,7 +24,7 @@ ONE_NEWTON_S = 1.0
 
 
 @pytest.fixture(scope="module")
-def played(gait):
+def simulated(gait):
     """Plan, trace and measurements by gait, each simulated once."""
     found = {}
 
@@ -39,8 +39,8 @@ def played(gait):
 
 
 @pytest.mark.parametrize("name", ["ssp optimum", "ssp pso", "ssp ga", "dsp optimum", "dsp pso", "dsp ga"])
-def test_published_gaits_and_optima_stay_up(played, name):
-    plan, trace, m = played(name)
+def test_published_gaits_and_optima_stay_up(simulated, name):
+    plan, trace, m = simulated(name)
     assert not m.fallen and m.fell_at_s is None
     assert m.largest_tilt_deg < 3.0
     assert m.tracking_max_rad < 0.03
@@ -49,32 +49,32 @@ def test_published_gaits_and_optima_stay_up(played, name):
     assert trace.t[-1] == pytest.approx(plan.duration_s + 1.0, abs=0.002)
 
 
-def test_the_measured_power_is_the_predicted_one_and_keeps_the_order(played):
-    optimum, pso, ga = (played(f"ssp {name}")[2] for name in ("optimum", "pso", "ga"))
+def test_the_measured_power_is_the_predicted_one_and_keeps_the_order(simulated):
+    optimum, pso, ga = (simulated(f"ssp {name}")[2] for name in ("optimum", "pso", "ga"))
     assert optimum.measured.mechanical_W == pytest.approx(optimum.predicted.mechanical_W, rel=0.10)
     assert optimum.measured.mechanical_W < pso.measured.mechanical_W < ga.measured.mechanical_W
     assert optimum.measured.total_W < pso.measured.total_W < ga.measured.total_W
     assert optimum.predicted.total_W == pytest.approx(0.846, abs=0.002)
 
 
-def test_the_swing_foot_lands_where_planned(played):
-    landing = played("ssp optimum")[2].landings["right"]
+def test_the_swing_foot_lands_where_planned(simulated):
+    landing = simulated("ssp optimum")[2].landings["right"]
     assert landing.planned_m == pytest.approx((0.12, -0.05))
     assert landing.error_m < 0.010
-    assert played("dsp optimum")[2].landings == {}
+    assert simulated("dsp optimum")[2].landings == {}
 
 
-def test_pressure_follows_the_planned_zmp(played):
-    """Within the drive's compliance: stiffer servos come closer (docs/simulation.md)."""
-    m = played("ssp optimum")[2]
+def test_pressure_follows_the_planned_zmp(simulated):
+    """Within the drive's compliance: stiffer drives come closer (docs/simulation.md)."""
+    m = simulated("ssp optimum")[2]
     assert m.pressure_rms_m < 0.007
     assert m.pressure_middle_rms_m < 0.0055
     assert m.pressure_rms_m < m.pressure_raw_rms_m
-    assert played("dsp optimum")[2].pressure_middle_rms_m < 0.0025
+    assert simulated("dsp optimum")[2].pressure_middle_rms_m < 0.0025
 
 
-def test_the_floor_carries_the_robot(played):
-    plan, trace, _ = played("ssp optimum")
+def test_the_floor_carries_the_robot(simulated):
+    plan, trace, _ = simulated("ssp optimum")
     resting = trace.t > trace.t[-1] - 0.1
     assert trace.loads[resting].sum(axis=1).mean() == pytest.approx(plan.robot.mass_kg * plan.gravity, rel=0.01)
     middle = np.abs(trace.t - 2.0) < 0.2
@@ -92,24 +92,24 @@ def test_an_infeasible_gait_falls_and_is_reported(gait):
     assert dataclasses.asdict(m)["fallen"] is True
 
 
-def test_twice_the_same_numbers(played):
-    plan, first, m = played("dsp optimum")
+def test_twice_the_same_numbers(simulated):
+    plan, first, m = simulated("dsp optimum")
     second = simulate_plan(plan)
     for field in dataclasses.fields(first):
         np.testing.assert_array_equal(getattr(first, field.name), getattr(second, field.name), err_msg=field.name)
     assert measure(plan, second, Drive()) == m
 
 
-def test_a_push_moves_and_a_strong_one_fells(played):
-    plan, _, m = played("dsp optimum")
+def test_a_push_moves_and_a_strong_one_fells(simulated):
+    plan, _, m = simulated("dsp optimum")
     pushed = simulate_plan(plan, Conditions(push=Push(impulse_Ns=(ONE_NEWTON_S, 0.0))))
     assert pushed.fell_at_s is None
     assert math.degrees(pushed.tilt.max()) > m.largest_tilt_deg + 0.5
     assert simulate_plan(plan, Conditions(push=Push(impulse_Ns=(0.0, 10 * ONE_NEWTON_S)))).fell_at_s is not None
 
 
-def test_slope_friction_and_mass_change_the_world(played):
-    plan, flat, _ = played("dsp optimum")
+def test_slope_friction_and_mass_change_the_world(simulated):
+    plan, flat, _ = simulated("dsp optimum")
     assert simulate_plan(plan, Conditions(slope_rad=(math.radians(35.0), 0.0))).fell_at_s is not None
     slippery = simulate_plan(plan, Conditions(friction=0.02, slope_rad=(math.radians(4.0), 0.0)))
     assert slippery.feet[-1, 0, 0] < flat.feet[-1, 0, 0] - 0.05  # slides down, that is backward
@@ -118,8 +118,8 @@ def test_slope_friction_and_mass_change_the_world(played):
     assert heavy.loads[-200:].sum(axis=1).mean() == pytest.approx(1.1 * weight, rel=0.01)
 
 
-def test_torque_limits_are_named_and_hold(played):
-    plan = played("ssp optimum")[0]
+def test_torque_limits_are_named_and_hold(simulated):
+    plan = simulated("ssp optimum")[0]
     drive = Drive(torque_limits="continuous")
     trace = simulate_plan(plan, drive=drive)
     m = measure(plan, trace, drive)
@@ -128,12 +128,12 @@ def test_torque_limits_are_named_and_hold(played):
     assert m.saturated and all(0.0 < share <= 1.0 for share in m.saturated.values())
 
 
-def test_polygon_soles_carry_too(played):
-    plan = played("dsp optimum")[0]
+def test_polygon_soles_carry_too(simulated):
+    plan = simulated("dsp optimum")[0]
     assert simulate_plan(plan, sole="polygon").fell_at_s is None
 
 
-def test_robustness_finds_the_first_fall(played, monkeypatch):
+def test_robustness_finds_the_first_fall(simulated, monkeypatch):
     """The sweep itself, against a fake robot that falls beyond known limits."""
     from nlp_gait.simulation import robustness as module
 
@@ -147,7 +147,7 @@ def test_robustness_finds_the_first_fall(played, monkeypatch):
         return FakeTrace(fell or conditions.slope_rad[0] > math.radians(2.2))
 
     monkeypatch.setattr(module, "simulate_plan", fake)
-    found = measure_robustness(played("dsp optimum")[0])
+    found = measure_robustness(simulated("dsp optimum")[0])
     assert found.undisturbed
     assert found.push_Ns == {"forward": 0.3, "backward": module.LARGEST_PUSH, "left": module.LARGEST_PUSH, "right": 0.1}
     assert found.slope_deg["forward"] == 2.0 and set(found.slope_deg) == set(DIRECTIONS)
@@ -155,18 +155,18 @@ def test_robustness_finds_the_first_fall(played, monkeypatch):
     assert found.mass_factor == {0.9: True, 1.1: False}
 
 
-def test_without_a_display_the_viewer_is_refused_in_one_sentence(played, monkeypatch):
+def test_without_a_display_the_viewer_is_refused_in_one_sentence(simulated, monkeypatch):
     glfw = pytest.importorskip("glfw")
     from nlp_gait.errors import OutputError
     from nlp_gait.simulation.film.viewer import show_in_window
 
     monkeypatch.setattr(glfw, "init", lambda: False)
     with pytest.raises(OutputError, match="no display; use --video"):
-        show_in_window(partial(simulate_plan, played("dsp optimum")[0]))
+        show_in_window(partial(simulate_plan, simulated("dsp optimum")[0]))
 
 
-def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(played):
-    plan = played("dsp optimum")[0]
+def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(simulated):
+    plan = simulated("dsp optimum")[0]
     drive = Drive(full_error_rad=1e-9, torque_limits="stall")  # stiffer than any time step can follow
     trace = simulate_plan(plan, Conditions(mass_factor=1e-6), drive)
     assert trace.fell_at_s is not None

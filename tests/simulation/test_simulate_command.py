@@ -1,4 +1,4 @@
-"""The 12-joint walk and the climb, played in the engine."""
+"""The 12-joint walk and the climb, in the engine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from compare.cli import app
 from nlp_gait.formulation import GaitProblem, Result
 
 pytest.importorskip("mujoco")
-pytestmark = pytest.mark.slow  # each gait is played in the engine
+pytestmark = pytest.mark.slow  # each gait is simulated
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import Measurements, measure  # noqa: E402
@@ -29,7 +29,7 @@ WALK = (0.130, 0.109, 0.014, 0.020)  # Goswami et al. (2008), Table III, lambda 
 SLOW_WALK = (0.126, 0.12, 0.014, 0.0215)  # Table IV, 2 s
 
 
-def played(
+def simulate(
     problem: GaitProblem, x: tuple[float, ...], steps: int | None = None
 ) -> tuple[Plan, Simulation, Measurements]:
     plan = make_plan(Result(problem=problem, x=problem.check_x(x)), steps)
@@ -38,7 +38,7 @@ def played(
 
 
 def test_the_planned_climb_is_climbed_with_the_planned_energy() -> None:
-    plan, trace, m = played(nlp_gait.load("stairs-plan"), CLIMB)
+    plan, trace, m = simulate(nlp_gait.load("stairs-plan"), CLIMB)
     assert not m.fallen and m.largest_tilt_deg < 2.0
     assert m.measured.mechanical_W == pytest.approx(m.predicted.mechanical_W, rel=0.05)
     assert m.pressure_middle_rms_m is not None and m.pressure_middle_rms_m < 0.004
@@ -54,13 +54,13 @@ def test_the_planned_climb_is_climbed_with_the_planned_energy() -> None:
 
 def test_tracked_steps_climb_with_stiff_gains_and_fall_with_the_papers() -> None:
     problem = nlp_gait.load("stairs-track")
-    assert not played(problem, TRACKED)[2].fallen
+    assert not simulate(problem, TRACKED)[2].fallen
     loose = problem.with_values(gravity_compensation=0.0)
-    assert played(loose, PAPERS_GAINS)[2].fallen
+    assert simulate(loose, PAPERS_GAINS)[2].fallen
 
 
 def test_the_walk_whose_pressure_leaves_the_sole_falls_within_five_steps() -> None:
-    plan, _, m = played(nlp_gait.load("walk12"), WALK, 5)
+    plan, _, m = simulate(nlp_gait.load("walk12"), WALK, 5)
     width = plan.robot.feet["left"].left_m
     outside = np.abs(plan.signals.arrays["zmp"][:1001, 1]) > width
     assert outside.mean() > 0.3
@@ -69,7 +69,7 @@ def test_the_walk_whose_pressure_leaves_the_sole_falls_within_five_steps() -> No
 
 def test_a_slow_walk_goes_on_and_the_floor_carries_its_weight() -> None:
     problem = nlp_gait.load("walk12").with_values(step_time_s=2.0)
-    plan, trace, m = played(problem, SLOW_WALK, 3)
+    plan, trace, m = simulate(problem, SLOW_WALK, 3)
     assert not m.fallen
     weight = plan.robot.mass_kg * plan.gravity
     assert weight == pytest.approx(0.86 * 9.81)
@@ -77,7 +77,7 @@ def test_a_slow_walk_goes_on_and_the_floor_carries_its_weight() -> None:
     assert trace.feet[:, :, 2].min() > -0.001  # soles do not sink into the floor
 
 
-def test_the_command_plays_them_and_says_what_is_not_repeated(tmp_path: Path) -> None:
+def test_the_command_simulates_them_and_names_what_is_not_repeated(tmp_path: Path) -> None:
     problem = nlp_gait.load("stairs-track")
     result = tmp_path / "climb.json"
     result.write_text(json.dumps({"problem": problem.name, "x": problem.by_name(problem.check_x(TRACKED))}))

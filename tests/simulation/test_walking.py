@@ -1,4 +1,4 @@
-"""Walks of several steps: mirrored exactly, and played in the engine."""
+"""Walks of several steps: mirrored exactly, and in the engine."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import left_over
 
 pytest.importorskip("mujoco")
-pytestmark = pytest.mark.slow  # each gait is played in the engine
+pytestmark = pytest.mark.slow  # each gait is simulated
 
 from nlp_gait.simulation.drive import DRIVES, Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
@@ -150,8 +150,8 @@ def test_the_command_says_how_far_it_walked(cycle: Result, tmp_path: Path) -> No
     assert report["fallen"] is False
     assert report["walk"]["steps_done"] == 1
     assert report["walk"]["planned_m"] == pytest.approx(0.07619)
-    said = CliRunner().invoke(app, ["simulate", str(result), "--steps", "1"]).stdout
-    assert "1 steps: walked" in said and "of 76 mm" in said
+    printed = CliRunner().invoke(app, ["simulate", str(result), "--steps", "1"]).stdout
+    assert "1 steps: walked" in printed and "of 76 mm" in printed
 
 
 @pytest.mark.parametrize("steps", [0, -1, True, 1.0])

@@ -130,10 +130,10 @@ class Captions:
         self._line = line = self._height / LINES
         width, strip = max(view.left + view.width for view in views), self._height - STRIP_LINES * line
         title = self._write(0.0, 0.0, recording.title, INK)
-        shown = recording.title
-        while shown and title.get_window_extent().width > views[0].width - line:
-            shown = shown[:-1]
-            title.set_text(f"{shown.rstrip()} ...")
+        fitting = recording.title
+        while fitting and title.get_window_extent().width > views[0].width - line:
+            fitting = fitting[:-1]
+            title.set_text(f"{fitting.rstrip()} ...")
         self._write(0.0, line, note, FAINT, SMALL)
         for view in views:
             self._label(view)
