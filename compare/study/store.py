@@ -29,6 +29,7 @@ from nlp_gait.progress import Progress, ignore_progress
 FOLDER = "store"  # in the folder of the work
 KEY = "{key}"  # in a name
 KEY_DIGITS = 20
+IDENTITY = "identity"  # array with the inputs and the names of all others, as JSON
 CODE = "code_sha256"  # input: hash of the modules that compute a result
 STORED, COMPUTED = b"s", b"c"
 
@@ -181,8 +182,8 @@ class Store:
                 arrays = {key: np.asarray(archive[key]) for key in archive}
         except Exception:  # NumPy and zipfile raise a dozen kinds of errors on damaged archives
             return None
-        fits = "inputs" in arrays and str(arrays.pop("inputs")) == json.dumps(inputs, sort_keys=True)
-        return arrays if fits else None
+        identity = str(arrays.pop(IDENTITY, ""))
+        return arrays if identity == _identify_arrays(inputs, arrays) else None
 
     def save_arrays(self, name: str, inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
         """Store arrays by name as an npz file.
@@ -193,8 +194,8 @@ class Store:
         with self._writing(name, inputs, ".npz") as path:
             if path is not None:
                 with replace_file(path) as temporary, open(temporary, "wb") as file:
-                    text = np.array(json.dumps(inputs, sort_keys=True))
-                    np.savez_compressed(file, allow_pickle=False, inputs=text, **arrays)
+                    identity = np.array(_identify_arrays(inputs, arrays))
+                    np.savez_compressed(file, allow_pickle=False, **arrays, **{IDENTITY: identity})
 
     def report_changes(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
         """Report what has changed since a question about a problem was last answered in this folder, and store its inputs."""
@@ -244,6 +245,10 @@ class Store:
     def _count(self, kind: bytes) -> None:
         with suppress(OSError):
             self._counts.write(kind)
+
+
+def _identify_arrays(inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+    return json.dumps({"inputs": inputs, "arrays": sorted(arrays)}, sort_keys=True)
 
 
 def as_json(data: Any) -> Any:

@@ -124,7 +124,7 @@ def test_a_report_without_playbacks_says_how_to_get_them(tmp_path: Path) -> None
     assert done.exit_code == 0
     assert "`nlp-gait report DIR --engine`" in (tmp_path / "report.md").read_text()
     refused = CliRunner().invoke(app, ["report", str(tmp_path), "--drive", "held"])
-    assert refused.exit_code == 1 and "give --engine as well" in refused.stderr
+    assert refused.exit_code == 1 and "add --engine" in refused.stderr
 
 
 def test_compare_says_that_the_engine_is_missing_before_the_work(

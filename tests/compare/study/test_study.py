@@ -78,7 +78,7 @@ def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
     )
     assert polished.verdict.feasible and polished.verdict.objective == pytest.approx(0.970839, rel=1e-5)
     assert polished.verdict.objective > search.verdict.objective  # maximised
-    assert polished.evaluations["f"] > search.evaluations["f"] == 500 and polished.evaluations["hessian"] > 0
+    assert polished.evaluations["f"] > search.evaluations["f"] == 500 and polished.evaluations["jacobian"] > 0
     assert polished.history.evaluations[:-1] == search.history.evaluations
     assert polished.time_s.solve > search.time_s.solve
     assert polished.active_constraints and not search.active_constraints
