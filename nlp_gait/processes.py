@@ -1,6 +1,7 @@
-"""Forked child processes: several that share some work, or one that is isolated. None of them outlives its parent.
+"""Child processes: forks that share some work, one isolated fork, or joblib's workers. None of them outlives its parent.
 
-A fork has everything that its parent has and starts within milliseconds; only its results are pickled.
+A fork has everything that its parent has and starts within milliseconds; only its results are pickled. Workers start afresh:
+their functions are pickled too.
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
+import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple, TypeVar
@@ -21,8 +24,10 @@ from typing import Any, NamedTuple, TypeVar
 from nlp_gait.errors import WorkerError
 from nlp_gait.interrupts import block_interrupts_in_children, never
 
+K = TypeVar("K")
 T = TypeVar("T")
 
+PARENT_CHECKED_EVERY_S = 0.5
 STOP_CHECKED_EVERY_S = 0.05
 END_WITHIN_S = 5.0  # a child that is to end is killed after this time
 COUNTER_BYTES = 8
@@ -181,3 +186,71 @@ def _isolate(sender: Connection, call: Callable[[], bytes]) -> None:
     sender.send_bytes(call())
     sender.close()
     os._exit(0)  # without the exit handlers of the parent
+
+
+def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
+    """Call picklable functions in worker processes; yield the key and the result of each as it finishes.
+
+    Args:
+        calls: functions by key.
+        workers: number of processes; -1 takes all of joblib's backend.
+
+    Raises:
+        WorkerError: a worker process died, or none starts.
+    """
+    from joblib import Parallel, delayed  # costs 0.1 s to import
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    # Dask's workers belong to its scheduler.
+    begin = {} if workers < 0 else {"initializer": exit_with_parent, "initargs": (os.getpid(),)}
+    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
+    results: Generator[tuple[K, T], None, None] | None = None
+    try:
+        with block_interrupts_in_children():
+            folder = os.getcwd() if workers > 0 else None  # another machine has other folders
+            results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
+        for result in results:  # noqa: UP028  `yield from` would close them before the lines below
+            yield result
+    except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes
+        raise WorkerError(
+            "a worker process died, perhaps out of memory; finished results are stored: rerun to continue"
+        ) from error
+    finally:
+        with warnings.catch_warnings(), _silence_manager():
+            warnings.simplefilter("ignore")  # joblib reports calls that were cancelled
+            if results is not None:
+                results.close()
+
+
+@contextmanager
+def _silence_manager() -> Iterator[None]:
+    """Hide the traceback of joblib's manager thread when calls are cancelled just as it hands one of them out."""
+    before = threading.excepthook
+
+    def hook(raised: threading.ExceptHookArgs) -> None:
+        if not (raised.exc_type is KeyError and raised.thread and "ExecutorManager" in raised.thread.name):
+            before(raised)
+
+    threading.excepthook = hook
+    try:
+        yield
+    finally:
+        threading.excepthook = before
+
+
+def exit_with_parent(parent: int) -> None:
+    """Let this worker process end within a second of its parent, however that ends."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECKED_EVERY_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
+
+
+def _call(key: K, call: Callable[[], T], folder: str | None) -> tuple[K, T]:
+    """Call in the folder of the caller: a worker keeps that in which it was started, and paths may be relative."""
+    if folder is not None and os.getcwd() != folder:
+        os.chdir(folder)
+    return key, call()

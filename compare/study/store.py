@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from compare.study.definition import describe_input_differences
-from compare.study.workers import run_in_processes
 from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import make_writable_folder, read_bytes, read_json, remove_leftovers, replace_file, write_json
 from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.processes import run_in_processes
 from nlp_gait.progress import Progress, ignore_progress
 
 FOLDER = "store"  # in the folder of the work

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import os
-import threading
-import time
-import warnings
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from functools import partial
-from typing import TypeVar
 
 from compare.study.record import RunRecord
 from compare.study.run_task import Run, run_task, try_task
 from compare.study.task import Task
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import convert_errors
-from nlp_gait.interrupts import block_interrupts_in_children, remember_interrupts
-
-K = TypeVar("K")
-T = TypeVar("T")
+from nlp_gait.interrupts import remember_interrupts
+from nlp_gait.processes import run_in_processes
 
 # A study continues in new processes if one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
 CONNECT_TIMEOUT = "10s"
-PARENT_CHECKED_EVERY_S = 0.5
 
 Job = tuple[Task, RunRecord | None]
 """A task, and the run that it polishes, if it does."""
@@ -74,74 +66,6 @@ def run_jobs(
                         f"a worker process died {deaths} times in a row, perhaps out of memory; finished runs are stored: "
                         "rerun with fewer --jobs to continue"
                     ) from error
-
-
-def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
-    """Call picklable functions in worker processes; yield the key and the result of each as it finishes.
-
-    Args:
-        calls: functions by key.
-        workers: number of processes; -1 takes all of joblib's backend.
-
-    Raises:
-        WorkerError: a worker process died, or none starts.
-    """
-    from joblib import Parallel, delayed  # costs 0.1 s to import
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    # Dask's workers belong to its scheduler.
-    begin = {} if workers < 0 else {"initializer": exit_with_parent, "initargs": (os.getpid(),)}
-    parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
-    results: Generator[tuple[K, T], None, None] | None = None
-    try:
-        with block_interrupts_in_children():
-            folder = os.getcwd() if workers > 0 else None  # another machine has other folders
-            results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
-        for result in results:  # noqa: UP028  `yield from` would close them before the lines below
-            yield result
-    except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes
-        raise WorkerError(
-            "a worker process died, perhaps out of memory; finished results are stored: rerun to continue"
-        ) from error
-    finally:
-        with warnings.catch_warnings(), _silence_manager():
-            warnings.simplefilter("ignore")  # joblib reports calls that were cancelled
-            if results is not None:
-                results.close()
-
-
-@contextmanager
-def _silence_manager() -> Iterator[None]:
-    """Hide the traceback of joblib's manager thread when calls are cancelled just as it hands one of them out."""
-    before = threading.excepthook
-
-    def hook(raised: threading.ExceptHookArgs) -> None:
-        if not (raised.exc_type is KeyError and raised.thread and "ExecutorManager" in raised.thread.name):
-            before(raised)
-
-    threading.excepthook = hook
-    try:
-        yield
-    finally:
-        threading.excepthook = before
-
-
-def exit_with_parent(parent: int) -> None:
-    """Let this worker process end within a second of its parent, however that ends."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_CHECKED_EVERY_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
-
-
-def _call(key: K, call: Callable[[], T], folder: str | None) -> tuple[K, T]:
-    """Call in the folder of the caller: a worker keeps that in which it was started, and paths may be relative."""
-    if folder is not None and os.getcwd() != folder:
-        os.chdir(folder)
-    return key, call()
 
 
 def _connect(address: str) -> AbstractContextManager[object]:

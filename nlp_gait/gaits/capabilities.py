@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pkgutil import resolve_name
 from typing import Any
 
 from nlp_gait.errors import InputError
+from nlp_gait.providers import import_object
 
 _NAO_RECORDED = "nlp_gait.gaits.nao.recorded:make_recorded_gait"
 _NAO_FITTED = "nlp_gait.gaits.nao.free_joints:fit_joints"
@@ -25,4 +25,4 @@ def resolve(functions: Mapping[str, str], problem: str) -> Any:
     """Return the function that a problem provides; InputError if it provides none."""
     if problem not in functions:
         raise InputError(f"problem {problem!r} does not provide this; these do: {', '.join(functions)}")
-    return resolve_name(functions[problem])
+    return import_object(functions[problem])

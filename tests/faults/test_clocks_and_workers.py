@@ -18,10 +18,10 @@ import nlp_gait
 from compare.study.record import read_record
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
-from compare.study.workers import run_in_processes
 from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
 from nlp_gait.files import remove_leftovers
+from nlp_gait.processes import run_in_processes
 
 WALK = ProblemSpec(name="walk12")
 STOP = Stop(evaluations=300)

@@ -8,8 +8,8 @@ from functools import partial
 
 import pytest
 
-from compare.study.workers import run_in_processes
 from nlp_gait.errors import WorkerError
+from nlp_gait.processes import run_in_processes
 
 
 def no_reader() -> None:
