@@ -18,7 +18,7 @@ from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.evaluators import NativeKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.nao.body import GRAVITY, load_nao, upright_links
+from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links, load_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
@@ -119,7 +119,7 @@ def torques(rounds: int) -> list[Row]:
     robot = load_nao("nao-v5")
     moving = [name for name in JOINTS if name in PLANNED_JOINTS or name in ARM_SWING]
     free = _torques(rounds, robot, JOINTS, ())
-    gait = _torques(rounds, robot, moving, upright_links(robot))
+    gait = _torques(rounds, robot, moving, find_upright_links(robot))
     return [
         Row(name="torques alone, against pin.rneaInParallel(1)", unit="x", required=12, ambition=25, **gait),
         Row(name="torques alone, all 22 joints free", unit="x", **free),

@@ -23,7 +23,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.nao.joints import YAW_PITCHES
-from nlp_gait.gaits.nao.recorded import nao_cycles
+from nlp_gait.gaits.nao.recorded import make_nao_cycles
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import planned_distance, walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan
@@ -221,7 +221,7 @@ def simulate_drives(
 @cache
 def plan_own_walk(footsteps: Footsteps) -> Result:
     """Return the robot's own walk: preview control of a cart on a table over footsteps."""
-    return plan_cart_table_walk(nao_cycles(), footsteps)
+    return plan_cart_table_walk(make_nao_cycles(), footsteps)
 
 
 def compute_knee_deg(result: Result) -> float:
@@ -236,12 +236,12 @@ def _sum_by_kind(plan: Plan, torque: Array, rate: Array, t: Array, distance_m: f
     """By kind of joint: mechanical energy, and heat with the paper's constant and those of the data sheet [J/m]."""
     mechanical = trapezoid(np.abs(torque * rate), t, axis=0)
     paper = plan.heat_loss * trapezoid(torque**2, t, axis=0)
-    by_motor = torque.copy()
+    sum_by_motor = torque.copy()
     first, second = (plan.joints.index(joint) for joint in YAW_PITCHES)  # one motor turns both
-    by_motor[:, first], by_motor[:, second] = torque[:, first] + torque[:, second], 0.0
+    sum_by_motor[:, first], sum_by_motor[:, second] = torque[:, first] + torque[:, second], 0.0
     motors = (plan.robot.joint(joint).motor for joint in plan.joints)
     K = np.array([motor.heat_W_per_Nm2 for motor in motors if motor is not None])
-    sheet = K * trapezoid(by_motor**2, t, axis=0)
+    sheet = K * trapezoid(sum_by_motor**2, t, axis=0)
     found = {kind: dict.fromkeys(("mechanical", "paper", "sheet"), 0.0) for kind in KINDS}
     for column, joint in enumerate(plan.joints):
         parts = found[joint[1:] if joint[1:] in KINDS else ARMS]

@@ -164,7 +164,7 @@ class Body(ABC):
         lower, upper = self.scale_length(0.015), self.scale_length(0.03)
         return Variable(name=LIFT, unit="m", lower=lower, upper=upper, description="highest point of the swing foot")
 
-    def time_variable(self, phase: PhaseName) -> Variable:
+    def make_time_variable(self, phase: PhaseName) -> Variable:
         """Return the duration of a phase."""
         least, most = {"ssp": (0.4, 4.0), "dsp": (0.2, 2.0)}[phase]
         word = {"ssp": "from lift-off to touch-down", "dsp": "from touch-down to the next lift-off"}[phase]
@@ -214,14 +214,14 @@ class Body(ABC):
         """
 
     @abstractmethod
-    def cosines(self, q: MX) -> MX:
+    def compute_cosines(self, q: MX) -> MX:
         """Return the cosines (2, n) of both knees, as ``plan`` has them, from the angles (J, n) of all joints."""
 
     @abstractmethod
-    def sole_margins(self, support_xy: tuple[float, float]) -> Margins:
+    def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
         """Return the balance margins in x and y on the left sole, whose ankle is at ``support_xy`` [m]."""
 
-    def curve_limits(
+    def make_curve_limits(
         self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
         """Return the limits that cubics cannot break but splines can.

@@ -31,15 +31,21 @@ from nlp_gait.formulation import (
 from nlp_gait.formulation.assembly import parameters
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.curves import make_grid
-from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, cycle_planners, cycle_variables
-from nlp_gait.gaits.biped.double_support import Box, Point2, double_support_mean_margins, margins_in, support_box
+from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
+from nlp_gait.gaits.biped.double_support import (
+    Box,
+    Point2,
+    compute_double_support_mean_margins,
+    compute_margins,
+    make_support_box,
+)
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import Limit, Margins, rows
+from nlp_gait.gaits.biped.limits import Limit, Margins, make_rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import add_robot, goal_for, phase_limits, start_within_reach
+from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
-from nlp_gait.gaits.biped.single_support import single_support_loads, single_support_mean_margins
+from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
 from nlp_gait.robots.mirror import mirror_sign
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -161,7 +167,7 @@ class WalkingCycle:
     def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
         limit, joints = motion["torque_jump_limit_Nm"], self.body.joints
         return tuple(
-            rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.body.torque_scale)
+            make_rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.body.torque_scale)
             for switch, jump in jumps.items()
         )
 
@@ -184,7 +190,9 @@ class WalkingCycle:
     def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:
         if not self.at_given_speed:
             return ()
-        return (rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"], over="once"),)
+        return (
+            make_rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"], over="once"),
+        )
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Compute changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start."""
@@ -201,7 +209,9 @@ class WalkingCycle:
         return {"ssp": single, "dsp": replace(double, arrays=later)}
 
 
-def walking_cycle(body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool) -> WalkingCycle:
+def make_walking_cycle(
+    body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool
+) -> WalkingCycle:
     """Return both phases of the cycle, joined.
 
     Args:
@@ -211,11 +221,11 @@ def walking_cycle(body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, a
         goal: of each phase; the cycle's is their mean over time, or energy per metre.
         at_given_speed: the step length follows from the speed.
     """
-    *motion, step = cycle_variables(body)
+    *motion, step = make_cycle_variables(body)
     variables = (*motion, *sharing.variables, step)
-    plans, margins = cycle_planners(body), cycle_margins(body)
+    plans, margins = make_cycle_planners(body), make_cycle_margins(body)
     own: dict[PhaseName, tuple[Planner, Loader, tuple[Limit, ...]]] = {
-        "ssp": (plans["ssp"], single_support_loads(body), ()),
+        "ssp": (plans["ssp"], make_single_support_loads(body), ()),
         "dsp": (sharing.add_to(plans["dsp"]), sharing.loads, sharing.limits),
     }
     phases: dict[PhaseName, Phase] = {
@@ -226,7 +236,7 @@ def walking_cycle(body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, a
             plan=plan,
             loads=loads,
             grid=grid,
-            limits=(*phase_limits(body, *margins[name]), *body.motors.limits, *more),
+            limits=(*make_phase_limits(body, *margins[name]), *body.motors.limits, *more),
             goal=goal,
         )
         for name, (plan, loads, more) in own.items()
@@ -234,21 +244,21 @@ def walking_cycle(body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, a
     return WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=at_given_speed)
 
 
-def cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
+def make_cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
     """Return the balance margins of each phase, and the default of the least mean ones in x and y [m]."""
     feet, (left_y, right_y) = body.robot.feet, body.feet_y
-    usual = support_box(body.robot, {"L": (0.0, left_y), "R": (body.step_length_m, right_y)})
+    usual = make_support_box(body.robot, {"L": (0.0, left_y), "R": (body.step_length_m, right_y)})
 
     def double(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
         """In the box around the left foot and the right one a step ahead."""
         step = at[STEP]
         back = ca.fmin(-feet["left"].back_m, step - feet["right"].back_m)
         front = ca.fmax(feet["left"].front_m, step + feet["right"].front_m)
-        return margins_in(Box(back=back, front=front, right=usual.right, left=usual.left), zmp, ops)
+        return compute_margins(Box(back=back, front=front, right=usual.right, left=usual.left), zmp, ops)
 
     return {
-        "ssp": (body.sole_margins((0.0, left_y)), single_support_mean_margins(feet["left"])),
-        "dsp": (double, double_support_mean_margins(usual)),
+        "ssp": (body.make_sole_margins((0.0, left_y)), compute_single_support_mean_margins(feet["left"])),
+        "dsp": (double, compute_double_support_mean_margins(usual)),
     }
 
 
@@ -264,8 +274,8 @@ def plan_cycle(
     """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     sharing, at_given_speed = share_load(body, torso_share, load_degree), objective != "energy-per-metre"
-    goal = goal_for(body, "torque" if objective == "torque" else "power")
-    cycle = walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed)
+    goal = make_goal(body, "torque" if objective == "torque" else "power")
+    cycle = make_walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(at: Point) -> MX:
@@ -276,11 +286,11 @@ def plan_cycle(
 
     start = sharing.start(names, start_with_step if at_given_speed else None)
     if not body.closed_form:
-        start = start_within_reach(names, (SPEED,) if at_given_speed else (), reach, start)
-    return cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
+        start = make_start_within_reach(names, (SPEED,) if at_given_speed else (), reach, start)
+    return make_cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
 
 
-def cycle_problem(
+def make_cycle_problem(
     name: str, cycle: WalkingCycle, start: Start | None = None, *, rows_over_time: bool, repeats: bool
 ) -> GaitProblem:
     """Return the problem of a cycle.
@@ -301,7 +311,7 @@ def cycle_problem(
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
         rows_over_time=cycle.rows_over_time if rows_over_time else (),
-        display=Display(motion=lambda at: join(cycle.signals(at)), durations=tuple(TIMES.values())),
+        display=Display(motion=lambda at: join_phases(cycle.signals(at)), durations=tuple(TIMES.values())),
         hints=SolverHints(start=start),
     )
     return add_robot(problem, cycle.body, repeats=repeats)
@@ -322,7 +332,7 @@ def draw_start(names: Sequence[str], values: Mapping[str, float], rng: np.random
     return np.asarray(x)
 
 
-def join(phases: Mapping[str, Signals]) -> Signals:
+def join_phases(phases: Mapping[str, Signals]) -> Signals:
     """Join phases; of the two samples at a switch the earlier one is kept: positions and velocities are equal."""
     first, *others = phases.values()
     return replace(

@@ -71,7 +71,7 @@ class Cycle(NamedTuple):
         )
 
 
-def cycle_variables(body: Body) -> tuple[Variable, ...]:
+def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
     """Return the variables of a cycle; the step length is the last one.
 
     Heights, velocities, swing height and times have the bounds of the phases.
@@ -104,24 +104,24 @@ def cycle_variables(body: Body) -> tuple[Variable, ...]:
         ]
     low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
-    return (*found, body.lift_variable, body.time_variable("ssp"), body.time_variable("dsp"), step)
+    return (*found, body.lift_variable, body.make_time_variable("ssp"), body.make_time_variable("dsp"), step)
 
 
-def cycle_planners(body: Body) -> dict[PhaseName, Planner]:
+def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     """Return the plans of both phases."""
     left, right = body.standing_ankle("L"), body.standing_ankle("R")
     right_y, right_z = body.ankle("R")
 
     def single(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
         """From lift-off to touch-down over the left foot."""
-        cycle = cycle_from(at, body.coordinates)
+        cycle = read_cycle(at, body.coordinates)
         swing = swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase)
         hip, angles = between(cycle.lift_off, cycle.touch_down, cycle.single, phase)
         return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": swing}, at[REACH_MARGIN], ops)
 
     def double(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
         """From touch-down to the mirror image of lift-off over both feet."""
-        cycle = cycle_from(at, body.coordinates)
+        cycle = read_cycle(at, body.coordinates)
         ahead = right._replace(position=right.position + vertcat(cycle.step, 0, 0))
         hip, angles = between(cycle.touch_down, cycle.end, cycle.double, phase)
         return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": ahead}, at[REACH_MARGIN], ops)
@@ -129,7 +129,7 @@ def cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     return {"ssp": single, "dsp": double}
 
 
-def cycle_from(at: InstantPoint, coordinates: Sequence[Coordinate]) -> Cycle:
+def read_cycle(at: InstantPoint, coordinates: Sequence[Coordinate]) -> Cycle:
     """Cycle of the variables."""
     lift_off, touch_down = (
         State(

@@ -14,7 +14,7 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
-from nlp_gait.gaits.biped.phase_problem import Criterion, goal_for, phase_limits, phase_problem
+from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -36,7 +36,7 @@ class Box(NamedTuple, Generic[Side]):
     left: float
 
 
-def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
+def make_support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
     """Return the rectangle around both soles, whose ankles are at ``soles`` by side [m]."""
     feet = {side: robot.feet[foot] for side, foot in BOTH_FEET.items()}
     return Box(
@@ -47,28 +47,28 @@ def support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
     )
 
 
-def double_support_mean_margins(box: Box[float]) -> Point2:
+def compute_double_support_mean_margins(box: Box[float]) -> Point2:
     """Return the least mean balance margins in x and y as shares of the box, to a tenth of a millimetre [m]."""
     along, across = MEAN_DBM_SHARES
     return round(along * (box.front - box.back), 4), round(across * (box.left - box.right), 4)
 
 
-def double_support_margins(box: Box[float]) -> Margins:
+def make_double_support_margins(box: Box[float]) -> Margins:
     """Return the balance margins in x and y: distances to the sides of the box around both soles.
 
     Source:
         Gupta, Pratihar, Deb (2023), Fig. 8 (b).
     """
-    return lambda zmp, at, ops: margins_in(box, zmp, ops)
+    return lambda zmp, at, ops: compute_margins(box, zmp, ops)
 
 
-def margins_in(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
+def compute_margins(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
     """Compute the distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
     x, y = zmp[0, :].T, zmp[1, :].T
     return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T
 
 
-def soles_of(body: Body, step_m: float) -> dict[str, Point2]:
+def place_soles(body: Body, step_m: float) -> dict[str, Point2]:
     """Place the ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2) [m]."""
     left, right = body.feet_y
     return {"L": (step_m, left), "R": (2 * step_m, right)}
@@ -85,7 +85,7 @@ def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
     return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)
 
 
-def double_support_splines(body: Body, trajectory: Trajectory) -> Splines:
+def make_double_support_splines(body: Body, trajectory: Trajectory) -> Splines:
     """Return the splines of the phase."""
     units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(body.angle_names("dsp"), "rad")
     return Splines(trajectory=trajectory, units=units, length_scale=body.length_scale)
@@ -104,14 +104,14 @@ def plan_double_support(
     derivatives: Derivatives = "analytic",
 ) -> GaitProblem:
     """Return the problem of double support; for the options see ``gaits.nao``."""
-    splines, sharing = double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
+    splines, sharing = make_double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
-    phase = double_support_phase(body, step_m, splines, sharing, grid, goal_for(body, objective), derivatives)
+    phase = make_double_support_phase(body, step_m, splines, sharing, grid, make_goal(body, objective), derivatives)
     start = sharing.start(phase.names, splines.start_of(phase.names))
-    return phase_problem("dsp", "double support: least mean power", phase, start=start)
+    return make_phase_problem("dsp", "double support: least mean power", phase, start=start)
 
 
-def double_support_phase(
+def make_double_support_phase(
     body: Body,
     step_m: float,
     splines: Splines,
@@ -125,14 +125,14 @@ def double_support_phase(
     Args:
         body: the robot.
         step_m: from foot to foot.
-        splines: see ``double_support_splines``.
+        splines: see ``make_double_support_splines``.
         sharing: of the load between the feet.
         grid: its samples.
         goal: what it minimises.
         derivatives: of the angles.
     """
-    soles = soles_of(body, step_m)
-    box, ends = support_box(body.robot, soles), hip_ends(body, soles)
+    soles = place_soles(body, step_m)
+    box, ends = make_support_box(body.robot, soles), hip_ends(body, soles)
     ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
 
     def state(at: InstantPoint, s: SX) -> State:
@@ -148,7 +148,7 @@ def double_support_phase(
         variables=(
             *body.hip_variables,
             *body.angle_variables,
-            body.time_variable("dsp"),
+            body.make_time_variable("dsp"),
             *splines.variables,
             *sharing.variables,
         ),
@@ -158,8 +158,8 @@ def double_support_phase(
         grid=grid,
         derivatives=derivatives,
         limits=(
-            *phase_limits(body, double_support_margins(box), double_support_mean_margins(box)),
-            *body.curve_limits("dsp", splines.count, state),
+            *make_phase_limits(body, make_double_support_margins(box), compute_double_support_mean_margins(box)),
+            *body.make_curve_limits("dsp", splines.count, state),
             *body.motors.limits,
             *sharing.limits,
         ),

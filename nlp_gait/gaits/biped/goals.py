@@ -22,7 +22,7 @@ HEAT_LOSS = Parameter(
 PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
 
 
-def paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
+def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
     """Compute the mean electrical power by the trapezoidal rule [W]: braking costs as much as driving, one K (eq. 32)."""
     mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
     return time_mean(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
@@ -41,7 +41,7 @@ class Goal:
     """
 
     objective: Objective = POWER
-    power: PowerModel = paper_power
+    power: PowerModel = compute_paper_power
     figure: Callable[[Samples], MX] | None = None
     reads_motion: bool = False
     heat: Parameter = HEAT_LOSS
@@ -50,9 +50,9 @@ class Goal:
         """Return the objective, and the indexes before and after those of the limits."""
         if self.figure is not None:
             figure = self.figure(samples)
-            return figure, {"power_W": paper_power(at, samples, Exact())}, {self.objective.name: figure}
+            return figure, {"power_W": compute_paper_power(at, samples, Exact())}, {self.objective.name: figure}
         power = self.power(at, samples, ops)
-        more = {} if self.power is paper_power else {"paper_power_W": paper_power(at, samples, Exact())}
+        more = {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(at, samples, Exact())}
         return power, {"power_W": power}, more
 
 

@@ -54,7 +54,7 @@ class Limit(ABC):
         """Return the rows at a point, and performance indexes by name."""
 
 
-def rows(
+def make_rows(
     name: str,
     unit: str,
     value: MX,
@@ -77,7 +77,7 @@ def rows(
     )
 
 
-def rows_at_samples(
+def make_rows_at_samples(
     name: str,
     unit: str,
     values: MX,
@@ -99,7 +99,7 @@ def rows_at_samples(
         first: number of the first sample.
     """
     numbers = range(first, first + values.shape[1])
-    return rows(name, unit, ca.vec(values), lower, upper, make_labels(names, numbers), "instant")
+    return make_rows(name, unit, ca.vec(values), lower, upper, make_labels(names, numbers), "instant")
 
 
 class JointLimits(Limit):
@@ -122,7 +122,7 @@ class JointLimits(Limit):
         n = samples.steps + 1
         limits = (ca.vertcat(*(at[f"{joint}_rad.{end}"] for joint in self._planned)) for end in ("lower", "upper"))
         lower, upper = (ca.repmat(limit, n, 1) for limit in limits)
-        return [rows_at_samples("joint_angle", "rad", samples.planned, self._planned, lower, upper)], {}
+        return [make_rows_at_samples("joint_angle", "rad", samples.planned, self._planned, lower, upper)], {}
 
 
 class Reach(Limit):
@@ -134,7 +134,7 @@ class Reach(Limit):
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         limit = 1 - at[REACH_MARGIN]
-        return [rows_at_samples("reach", "1", samples.reach, LEGS, -limit, limit)], {}
+        return [make_rows_at_samples("reach", "1", samples.reach, LEGS, -limit, limit)], {}
 
 
 class Closure(Limit):
@@ -144,7 +144,7 @@ class Closure(Limit):
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
         miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(LEGS) * (samples.steps + 1))
         names = make_labels(LEGS, range(samples.steps + 1))
-        return [rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant")], {}
+        return [make_rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant")], {}
 
 
 class DriveLimits(Limit):
@@ -168,8 +168,8 @@ class DriveLimits(Limit):
         torque, rate = ca.vec(samples.torque), ca.vec(samples.qd)
         joints, moving = (make_labels(names, range(n)) for names in (samples.joints, samples.moving))
         return (
-            rows("effort", "Nm", torque, -strongest, strongest, joints, "instant", self._size),
-            rows("joint_speed", "rad/s", rate, -fastest, fastest, moving, "instant"),
+            make_rows("effort", "Nm", torque, -strongest, strongest, joints, "instant", self._size),
+            make_rows("joint_speed", "rad/s", rate, -fastest, fastest, moving, "instant"),
         ), {
             "effort_share": ca.mmax(ca.fabs(torque) / strongest),
             "speed_share": ca.mmax(ca.fabs(rate) / fastest),
@@ -195,7 +195,7 @@ class TorqueChange(Limit):
         change = samples.torque[:, step:] - samples.torque[:, :-step]
         limit = at["torque_change_limit_Nm"]
         names = make_labels(samples.joints, range(change.shape[1]))
-        return [rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size)], {
+        return [make_rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size)], {
             "torque_change_Nm": ca.mmax(ca.fabs(change))
         }
 
@@ -224,11 +224,11 @@ class BalanceMargins(Limit):
         means = {axis: ca.sum2(margin) / n for axis, margin in margins.items()}
         names = [str(k) for k in range(n)]
         each = [
-            rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
+            make_rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")
             for axis, margin in margins.items()
         ]
         mean = [
-            rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
+            make_rows(f"dbm_{axis}_mean", "m", value, at[f"dbm_{axis}_mean_limit_m"], over="mean")
             for axis, value in means.items()
         ]
         return (*each, *mean), {
@@ -252,16 +252,16 @@ class AngleLimits(Limit):
         self.traces = {name: angles}
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        return [angle_rows(self._name, self._robot, self._joints, samples.traces[self._name][:, 1:-1])], {}
+        return [make_angle_rows(self._name, self._robot, self._joints, samples.traces[self._name][:, 1:-1])], {}
 
 
-def angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> Constraint:
+def make_angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> Constraint:
     """Make rows that keep angles (m, N - 1) between the ends of a phase within the robot's limits [rad]."""
     lower, upper = (
         MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], angles.shape[1])))
         for end in (0, 1)
     )
-    return rows_at_samples(name, "rad", angles, joints, lower, upper, first=1)
+    return make_rows_at_samples(name, "rad", angles, joints, lower, upper, first=1)
 
 
 class FootClearance(Limit):
@@ -279,9 +279,9 @@ class FootClearance(Limit):
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
-        above = rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
+        above = make_rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         halfway = self._halfway(at)
-        return (above, *halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])), {}
+        return (above, *make_halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])), {}
 
     def _halfway(self, at: Point) -> MX:
         """Evaluate the foot at half the phase, which is a sample only on some grids."""
@@ -291,7 +291,7 @@ class FootClearance(Limit):
         return function(at.x)
 
 
-def halfway_rows(
+def make_halfway_rows(
     along: MX, middle: float, heights: MX, least: MX, corners: tuple[str, ...] = ()
 ) -> tuple[Constraint, ...]:
     """Make rows for a swing foot halfway through the phase: in the middle of its path, as in the papers, and high enough.
@@ -304,6 +304,6 @@ def halfway_rows(
         corners: names of the points.
     """
     return (
-        rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),
-        rows("foot_lift", "m", heights - least, MX(0.0), labels=corners, over="once"),
+        make_rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),
+        make_rows("foot_lift", "m", heights - least, MX(0.0), labels=corners, over="once"),
     )

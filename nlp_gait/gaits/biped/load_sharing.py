@@ -21,7 +21,7 @@ from nlp_gait.formulation import Array, InstantPoint, Point, Start, Variable
 from nlp_gait.formulation.assembly import parameters as table
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows, rows_at_samples
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.tree import tree_from
@@ -90,7 +90,7 @@ class LoadSharing:
     limits: tuple[Limit, ...] = ()
 
     def __init__(self, body: Body, rule: Division) -> None:
-        self.loads = divided_loads(body, rule)
+        self.loads = make_divided_loads(body, rule)
 
     def add_to(self, plan: Planner) -> Planner:
         """Return a plan with the load's own part."""
@@ -132,7 +132,7 @@ class PlannedLoad(LoadSharing):
         self._degree, self._weight = degree, body.weight
         self._count = degree + 1 + RAMPS  # coefficients of each component
         self.variables = self._coefficients(body.robot.feet["right"])
-        self.loads = planned_loads(body.robot, body.gravity, body.upright)
+        self.loads = make_planned_loads(body.robot, body.gravity, body.upright)
         self.limits = (FootLimits(body, self.load_slope),)
 
     def _coefficients(self, foot: Foot) -> tuple[Variable, ...]:
@@ -191,7 +191,7 @@ def load_basis(degree: int, phase: SX) -> SX:
     )
 
 
-def planned_loads(robot: Robot, gravity: float, upright: Collection[str]) -> Loader:
+def make_planned_loads(robot: Robot, gravity: float, upright: Collection[str]) -> Loader:
     """Return a function of the torques from the left foot with the planned wrench on the right one, and the ZMP of both feet.
 
     Args:
@@ -216,7 +216,7 @@ def planned_loads(robot: Robot, gravity: float, upright: Collection[str]) -> Loa
     return loads
 
 
-def divided_loads(body: Body, rule: Division) -> Loader:
+def make_divided_loads(body: Body, rule: Division) -> Loader:
     """Return a function of the torques of each half from its own foot, and the combined ZMP of both feet."""
     robot, gravity, weight = body.robot, body.gravity, body.weight
     trees = {side: tree_from(robot, robot.feet[foot].link, body.leg_joints[side]) for side, foot in BOTH_FEET.items()}
@@ -273,7 +273,7 @@ class FootLimits(Limit):
         for side, foot in BOTH_FEET.items():
             kinds = _bearing(self._feet[foot]).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
-                found.append(rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
+                found.append(make_rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
             loads[foot] = samples.wrenches[side][2, :] / self._weight
         # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
         right = samples.traces["load_slope"] / (samples.step_s * samples.steps * self._weight)
@@ -285,8 +285,8 @@ class FootLimits(Limit):
         feet = ("right, landed", "left, lifting")
         return (
             *found,
-            rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
-            rows("switch_load", "1", ends, None, at["switch_load_limit"], feet, over="once"),
+            make_rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
+            make_rows("switch_load", "1", ends, None, at["switch_load_limit"], feet, over="once"),
         ), {
             "load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))),
             "switch_load": ca.mmax(ends),

@@ -27,7 +27,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, PowerModel
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.samples import Samples, time_mean
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
@@ -127,7 +127,7 @@ class Motors:
             mechanical = ops.abs(driven)
         if "heat" in self.features:
             constants = DM([rating.heat_W_per_Nm2 for rating in self._ratings])
-            heat = constants.T @ self.by_motor(samples.torque) ** 2
+            heat = constants.T @ self.sum_by_motor(samples.torque) ** 2
         else:
             heat = at[HEAT_LOSS.name] * ca.sum1(samples.torque**2)
         return time_mean(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
@@ -144,7 +144,7 @@ class Motors:
             ratings.append(motor)
         return tuple(ratings)
 
-    def by_motor(self, torque: MX) -> MX:
+    def sum_by_motor(self, torque: MX) -> MX:
         """Return torques (J, n) with the sum of the joints that share a motor in the first one's row."""
         if not self.shared:
             return torque
@@ -176,7 +176,7 @@ class MotorLimits(Limit):
         joints = self._motors.joints
         motors = [k for k, joint in enumerate(joints) if joint not in self._motors.shared[1:]]
         names = tuple(joints[k] for k in motors)
-        loads = self._motors.by_motor(torque)[motors, :]
+        loads = self._motors.sum_by_motor(torque)[motors, :]
         ratings = [self._ratings[k] for k in motors]
         stall = DM([rating.stall_torque_Nm for rating in ratings])
         slope = DM([rating.stall_torque_Nm / rating.no_load_rad_s for rating in ratings])
@@ -186,12 +186,16 @@ class MotorLimits(Limit):
         drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
         speed = DM([self._motors.robot.joint(joint).velocity_limit_rad_s for joint in moving])
         fastest, strongest = MX(ca.repmat(speed, n, 1)), supply * ca.repmat(stall, n, 1)
-        too_fast = rows("joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, make_labels(moving, range(n)), "instant")
+        too_fast = make_rows(
+            "joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, make_labels(moving, range(n)), "instant"
+        )
         too_weak = [
-            rows(f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, make_labels(names, range(n)), "instant")
+            make_rows(
+                f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, make_labels(names, range(n)), "instant"
+            )
             for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
         ]
         continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
         rms = ca.sqrt(time_mean(loads**2))
-        too_hot = rows("continuous_torque", "Nm", rms, None, continuous, names, "root-mean-square")
+        too_hot = make_rows("continuous_torque", "Nm", rms, None, continuous, names, "root-mean-square")
         return (too_fast, *too_weak, too_hot), {}

@@ -33,7 +33,7 @@ Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
 DRAWS = 50  # of a start point, at most
 
 
-def goal_for(body: Body, criterion: Criterion) -> Goal:
+def make_goal(body: Body, criterion: Criterion) -> Goal:
     """Return the goal of a criterion, with the robot's motors and heat constant.
 
     Raises:
@@ -50,7 +50,7 @@ def goal_for(body: Body, criterion: Criterion) -> Goal:
     return Goal(heat=heat) if motors.power is None else Goal(heat=heat, power=motors.power)
 
 
-def phase_limits(
+def make_phase_limits(
     body: Body, margins: Margins, mean_limits_m: tuple[float, float], *, solved: bool = True
 ) -> tuple[Limit, ...]:
     """Return the limits of every phase (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2), and those of the robot's drives.
@@ -72,7 +72,7 @@ def phase_limits(
     )
 
 
-def phase_problem(
+def make_phase_problem(
     name: str, title: str, phase: Phase, *, start: Start | None = None, searchable: bool = True
 ) -> GaitProblem:
     """Return the problem of one phase.
@@ -90,7 +90,7 @@ def phase_problem(
 
     body = phase.body
     if not body.closed_form:
-        start = start_within_reach(phase.names, (), lambda at: phase.sample(at, Exact()).reach, start)
+        start = make_start_within_reach(phase.names, (), lambda at: phase.sample(at, Exact()).reach, start)
     problem = GaitProblem(
         name=f"{body.family}-{name}",
         title=f"{body.title}, {title}",
@@ -120,7 +120,7 @@ def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False) -> Gai
     return replace(problem, display=display)
 
 
-def start_within_reach(
+def make_start_within_reach(
     variables: Sequence[str], known: Sequence[str], reach: Callable[[Point], MX], start: Start | None
 ) -> Start:
     """Return start points at which all knees are within reach, or the nearest of some: beyond reach there is no slope back.

@@ -10,17 +10,21 @@ import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Grid, Result, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
-from nlp_gait.gaits.biped.cycle import WalkingCycle, cycle_margins, cycle_problem
-from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, cycle_variables
-from nlp_gait.gaits.biped.double_support import double_support_margins, double_support_mean_margins, support_box
+from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
+from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
+from nlp_gait.gaits.biped.double_support import (
+    compute_double_support_mean_margins,
+    make_double_support_margins,
+    make_support_box,
+)
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit
-from nlp_gait.gaits.biped.load_sharing import Division, divided_loads
-from nlp_gait.gaits.biped.phase_problem import phase_limits, phase_problem
+from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
+from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import FINE, Motion
 from nlp_gait.gaits.biped.recorded_phase import HipLimits, RecordedPhase, StandingLimits, SwingLimits
 from nlp_gait.gaits.biped.samples import Loader
-from nlp_gait.gaits.biped.single_support import single_support_loads, single_support_mean_margins
+from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,38 +68,38 @@ def make_refinable(
     return refined(1)
 
 
-def recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
+def make_recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
     """Return the loads of both phases for any angles, at which no link stays upright."""
     freed = replace(body, upright=frozenset())
-    return {"ssp": single_support_loads(freed), "dsp": divided_loads(freed, rule)}
+    return {"ssp": make_single_support_loads(freed), "dsp": make_divided_loads(freed, rule)}
 
 
-def recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, grid: Grid) -> GaitProblem:
+def make_recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, grid: Grid) -> GaitProblem:
     """Return the problem of one recorded phase, whose time is its variable."""
     height, vz0, vz1, vx0, vx1, vy0, vy1 = body.hip_variables
     ends = ({"z": height, "vx": vx0, "vy": vy0, "vz": vz0}, {"z": height, "vx": vx1, "vy": vy1, "vz": vz1})
     left = body.support[:2]
     own: Limit
     if name == "ssp":
-        margins, means = body.sole_margins(left), single_support_mean_margins(body.robot.feet["left"])
+        margins, means = body.make_sole_margins(left), compute_single_support_mean_margins(body.robot.feet["left"])
         own = SwingLimits(motion, body.lift_variable)
     else:
         foot = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))
         x, y = (foot[:, :2].mean(axis=0) + (0.0, left[1])).tolist()
-        box = support_box(body.robot, {"L": left, "R": (x, y)})
-        margins, means = double_support_margins(box), double_support_mean_margins(box)
+        box = make_support_box(body.robot, {"L": left, "R": (x, y)})
+        margins, means = make_double_support_margins(box), compute_double_support_mean_margins(box)
         own = StandingLimits()
     phase = RecordedPhase(
         body=body,
-        variables=(body.time_variable(name),),
+        variables=(body.make_time_variable(name),),
         duration=TIMES[name],
-        loads=recorded_loads(body, "printed")[name],
+        loads=make_recorded_loads(body, "printed")[name],
         grid=grid,
-        limits=(*phase_limits(body, margins, means, solved=False), HipLimits(ends, ("start", "end")), own),
+        limits=(*make_phase_limits(body, margins, means, solved=False), HipLimits(ends, ("start", "end")), own),
         goal=Goal(heat=body.heat),
         recorded=motion,
     )
-    problem = phase_problem(name, "", phase)
+    problem = make_phase_problem(name, "", phase)
     title = f"A recorded gait of {body.title}, {'single' if name == 'ssp' else 'double'} support"
     return replace(problem, name=f"recorded-{name}", title=title)
 
@@ -129,10 +133,12 @@ class RecordedCycles:
         parts = {name: motion.cut(*span) for name, span in motion.phases(touch_down_s).items()}
         step_m = float(motion.right_foot(t[-1:])[0, 0])
         x = np.array([*(part.duration_s for part in parts.values()), step_m])
-        problem = make_refinable(lambda grid: self.problem(parts, grid, motion.repeats), self.intervals, self.options)
+        problem = make_refinable(
+            lambda grid: self.make_problem(parts, grid, motion.repeats), self.intervals, self.options
+        )
         return Result(problem=problem, x=x)
 
-    def problem(self, motions: Mapping[PhaseName, Motion], grid: Grid, repeats: bool) -> GaitProblem:
+    def make_problem(self, motions: Mapping[PhaseName, Motion], grid: Grid, repeats: bool) -> GaitProblem:
         """Return the problem of both phases of a motion and the rows that join them.
 
         Args:
@@ -140,8 +146,8 @@ class RecordedCycles:
             grid: of each phase.
             repeats: another step can follow.
         """
-        body, margins = self.body, cycle_margins(self.body)
-        known = {variable.name: variable for variable in cycle_variables(body)}
+        body, margins = self.body, make_cycle_margins(self.body)
+        known = {variable.name: variable for variable in make_cycle_variables(body)}
         variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
         own: dict[PhaseName, tuple[Limit, ...]] = {
             "ssp": (
@@ -157,19 +163,19 @@ class RecordedCycles:
                 duration=TIMES[name],
                 loads=loads,
                 grid=grid,
-                limits=(*phase_limits(body, *margins[name], solved=False), *own[name]),
+                limits=(*make_phase_limits(body, *margins[name], solved=False), *own[name]),
                 goal=Goal(heat=body.heat),
                 recorded=motions[name],
             )
             for name, loads in self._loads.items()
         }
         cycle = WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=False)
-        problem = cycle_problem("recorded-cycle", cycle, rows_over_time=False, repeats=repeats)
+        problem = make_cycle_problem("recorded-cycle", cycle, rows_over_time=False, repeats=repeats)
         return replace(problem, title=f"A recorded gait of {body.title}, a walking cycle")
 
     @cached_property
     def _loads(self) -> dict[PhaseName, Loader]:
-        return recorded_loads(self.body, "lever")
+        return make_recorded_loads(self.body, "lever")
 
 
 def _hip_ranges(known: Mapping[str, Variable], switch: str) -> dict[str, Variable]:

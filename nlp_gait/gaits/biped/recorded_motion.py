@@ -79,7 +79,7 @@ class Motion:
     def right_foot(self, times: Array) -> Array:
         """Return the right sole under its ankle relative to the left one (T, 3): ahead, to the left, and above [m]."""
         (_, left_y, _), (_, height) = self.body.support, self.body.ankle("R")
-        ankle = places(self.body).map(len(times))(DM(self.spline(times).T))[2].full().T
+        ankle = make_places_function(self.body).map(len(times))(DM(self.spline(times).T))[2].full().T
         return np.asarray(ankle - (0.0, left_y, height))
 
     def mirror_image(self) -> Motion:
@@ -134,7 +134,7 @@ class FreeParts(NamedTuple):
     rotation: SX
 
 
-def free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
+def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
     """Return the places of torso and right foot of a robot on its left foot.
 
     Args:
@@ -164,19 +164,19 @@ def free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, f
 
 
 @lru_cache(maxsize=8)
-def places(body: Body) -> ca.Function:
+def make_places_function(body: Body) -> ca.Function:
     """Return a function of the angles (J,) on the left foot.
 
     Outputs: torso, hip and right ankle (3,), corners of the right sole (3, 4) [m], and the cosine of the lean.
     """
     q = SX.sym("q", len(body.joints))
-    parts = free_parts(body.robot, dict(zip(body.joints, ca.vertsplit(q), strict=True)), body.support)
+    parts = locate_free_parts(body.robot, dict(zip(body.joints, ca.vertsplit(q), strict=True)), body.support)
     hip = parts.torso + parts.rotation @ DM(body.hip_m)
     return ca.Function("places", [q], [parts.torso, hip, parts.ankle, parts.corners, parts.rotation[2, 2]])
 
 
 @lru_cache(maxsize=8)  # the phases of a few robots: every motion of one has the same
-def instant_function(body: Body, loads: Loader) -> ca.Function:
+def make_instant_function(body: Body, loads: Loader) -> ca.Function:
     """Return a function of angles and both derivatives (J,) on the left foot.
 
     Outputs: torque (J,), ZMP (2,), torso (3,), hip (3,) and its velocity, right ankle (3,), corners of the right sole (12,),
@@ -184,7 +184,7 @@ def instant_function(body: Body, loads: Loader) -> ca.Function:
     """
     joints, support = body.joints, SX(DM(body.support))
     q, qd, qdd = (SX.sym(name, len(joints)) for name in ("q", "qd", "qdd"))
-    torso, hip, ankle, corners, _ = places(body)(q)
+    torso, hip, ankle, corners, _ = make_places_function(body)(q)
     motions = {name: trajectories.Motion(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
     found = loads(Instant(joints=motions, hip=torso, ankles={"L": support, "R": ankle}))
     torque = ca.vertcat(*(found.torques[name] for name in joints))

@@ -22,9 +22,9 @@ from nlp_gait.formulation import (
     Variable,
 )
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
-from nlp_gait.gaits.biped.recorded_motion import FINE, Motion, instant_function
+from nlp_gait.gaits.biped.recorded_motion import FINE, Motion, make_instant_function
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner, Samples
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -72,7 +72,7 @@ class RecordedPhase(Phase):
             per_interval=self.grid.samples_per_interval,
             duration=at[self.duration],
             planned=q[planned, :],
-            reach=self.body.cosines(q),
+            reach=self.body.compute_cosines(q),
             torque=torque,
             power=qd[rows_of, :] * torque[rows_of, :],
             zmp=zmp,
@@ -120,7 +120,7 @@ class RecordedPhase(Phase):
 
     @property
     def _instant(self) -> ca.Function:
-        return instant_function(self.body, self.loads)
+        return make_instant_function(self.body, self.loads)
 
 
 CORNERS = ("back right", "back left", "front right", "front left")
@@ -145,7 +145,7 @@ class HipLimits(Limit):
     def __init__(self, variables: Sequence[Mapping[str, Variable]], labels: Sequence[str]) -> None:
         self._variables, self._labels = variables, labels
         unique = {v.name: v for limits in variables for v in limits.values()}
-        self.parameters = bound_parameters(tuple(unique.values()))
+        self.parameters = make_bound_parameters(tuple(unique.values()))
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         hip, rate = samples.traces["hip"], samples.traces["hip_rate"]
@@ -178,7 +178,7 @@ class SwingLimits(Limit):
 
     def __init__(self, motion: Motion, lift: Variable) -> None:
         self._motion, self._lift = motion, lift
-        self.parameters = (GROUND_TOLERANCE, *bound_parameters((lift,)))
+        self.parameters = (GROUND_TOLERANCE, *make_bound_parameters((lift,)))
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
@@ -190,10 +190,12 @@ class SwingLimits(Limit):
         lift = self._lift.name
         apart = self._inner_edge - ca.vec(sides[1::2, 1:-1])
         return (
-            rows("foot_stands", "m", ca.vec(ends), -tolerance, tolerance, make_labels(CORNERS, (0, samples.steps))),
-            rows("foot_height", "m", ca.vec(heights[:, 1:-1]), -tolerance, labels=make_labels(CORNERS, inside)),
-            rows("feet_apart", "m", apart, MX(0.0), labels=make_labels(CORNERS[1::2], inside)),
-            rows("swing_height", "m", highest, at[f"{lift}.lower"], at[f"{lift}.upper"]),
+            make_rows(
+                "foot_stands", "m", ca.vec(ends), -tolerance, tolerance, make_labels(CORNERS, (0, samples.steps))
+            ),
+            make_rows("foot_height", "m", ca.vec(heights[:, 1:-1]), -tolerance, labels=make_labels(CORNERS, inside)),
+            make_rows("feet_apart", "m", apart, MX(0.0), labels=make_labels(CORNERS[1::2], inside)),
+            make_rows("swing_height", "m", highest, at[f"{lift}.lower"], at[f"{lift}.upper"]),
         ), {"swing_height_m": highest}
 
 
@@ -208,11 +210,11 @@ class StandingLimits(Limit):
         drift = ground - ca.repmat(ca.sum2(ground) / n, 1, n)
         every = range(n)
         return (
-            rows("foot_stands", "m", ca.vec(heights), -tolerance, tolerance, make_labels(CORNERS, every)),
-            rows("foot_still", "m", ca.vec(drift), -tolerance, tolerance, make_labels(("x", "y"), every)),
+            make_rows("foot_stands", "m", ca.vec(heights), -tolerance, tolerance, make_labels(CORNERS, every)),
+            make_rows("foot_still", "m", ca.vec(drift), -tolerance, tolerance, make_labels(("x", "y"), every)),
         ), {}
 
 
-def bound_parameters(variables: Sequence[Variable]) -> tuple[Parameter, ...]:
+def make_bound_parameters(variables: Sequence[Variable]) -> tuple[Parameter, ...]:
     """Return the bounds of a planned motion's variables as parameters."""
     return tuple(bound for v in variables for bound in (v.bound("lower"), v.bound("upper")))

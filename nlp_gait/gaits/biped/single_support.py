@@ -13,7 +13,7 @@ from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, hip_on_
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
-from nlp_gait.gaits.biped.phase_problem import Criterion, goal_for, phase_limits, phase_problem
+from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader
 from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import tree_from
@@ -36,13 +36,13 @@ class Stance(NamedTuple):
     hip_y: tuple[float, float]
 
 
-def stance_of(body: Body, step_m: float) -> Stance:
+def place_stance(body: Body, step_m: float) -> Stance:
     """Place each foot below its own hip joint, and the hip halfway to the supporting one (section 4.1, Table 3)."""
     left, right = body.feet_y
     return Stance((step_m, left), (0.0, 2 * step_m), right, (step_m / 2, 1.5 * step_m), (left / 2, left / 2))
 
 
-def single_support_splines(body: Body, trajectory: Trajectory) -> Splines:
+def make_single_support_splines(body: Body, trajectory: Trajectory) -> Splines:
     """Return the splines of the phase; the swing foot stays on its line across the walking direction."""
     units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(body.angle_names("ssp"), "rad")
     return Splines(trajectory=trajectory, units=units | {"foot_x": "m", "foot_z": "m"}, length_scale=body.length_scale)
@@ -59,13 +59,13 @@ def plan_single_support(
     derivatives: Derivatives = "analytic",
 ) -> GaitProblem:
     """Return the problem of single support; for the options see ``gaits.nao``."""
-    splines = single_support_splines(body, trajectory)
+    splines = make_single_support_splines(body, trajectory)
     grid = make_grid(trajectory, intervals, samples_per_interval)
-    phase = single_support_phase(body, step_m, splines, grid, goal_for(body, objective), derivatives)
-    return phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
+    phase = make_single_support_phase(body, step_m, splines, grid, make_goal(body, objective), derivatives)
+    return make_phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
 
 
-def single_support_phase(
+def make_single_support_phase(
     body: Body,
     step_m: float,
     splines: Splines,
@@ -78,12 +78,12 @@ def single_support_phase(
     Args:
         body: the robot.
         step_m: from foot to foot.
-        splines: see ``single_support_splines``.
+        splines: see ``make_single_support_splines``.
         grid: its samples.
         goal: what it minimises.
         derivatives: of the angles.
     """
-    stance, foot = stance_of(body, step_m), body.robot.feet["left"]
+    stance, foot = place_stance(body, step_m), body.robot.feet["left"]
     left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
 
     def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
@@ -110,18 +110,20 @@ def single_support_phase(
             *body.hip_variables,
             *body.angle_variables,
             body.lift_variable,
-            body.time_variable("ssp"),
+            body.make_time_variable("ssp"),
             *splines.variables,
         ),
         duration=TIMES["ssp"],
         plan=plan,
-        loads=single_support_loads(body),
+        loads=make_single_support_loads(body),
         grid=grid,
         derivatives=derivatives,
         limits=(
-            *phase_limits(body, body.sole_margins(stance.support_xy), single_support_mean_margins(foot)),
+            *make_phase_limits(
+                body, body.make_sole_margins(stance.support_xy), compute_single_support_mean_margins(foot)
+            ),
             *((FootClearance(sole, step_m, LIFT),) if splines.count else ()),
-            *body.curve_limits("ssp", splines.count, state),
+            *body.make_curve_limits("ssp", splines.count, state),
             *body.motors.limits,
         ),
         goal=goal,
@@ -134,13 +136,13 @@ def single_support_duration(at: InstantPoint) -> SX:
     return fmax(at[TIMES["ssp"]], LEAST_DURATION)
 
 
-def single_support_mean_margins(foot: Foot) -> tuple[float, float]:
+def compute_single_support_mean_margins(foot: Foot) -> tuple[float, float]:
     """Return the least mean balance margins in x and y as shares of the sole, to a tenth of a millimetre [m]."""
     along, across = MEAN_DBM_SHARES
     return round(along * (foot.back_m + foot.front_m), 4), round(across * (foot.left_m + foot.right_m), 4)
 
 
-def nearest_edge_margins(support_xy: tuple[float, float], foot: Foot) -> Margins:
+def make_nearest_edge_margins(support_xy: tuple[float, float], foot: Foot) -> Margins:
     """Return the distances of the ZMP to the nearer edges of one sole in x and in y, whose ankle is at ``support_xy`` [m]."""
 
     def margins(zmp: MX, at: Point, ops: Nonsmooth) -> tuple[MX, MX]:
@@ -158,7 +160,7 @@ def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, 
     return stack(forward, constant_motion(y), rise._replace(position=rise.position + ankle_height))
 
 
-def single_support_loads(body: Body) -> Loader:
+def make_single_support_loads(body: Body) -> Loader:
     """Return a function of the torques from the left foot, which supports the robot, and of the ZMP under it."""
     robot, foot = body.robot, body.robot.feet["left"]
     tree = tree_from(robot, foot.link)

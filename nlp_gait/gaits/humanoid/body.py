@@ -17,7 +17,7 @@ from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
-from nlp_gait.gaits.biped.single_support import nearest_edge_margins
+from nlp_gait.gaits.biped.single_support import make_nearest_edge_margins
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
@@ -95,10 +95,10 @@ class Humanoid(Body):
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         return dict(zip(LEAN, coordinates, strict=True))
 
-    def sole_margins(self, support_xy: tuple[float, float]) -> Margins:
-        return nearest_edge_margins(support_xy, self.robot.feet["left"])
+    def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
+        return make_nearest_edge_margins(support_xy, self.robot.feet["left"])
 
-    def cosines(self, q: MX) -> MX:
+    def compute_cosines(self, q: MX) -> MX:
         angles = SX.sym("q", len(self.joints))
         legs = zip(self.biped.legs.values(), ca.vertsplit(angles, LEG_JOINT_COUNT), strict=True)
         reach = ca.Function("reach", [angles], [ca.vertcat(*(compute_reach(leg, own) for leg, own in legs))])

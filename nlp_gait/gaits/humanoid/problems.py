@@ -108,7 +108,7 @@ def humanoid_cycle(
     )
 
 
-def humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
+def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
     """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged.
 
     Args:

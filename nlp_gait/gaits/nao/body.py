@@ -84,7 +84,7 @@ def load_nao(robot: str) -> Robot:
     return welded
 
 
-def upright_links(robot: Robot) -> frozenset[str]:
+def find_upright_links(robot: Robot) -> frozenset[str]:
     """Return the links that keep the world's axes: torso, soles, and hips whose yaw-pitch joint is held at zero."""
     hips = (robot.joint(f"{side}HipYawPitch").child for side in "LR")
     return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
@@ -156,10 +156,10 @@ class NaoBody(Body):
         arms = {**{name: constant_motion(angle) for name, angle in RESTING_ARM_ANGLES.items()}, **angles}
         return upright_plan(self.robot, hip, ankles, arms, margin, ops)
 
-    def cosines(self, q: MX) -> MX:
+    def compute_cosines(self, q: MX) -> MX:
         return cos(q[[JOINTS.index(knee) for knee in KNEES], :])
 
-    def sole_margins(self, support_xy: tuple[float, float]) -> Margins:
+    def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
         """Return the balance margins in x and y on the left sole.
 
         In x the distance to the sole's edge on the side of the ankle on which the ZMP lies: it jumps at the ankle, as printed.
@@ -178,7 +178,7 @@ class NaoBody(Body):
 
         return margins
 
-    def curve_limits(
+    def make_curve_limits(
         self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
         """Return the limits of the arms' joints that swing."""
@@ -221,7 +221,7 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -
         images=tuple(map(partner, JOINTS)),
         leg_joints={side: tuple(joint for joint in JOINTS if joint.startswith(side)) for side in "LR"},
         coordinates=(ARM_COORDINATE,),
-        upright=upright_links(simulated),
+        upright=find_upright_links(simulated),
         gravity=GRAVITY,
         feet_y=(left.hip_m[1], right.hip_m[1]),
         leg_length_m=leg_length,

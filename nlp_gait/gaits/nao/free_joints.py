@@ -24,17 +24,17 @@ from nlp_gait.gaits.biped.limits import (
     REACH_MARGIN,
     Limit,
     RowsAndIndexes,
-    angle_rows,
-    halfway_rows,
-    rows_at_samples,
+    make_angle_rows,
+    make_halfway_rows,
+    make_rows_at_samples,
 )
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.recorded_motion import FreeParts, free_parts
+from nlp_gait.gaits.biped.recorded_motion import FreeParts, locate_free_parts
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.biped.single_support import (
+    make_single_support_phase,
+    make_single_support_splines,
     single_support_duration,
-    single_support_phase,
-    single_support_splines,
 )
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
@@ -91,7 +91,7 @@ class FreeMotion:
 
     def body(self, q: Mapping[str, SX]) -> FreeParts:
         """Return the places of torso and right foot for angles by joint name."""
-        return free_parts(self.paper.body.robot, q, self.support)
+        return locate_free_parts(self.paper.body.robot, q, self.support)
 
     @cached_property
     def instant(self) -> ca.Function:
@@ -140,7 +140,7 @@ class FreePhase(Phase):
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
         motions = tie(values, ops)
         torque, zmp, along, heights, sides = (tie(part, ops) for part in self.free.instant.map(n)(motions))
-        q, qd, qdd = (by_joint(part) for part in ca.vertsplit(motions, len(CURVES)))
+        q, qd, qdd = (name_rows(part) for part in ca.vertsplit(motions, len(CURVES)))
         return Samples(
             joints=JOINTS,
             moving=MOVING,
@@ -161,7 +161,7 @@ class FreePhase(Phase):
         )
 
 
-def by_joint(rows: MX) -> dict[str, MX]:
+def name_rows(rows: MX) -> dict[str, MX]:
     """Return the rows of a matrix (15, N + 1) by joint name."""
     found = dict(zip(CURVES, ca.vertsplit(rows), strict=True))
     return {name: found[YAW_PITCH if name in YAW_PITCHES else name] for name in MOVING}
@@ -183,14 +183,14 @@ class FreeLimits(Limit):
         traces, middle = samples.traces, samples.steps // 2  # the number of samples is odd
         heights, aside = traces["heights"], self._inner_edge - traces["sides"][:, 1:-1]
         return (
-            angle_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
-            rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
-            *halfway_rows(traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS),
-            rows_at_samples("feet_apart", "m", aside, CORNERS[1::2], MX(0.0), first=1),
+            make_angle_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
+            make_rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
+            *make_halfway_rows(traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS),
+            make_rows_at_samples("feet_apart", "m", aside, CORNERS[1::2], MX(0.0), first=1),
         ), {}
 
 
-def free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
+def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
     """Return single support with free joints between the ends of the paper's.
 
     Args:
@@ -200,7 +200,7 @@ def free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajecto
         grid: one of its samples is the middle.
     """
     body = replace(body, upright=frozenset())
-    paper = single_support_phase(body, step_m, single_support_splines(body, "cubic"), grid, Goal())
+    paper = make_single_support_phase(body, step_m, make_single_support_splines(body, "cubic"), grid, Goal())
     splines = Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
     _, left_y, _ = support = (step_m, *body.ankle("L"))
     motion = FreeMotion(paper=paper, splines=splines, support=support)
@@ -228,7 +228,7 @@ def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
     dense = planned.dense(FIT_FACTOR)
     assert dense is not None  # a phase has one; for the type checker
     own = x[: sum("[" not in name for name in planned.names)]
-    return np.concatenate([own, joint_coefficients(dense.signals(x), SPANS[trajectory])])
+    return np.concatenate([own, fit_coefficients(dense.signals(x), SPANS[trajectory])])
 
 
 def tie(values: MX, ops: Nonsmooth) -> MX:
@@ -236,7 +236,7 @@ def tie(values: MX, ops: Nonsmooth) -> MX:
     return ca.reshape(ops.tie(ca.vec(values)), *values.shape)
 
 
-def joint_coefficients(signals: Signals, spans: int) -> Array:
+def fit_coefficients(signals: Signals, spans: int) -> Array:
     """Return the coefficients, curve by curve, of the free motion that is nearest to another one with the same ends.
 
     Args:

@@ -15,7 +15,7 @@ from casadi import DM, MX, SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import InstantPoint, Point
 from nlp_gait.gaits.biped.body import Angles, PhaseName, State
-from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, rows_at_samples
+from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
 from nlp_gait.gaits.nao.body import NaoBody
 from nlp_gait.gaits.nao.joints import (
@@ -57,7 +57,7 @@ class LeaningNao(NaoBody):
         arms |= {name: motion for name, motion in angles.items() if name not in LEAN}
         return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=reach)
 
-    def curve_limits(
+    def make_curve_limits(
         self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
         def close(at: InstantPoint, s: SX) -> tuple[SX, SX]:
@@ -66,10 +66,10 @@ class LeaningNao(NaoBody):
             return close_chain(self.robot, ca.vertcat(hip.position, lean_of(angles).position), places)
 
         yaw_pitch = AngleLimits("other_angle", self.robot, YAW_PITCHES[:1], lambda at, s: close(at, s)[0])
-        return (*super().curve_limits(phase, count, state), yaw_pitch, FlatSoles(lambda at, s: close(at, s)[1]))
+        return (*super().make_curve_limits(phase, count, state), yaw_pitch, FlatSoles(lambda at, s: close(at, s)[1]))
 
 
-def leaning_nao(body: NaoBody) -> LeaningNao:
+def make_leaning_nao(body: NaoBody) -> LeaningNao:
     """Return the body with a free torso.
 
     Raises:
@@ -92,7 +92,7 @@ class FlatSoles(Limit):
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         turns = samples.traces["sole_turn"][:, 1:-1]
-        return [rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
+        return [make_rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
 
 
 def lean_of(angles: Angles) -> Motion:

@@ -9,7 +9,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.formulation import Point
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, rows
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.gaits.nao.joints import JOINTS, YAW_PITCHES
@@ -48,8 +48,8 @@ class AnkleCoupling(Limit):
             pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
             least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
             found += [
-                rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
-                rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
+                make_rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
+                make_rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
             ]
         return found, {}
 

@@ -13,21 +13,21 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, maker
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import (
-    double_support_phase,
-    double_support_splines,
     hip_ends,
+    make_double_support_phase,
+    make_double_support_splines,
+    place_soles,
     plan_double_support,
-    soles_of,
 )
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.phase_problem import Criterion, phase_problem
-from nlp_gait.gaits.biped.single_support import plan_single_support, stance_of
+from nlp_gait.gaits.biped.phase_problem import Criterion, make_phase_problem
+from nlp_gait.gaits.biped.single_support import place_stance, plan_single_support
 from nlp_gait.gaits.nao.body import ARM_SWING, make_nao
-from nlp_gait.gaits.nao.free_joints import fit_joints, free_single_support_phase
+from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
 from nlp_gait.gaits.nao.joints import check_step_length
-from nlp_gait.gaits.nao.leaning_torso import leaning_nao
+from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
 from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, power_form_maker
 from nlp_gait.gaits.nao.least_power.power_instants import double_support_instants, single_support_instants
 
@@ -54,7 +54,7 @@ def nao_ssp(
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
     power_form = None
     if (derivatives, trajectory, objective, motors) == FORM_OPTIONS and samples_per_interval < 2:
-        stance = stance_of(body, step_length_m)
+        stance = place_stance(body, step_length_m)
         power_form = power_form_maker(
             body.robot, partial(single_support_instants, body.robot, *stance, ARM_SWING["ssp"])
         )
@@ -98,7 +98,7 @@ def nao_dsp(
     power_form = None
     paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and samples_per_interval < 2
     if paper and torso_share != "free":
-        soles = soles_of(body, step_length_m)
+        soles = place_soles(body, step_length_m)
         places = (soles, hip_ends(body, soles), ARM_SWING["dsp"])
         power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))
     problem = plan_double_support(
@@ -180,7 +180,7 @@ def nao_ssp_free(
     if grid.parts % 2:
         raise InputError(f"intervals * samples_per_interval must be even, got {grid.parts}: one sample is the middle")
     body = make_nao(robot, rotational_inertia=rotational_inertia)
-    phase = free_single_support_phase(body, step_length_m, trajectory, grid)
+    phase = make_free_single_support_phase(body, step_length_m, trajectory, grid)
 
     @cache
     def planned() -> GaitProblem:
@@ -193,7 +193,7 @@ def nao_ssp_free(
         return fit_joints(trajectory, planned(), rng.uniform(lower, upper))
 
     title = "single support with free joints: least mean power"
-    return phase_problem("ssp-free", title, phase, start=start, searchable=False)
+    return make_phase_problem("ssp-free", title, phase, start=start, searchable=False)
 
 
 @maker
@@ -217,9 +217,9 @@ def nao_dsp_free(
         Ends, limits, loads and objective of Gupta, Pratihar, Deb (2023), section 4.2; the formulation is this package's own.
     """
     check_step_length(step_length_m)
-    body = leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia))
-    splines, sharing = double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
+    body = make_leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia))
+    splines, sharing = make_double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
-    phase = double_support_phase(body, step_length_m, splines, sharing, grid, Goal())
+    phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, Goal())
     title, start = "double support with a leaning torso: least mean power", splines.start_of(phase.names)
-    return phase_problem("dsp-free", title, phase, start=sharing.start(phase.names, start), searchable=False)
+    return make_phase_problem("dsp-free", title, phase, start=sharing.start(phase.names, start), searchable=False)

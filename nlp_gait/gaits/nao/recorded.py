@@ -11,8 +11,13 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
-from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles, RecordedGait, make_refinable, recorded_phase_problem
-from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, places
+from nlp_gait.gaits.biped.recorded_cycle import (
+    RecordedCycles,
+    RecordedGait,
+    make_recorded_phase_problem,
+    make_refinable,
+)
+from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, make_places_function
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES
 
@@ -54,7 +59,7 @@ def motion_of(angles: JointAngles, body: Body) -> Motion:
     return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
 
 
-def nao_cycles(robot: str = "nao-v5", intervals: int = 10) -> RecordedCycles:
+def make_nao_cycles(robot: str = "nao-v5", intervals: int = 10) -> RecordedCycles:
     """Return NAO and the limits of ``nao-cycle``, by which its recorded cycles are judged.
 
     Args:
@@ -90,7 +95,7 @@ def make_recorded_gait(
     """
     if gait is not None and gait not in GAITS:
         raise InputError(f"a motion is judged by the limits of {', '.join(GAITS)}, got {gait!r}")
-    cycles = nao_cycles(robot, intervals)
+    cycles = make_nao_cycles(robot, intervals)
     body = cycles.body
     motion = motion_of(angles, body)
     phases: dict[PhaseName, tuple[float, float]]
@@ -111,11 +116,11 @@ def make_recorded_gait(
     else:
         (name,) = phases
         problem = make_refinable(
-            lambda grid: recorded_phase_problem(body, name, motion, grid), intervals, cycles.options
+            lambda grid: make_recorded_phase_problem(body, name, motion, grid), intervals, cycles.options
         )
         x = (motion.duration_s,)
         step = float(foot[1, 0] - foot[0, 0]) / 2 if name == "ssp" else step
-    cosine = float(places(body)(motion.q[0])[4])
+    cosine = float(make_places_function(body)(motion.q[0])[4])
     return RecordedGait(
         gait=found,
         problem=problem,

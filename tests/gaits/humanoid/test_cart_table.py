@@ -11,7 +11,7 @@ from nlp_gait.formulation import Array, Result, Signals, load, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.humanoid.body import GRAVITY
-from nlp_gait.gaits.humanoid.problems import humanoid_cycles
+from nlp_gait.gaits.humanoid.problems import make_humanoid_cycles
 from tests.pinocchio_oracle import Standing, floating_model, stand
 from tests.robots.crooked import SOLE_AHEAD_M, crooked
 
@@ -31,7 +31,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="module")
 def cycles(path: str) -> RecordedCycles:
-    return humanoid_cycles(path, intervals=4)
+    return make_humanoid_cycles(path, intervals=4)
 
 
 @pytest.fixture(scope="module")

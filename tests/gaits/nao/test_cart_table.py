@@ -11,7 +11,7 @@ from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, Walker, plan_cart_table_walk
 from nlp_gait.gaits.biped.preview_control import JERK_WEIGHT, PreviewController
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
-from nlp_gait.gaits.nao.recorded import nao_cycles
+from nlp_gait.gaits.nao.recorded import make_nao_cycles
 
 STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3, lift_m=0.015)
 
@@ -21,7 +21,7 @@ def histories(gait: Result) -> dict[str, Array]:
 
 
 def walker() -> Walker:
-    return Walker(cycles=nao_cycles(), footsteps=STEPS)
+    return Walker(cycles=make_nao_cycles(), footsteps=STEPS)
 
 
 def test_preview_control_is_the_least_squares_optimum() -> None:
@@ -69,7 +69,7 @@ def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_
 @pytest.fixture(scope="module")
 def walks() -> dict[int, Result]:
     """The same footsteps with the cart alone, and with the whole body's ZMP."""
-    return {passes: plan_cart_table_walk(nao_cycles(), STEPS, passes=passes) for passes in (1, 2)}
+    return {passes: plan_cart_table_walk(make_nao_cycles(), STEPS, passes=passes) for passes in (1, 2)}
 
 
 @pytest.mark.slow
@@ -94,7 +94,7 @@ def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Result]) ->
 
 @pytest.mark.slow
 def test_another_robot_walks_on_its_own_legs() -> None:
-    gait = plan_cart_table_walk(nao_cycles("nao-v6", 2), STEPS, passes=1)
+    gait = plan_cart_table_walk(make_nao_cycles("nao-v6", 2), STEPS, passes=1)
     assert gait.problem.options["robot"] == "nao-v6" and gait.problem.display.robot is not None
     assert gait.problem.display.robot.name == load_nao("nao-v6").name
 
@@ -113,4 +113,4 @@ def test_another_robot_walks_on_its_own_legs() -> None:
 )
 def test_footsteps_that_are_no_walk_are_refused(change: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        plan_cart_table_walk(nao_cycles(), Footsteps(**{**vars(STEPS), **change}))
+        plan_cart_table_walk(make_nao_cycles(), Footsteps(**{**vars(STEPS), **change}))

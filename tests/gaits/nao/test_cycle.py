@@ -7,7 +7,7 @@ import pytest
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
-from nlp_gait.gaits.biped.cycle import walking_cycle
+from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import share_load
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
@@ -76,7 +76,9 @@ def phases(problem: GaitProblem, x: Array) -> tuple[Signals, Signals]:
     body = make_nao("nao-v5")
     sharing = share_load(body, problem.options["torso_share"])  # type: ignore[arg-type]
     assert problem.grid is not None
-    cycle = walking_cycle(body, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power")
+    cycle = make_walking_cycle(
+        body, sharing, problem.grid, Goal(), at_given_speed=problem.options["objective"] == "power"
+    )
     found = cycle.signals(problem.at(x))
     return found["ssp"], found["dsp"]
 

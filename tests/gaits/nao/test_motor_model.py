@@ -159,8 +159,8 @@ def test_features() -> None:
 
 def test_joints_that_share_a_motor() -> None:
     torque: Any = MX(DM(TORQUE))
-    assert Motors.parse("heat", ROBOT, JOINTS).by_motor(torque) is torque
-    shared = np.array(ca.evalf(Motors.parse("heat", ROBOT, JOINTS, YAW_PITCHES).by_motor(torque)))
+    assert Motors.parse("heat", ROBOT, JOINTS).sum_by_motor(torque) is torque
+    shared = np.array(ca.evalf(Motors.parse("heat", ROBOT, JOINTS, YAW_PITCHES).sum_by_motor(torque)))
     np.testing.assert_allclose(np.delete(shared, JOINTS.index("RHipYawPitch"), axis=0), at_motors(), rtol=1e-15)
     assert not shared[JOINTS.index("RHipYawPitch")].any()
     inertia = {

@@ -14,7 +14,7 @@ from scipy.optimize import linprog
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
-from nlp_gait.gaits.biped.cycle import walking_cycle
+from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import RAMP_SHARE, load_basis, share_load
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
@@ -66,7 +66,7 @@ def double_support(name: str, x: Array) -> Signals:
         return problem.signals(x)
     body = make_nao("nao-v5")
     assert problem.grid is not None
-    cycle = walking_cycle(body, share_load(body, "free"), problem.grid, Goal(), at_given_speed=True)
+    cycle = make_walking_cycle(body, share_load(body, "free"), problem.grid, Goal(), at_given_speed=True)
     return cycle.signals(problem.at(x))["dsp"]
 
 

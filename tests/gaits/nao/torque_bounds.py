@@ -17,8 +17,8 @@ import nlp_gait
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.gaits.biped.curves import hip_motion
-from nlp_gait.gaits.biped.single_support import stance_of, swing_foot
-from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, make_nao, upright_links, upright_plan
+from nlp_gait.gaits.biped.single_support import place_stance, swing_foot
+from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, find_upright_links, make_nao, upright_plan
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
 from nlp_gait.proofs.affine import AffineFunction
@@ -152,7 +152,7 @@ def enclose_sample(edge: float) -> tuple[Errors, Errors]:
 def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
     body = make_nao("nao-v5")
     robot = body.robot
-    stance, foot, tree = stance_of(body, STEP_M), robot.feet["left"], tree_from(robot, robot.feet["left"].link)
+    stance, foot, tree = place_stance(body, STEP_M), robot.feet["left"], tree_from(robot, robot.feet["left"].link)
     z = SX.sym("z", len(names))
     time, phase = z[-1], SX(PHASE)
     sums = [part / time for k in (1, 3, 5) for part in (z[k] + z[k + 1], z[k] - z[k + 1])]
@@ -175,7 +175,7 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
     else:
         joints = upright_plan(robot, hip, ankles, arms, SX(REACH_MARGIN), Exact()).joints
         q, qd, qdd = ({name: joint[order] for name, joint in joints.items()} for order in range(3))
-        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=upright_links(robot))
+        torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=find_upright_links(robot))
     zmp = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
     return ca.Function("sample", [z], [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS), zmp))])
 

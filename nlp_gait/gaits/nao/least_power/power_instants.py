@@ -13,7 +13,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.biped.double_support import Point2, support_box
+from nlp_gait.gaits.biped.double_support import Point2, make_support_box
 from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
@@ -223,7 +223,7 @@ def double_support_instants(
         found.zmp = sum(moments, SX(2, 1)) / sum(loads, SX(0))
         return found
 
-    box = support_box(robot, soles)
+    box = make_support_box(robot, soles)
     sides = ((box.back, box.front), (box.right, box.left))
     return PowerPhase(instant, sides, {axis: _nearer_margin(*pair) for axis, pair in zip("xy", sides, strict=True)})
 
@@ -283,7 +283,7 @@ def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
 
 
 def _ankle_side_margin(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
-    """Return the distance to the side beyond the ankle, see ``NaoBody.sole_margins``."""
+    """Return the distance to the side beyond the ankle, see ``NaoBody.make_sole_margins``."""
     return lambda at: (high - at) - ca.if_else(at - ankle < 0, (high - at) - (at - low), 0)
 
 
