@@ -41,23 +41,15 @@ class Points:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseFindings:
-    """Results of one support phase.
+    """Results of one support phase."""
 
-    Attributes:
-        paper: numbers in print.
-        problem: our problem.
-        searches: runs by search, in the order of their seeds; equal runs start from the same population.
-        starts: of IPOPT.
-        sweeps: IPOPT's optima over each variable, by its position in x.
-        points: by search.
-    """
-
-    paper: PrintedPhase
-    problem: GaitProblem
+    paper: PrintedPhase  # numbers in print
+    problem: GaitProblem  # our problem
+    # Runs by search, in the order of their seeds; equal runs start from the same population
     searches: Mapping[str, Sequence[RunRecord]]
-    starts: Sequence[RunRecord]
-    sweeps: Mapping[int, Sequence[SweepPoint]]
-    points: Mapping[str, Points]
+    starts: Sequence[RunRecord]  # of IPOPT
+    sweeps: Mapping[int, Sequence[SweepPoint]]  # IPOPT's optima over each variable, by its position in x
+    points: Mapping[str, Points]  # by search
 
     @cached_property
     def optimum(self) -> RunRecord:
@@ -134,21 +126,13 @@ class PhaseFindings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NaoFindings:
-    """All results.
+    """All results."""
 
-    Attributes:
-        ssp: single support.
-        dsp: double support.
-        swing: IPOPT's optima of single support over the paper's swing heights.
-        durations: likewise over durations.
-        lever: IPOPT's starts for double support with the lever rule for the torso's share.
-    """
-
-    ssp: PhaseFindings
-    dsp: PhaseFindings
-    swing: Sequence[SweepPoint]
-    durations: Sequence[SweepPoint]
-    lever: Sequence[RunRecord]
+    ssp: PhaseFindings  # single support
+    dsp: PhaseFindings  # double support
+    swing: Sequence[SweepPoint]  # IPOPT's optima of single support over the paper's swing heights
+    durations: Sequence[SweepPoint]  # likewise over durations
+    lever: Sequence[RunRecord]  # IPOPT's starts for double support with the lever rule for the torso's share
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:

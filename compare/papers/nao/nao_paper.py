@@ -16,52 +16,31 @@ from compare.analysis.statistics.inference import RankSum
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedOptimum:
-    """A solution as printed.
+    """A solution as printed."""
 
-    Attributes:
-        x: decision variables, in the order of x1, x2, ...
-        power_W: least mean power.
-        indexes: performance figures, named as the problem's indexes.
-    """
-
-    x: tuple[float, ...]
-    power_W: float
-    indexes: Mapping[str, float]
+    x: tuple[float, ...]  # x1, x2 and so on
+    power_W: float  # least mean power
+    indexes: Mapping[str, float]  # performance figures, named as the problem's indexes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedPhase:
-    """Numbers of one support phase as printed, and where they are.
+    """Numbers of one support phase as printed, and where they are."""
 
-    Attributes:
-        problem: name of the problem here.
-        title: in words.
-        optima: by search algorithm (Tables 6 and 8, 7 and 9).
-        test: section 5.3; p_less is NaN where the paper gives none.
-        tables: numbers of the tables of variables and of indexes.
-        convergence_figure: number of the figure of best per generation.
-        scatter_figures: number of each figure of the objective against variables, to the positions of these in x.
-        duration: position of the phase's time in x.
-        poses_every_s: time between the poses of Fig. 20.
-        better: section that says that PSO is better than GA.
-        steadier: that its runs differ less.
-        higher_hip: that a higher hip saves power.
-        slower: that a longer phase does.
-    """
-
-    problem: str
-    title: str
-    optima: Mapping[str, PrintedOptimum]
-    test: RankSum
-    tables: tuple[int, int]
-    convergence_figure: int
+    problem: str  # name of the problem here
+    title: str  # in words
+    optima: Mapping[str, PrintedOptimum]  # by search algorithm (Tables 6 and 8, 7 and 9)
+    test: RankSum  # section 5.3; p_less is NaN where the paper gives none
+    tables: tuple[int, int]  # numbers of the tables of variables and of indexes
+    convergence_figure: int  # number of the figure of best per generation
+    # Number of each figure of the objective against variables, to the positions of these in x
     scatter_figures: Mapping[int, tuple[int, ...]]
-    duration: int
-    poses_every_s: float
-    better: str
-    steadier: str
-    higher_hip: str
-    slower: str
+    duration: int  # position of the phase's time in x
+    poses_every_s: float  # time between the poses of Fig. 20
+    better: str  # section that says that PSO is better than GA
+    steadier: str  # that its runs differ less
+    higher_hip: str  # that a higher hip saves power
+    slower: str  # that a longer phase does
 
 
 def _indexes(*values: float) -> dict[str, float]:

@@ -23,30 +23,19 @@ NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measures:
-    """Measures of R runs of one search with one budget at L looks.
+    """Measures of R runs of one search with one budget at L looks."""
 
-    Attributes:
-        algorithm: name of the search.
-        budget: allowed evaluations.
-        evaluations: (L,) before each look.
-        hypervolume: (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point.
-        igd: (R, L) mean distance from a point of the true front, evenly along it, to the nearest one found; infinite without
-            one.
-        feasible: (R,) share of the evaluated points that are feasible.
-        first_feasible: (R,) number of the first of these; infinite without one.
-        time_s: (R,) processor time [s].
-        objective_time_s: (R,) of it in the objectives [s].
-    """
-
-    algorithm: str
-    budget: int
-    evaluations: Array
+    algorithm: str  # name of the search
+    budget: int  # allowed evaluations
+    evaluations: Array  # (L,) before each look
+    # (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point
     hypervolume: Array
+    # (R, L) mean distance from a point of the true front, evenly along it, to the nearest one found; infinite without one
     igd: Array
-    feasible: Array
-    first_feasible: Array
-    time_s: Array
-    objective_time_s: Array
+    feasible: Array  # (R,) share of the evaluated points that are feasible
+    first_feasible: Array  # (R,) number of the first of these; infinite without one
+    time_s: Array  # (R,) processor time [s]
+    objective_time_s: Array  # (R,) of it in the objectives [s]
 
     def until(self, share: float) -> Array:
         """Return (R,) evaluations at the first look with at least a share of the hypervolume; infinite if never."""
@@ -61,21 +50,13 @@ class Measures:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseFindings:
-    """Results of one support phase.
+    """Results of one support phase."""
 
-    Attributes:
-        problem: the phase, without its constraint on the criterion.
-        criterion: the second objective.
-        first_front: of the gradient method alone, whose ranges count as 1 in the searches.
-        answer: the front after solving from the searches' best points.
-        runs: of all searches.
-    """
-
-    problem: GaitProblem
-    criterion: CompetingObjective
-    first_front: Sequence[FrontPoint]
-    answer: Challenge
-    runs: Sequence[FrontRun]
+    problem: GaitProblem  # the phase, without its constraint on the criterion
+    criterion: CompetingObjective  # the second objective
+    first_front: Sequence[FrontPoint]  # of the gradient method alone, whose ranges count as 1 in the searches
+    answer: Challenge  # the front after solving from the searches' best points
+    runs: Sequence[FrontRun]  # of all searches
 
     @property
     def front(self) -> tuple[FrontPoint, ...]:
@@ -130,15 +111,10 @@ class PhaseFindings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParetoFindings:
-    """All results.
+    """All results."""
 
-    Attributes:
-        phases: single and double support.
-        effort: what was computed.
-    """
-
-    phases: tuple[PhaseFindings, ...]
-    effort: ParetoEffort
+    phases: tuple[PhaseFindings, ...]  # single and double support
+    effort: ParetoEffort  # what was computed
 
 
 def spread_evenly(front: Array) -> Array:

@@ -40,19 +40,12 @@ class ParetoEffort(Effort):
 
 @dataclass(frozen=True, kw_only=True)
 class FrontRun:
-    """Run of a search.
+    """Run of a search."""
 
-    Attributes:
-        algorithm: name of the search.
-        run: number of the run.
-        budget: allowed evaluations.
-        looks: in the order of their evaluations; only the last one, the end, has points.
-    """
-
-    algorithm: str
-    run: int
-    budget: int
-    looks: tuple[Snapshot, ...]
+    algorithm: str  # name of the search
+    run: int  # number of the run
+    budget: int  # allowed evaluations
+    looks: tuple[Snapshot, ...]  # in the order of their evaluations; only the last one, the end, has points
 
 
 def make_spec(phase: str, effort: ParetoEffort) -> ProblemSpec:

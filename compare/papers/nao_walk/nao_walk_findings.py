@@ -16,23 +16,15 @@ SAGITTAL = (KNEE, "HipPitch", "AnklePitch")  # kinds of joints that turn in the 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NaoWalkFindings:
-    """All results.
+    """All results."""
 
-    Attributes:
-        effort: what was computed.
-        speeds: by source of the heat constant, the cheapest gaits in the order of their speeds.
-        torsos: the robot's own walk in the order of its heights.
-        straighter: by heat constant, cheapest gaits at the default speed.
-        joints: by gait, energy of its joints.
-        drives: by feed-forward, the robot's own walk from full stiffness downwards.
-    """
-
-    effort: NaoWalkEffort
+    effort: NaoWalkEffort  # what was computed
+    # Cheapest gaits in the order of their speeds, by source of the heat constant.
     speeds: Mapping[str, Sequence[Point]]
-    torsos: Sequence[Point]
-    straighter: Mapping[str, Point]
-    joints: Mapping[str, Point]
-    drives: Mapping[str, Sequence[Point]]
+    torsos: Sequence[Point]  # the robot's own walk in the order of its heights
+    straighter: Mapping[str, Point]  # by heat constant, cheapest gaits at the default speed
+    joints: Mapping[str, Point]  # by gait, energy of its joints
+    drives: Mapping[str, Sequence[Point]]  # by feed-forward, the robot's own walk from full stiffness downwards
 
     def curve(self, heat: str) -> list[Point]:
         """Return the feasible gaits over speed."""

@@ -6,31 +6,18 @@ from typing import NamedTuple
 
 
 class Case(NamedTuple):
-    """A column of Table IV; units as printed, the last three without one in the paper but for the torque.
+    """A column of Table IV; units as printed, the last three without one in the paper but for the torque."""
 
-    Attributes:
-        stair_length_m: of a double step.
-        rise_run_ratio: rise over run.
-        acceleration: largest, printed in m/s^2, of joint angles [rad/s^2].
-        jerk: largest, printed in m/s^3 [rad/s^3].
-        torso_pitch_rad: q5.
-        kp: K_p.
-        kd: K_d.
-        cost: of (53).
-        energy: total consumption, without a unit.
-        peak_torque_Nm: largest torque.
-    """
-
-    stair_length_m: float
-    rise_run_ratio: float
-    acceleration: float
-    jerk: float
-    torso_pitch_rad: float
-    kp: float
-    kd: float
-    cost: float
-    energy: float
-    peak_torque_Nm: float
+    stair_length_m: float  # of a double step
+    rise_run_ratio: float  # rise over run
+    acceleration: float  # largest, printed in m/s^2, of joint angles [rad/s^2]
+    jerk: float  # largest, printed in m/s^3 [rad/s^3]
+    torso_pitch_rad: float  # q5
+    kp: float  # K_p
+    kd: float  # K_d
+    cost: float  # of (53)
+    energy: float  # total consumption, without a unit
+    peak_torque_Nm: float  # largest torque
 
     @property
     def step_m(self) -> tuple[float, float]:

@@ -32,19 +32,12 @@ STEP_M = 1e-4  # of a difference quotient
 
 @dataclass(frozen=True, kw_only=True)
 class Walk12Findings:
-    """All results of the reproduction.
+    """All results of the reproduction."""
 
-    Attributes:
-        effort: what was computed.
-        runs: by title of the problem and solver.
-        weighted: optima of the weighted sum over lambda.
-        front: largest f1 for each step length.
-    """
-
-    effort: Walk12Effort
-    runs: Runs
-    weighted: Sequence[PathPoint]
-    front: Sequence[PathPoint]
+    effort: Walk12Effort  # what was computed
+    runs: Runs  # by title of the problem and solver
+    weighted: Sequence[PathPoint]  # optima of the weighted sum over lambda
+    front: Sequence[PathPoint]  # largest f1 for each step length
     f1_of_table_3: Sequence[float] = field(default_factory=lambda: [compute_f1(row) for row in TABLE_3])
 
     def records(self, label: str, weight: float, solver: str) -> Sequence[RunRecord]:

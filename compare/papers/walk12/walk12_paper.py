@@ -14,21 +14,13 @@ F2MAX = 0.13  # [m]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRow:
-    """A row of Table III (step time 1 s) or Table IV (lambda 0.15).
+    """A row of Table III (step time 1 s) or Table IV (lambda 0.15)."""
 
-    Attributes:
-        weight: lambda.
-        step_time_s: T.
-        x: s, n, H, h [m].
-        f1max: f1 that counts as 1 [1/(m^2 s)].
-        f: the objective as printed.
-    """
-
-    weight: float
-    x: tuple[float, float, float, float]
-    f: float
-    step_time_s: float = 1.0
-    f1max: float = F1MAX
+    weight: float  # lambda
+    x: tuple[float, float, float, float]  # s, n, H, h [m]
+    f: float  # the objective as printed
+    step_time_s: float = 1.0  # T
+    f1max: float = F1MAX  # f1 that counts as 1 [1/(m^2 s)]
 
     @property
     def implied_f1(self) -> float:
