@@ -119,8 +119,8 @@ def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest
     done = run("sweep", "walk12", *over, "--out", str(tmp_path))
     table = (tmp_path / "walk12-sweep-step_length_m-ipopt.csv").read_text().splitlines()
     assert 2 < len(table) < 31
-    assert f"after {len(table) - 1} of 30 points; these are in {tmp_path}, not all of them solved from" in done.stderr
-    assert done.stderr.endswith("both sides; the same command continues\n")
+    assert f"after {len(table) - 1} of 30 points, not all of them solved in both directions" in done.stderr
+    assert done.stderr.endswith(f"the results are in {tmp_path}; rerun the command to continue\n")
 
 
 @pytest.mark.slow
@@ -129,10 +129,8 @@ def test_sweep_by_a_search_writes_the_points_that_it_has(tmp_path: Path, monkeyp
     over = ["--over", "step_length_m=0.05:0.12:30", "--algorithm", "pso", "--evaluations", "500"]
     done = run("sweep", "walk12", *over, "--out", str(tmp_path))
     table = (tmp_path / "walk12-sweep-step_length_m-pso.csv").read_text().splitlines()
-    assert (
-        len(table) == 3
-        and f"after 2 of 30 points; these are in {tmp_path}; the same command continues\n" in done.stderr
-    )
+    assert len(table) == 3
+    assert f"after 2 of 30 points; the results are in {tmp_path}; rerun the command to continue\n" in done.stderr
 
 
 def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,13 +199,13 @@ def gait(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.slow
-def test_simulate_keeps_the_playback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gait: str) -> None:
+def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gait: str) -> None:
     pytest.importorskip("mujoco")
     from nlp_gait.simulation import robustness
 
     monkeypatch.setattr(robustness, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
     done = run("simulate", gait, "--robustness", "--out", str(tmp_path))
-    assert f"interrupted in the tests of robustness; the playback is kept in {tmp_path}" in done.stderr
+    assert f"interrupted in the tests of robustness; the simulation is stored in {tmp_path}" in done.stderr
     assert {"report.json", "model.xml", "simulation.npz"} <= {path.name for path in tmp_path.iterdir()}
     assert "robustness" not in json.loads((tmp_path / "report.json").read_text())
 
@@ -281,10 +279,8 @@ def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkey
 
     press_after(monkeypatch, Figure, "savefig", 1)
     done = run(*asked)
-    assert (
-        done.stderr
-        == f"nlp-gait: interrupted at the end; what was found is in {tmp_path}; the same command continues\n"
-    )
+    sentence = f"interrupted at the end; the results are in {tmp_path}; rerun the command to continue"
+    assert done.stderr == f"nlp-gait: {sentence}\n"
     assert "walk12 by ipopt" in done.stdout and len(list(tmp_path.glob("*.png"))) == 1
 
 

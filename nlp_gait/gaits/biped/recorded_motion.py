@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import DM, SX
-from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
@@ -22,6 +21,9 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.simplification import simplify
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 LEAST_ROWS = 5
 SAME_TIME_S = 1e-9
@@ -58,6 +60,8 @@ class Motion:
     @cached_property
     def spline(self) -> CubicSpline:
         """Angles over time; continuous accelerations."""
+        from scipy.interpolate import CubicSpline  # takes longer to import than everything else
+
         return CubicSpline(self.t, self.q)
 
     def cut(self, start_s: float, end_s: float) -> Motion:
@@ -73,6 +77,8 @@ class Motion:
         rows = self.t[own]
         inside = rows[(rows > start_s + SAME_TIME_S) & (rows < end_s - SAME_TIME_S)]
         times = np.array([start_s, *inside, end_s])
+        from scipy.interpolate import CubicSpline
+
         q = CubicSpline(rows, self.q[own])(times)
         return replace(self, t=times - start_s, q=q)
 
