@@ -21,15 +21,7 @@ from metaheuristics.settings import check_number
 
 
 def mark_failed(f: Array, violation: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Give failed evaluations, those with a NaN or infinity in f or violation, the values that rank last.
-
-    Args:
-        f: (P,) objective values.
-        violation: (P,) constraint violations.
-
-    Returns:
-        f and violation, copied, with infinity in both where the evaluation failed, and the (P,) mask of failures.
-    """
+    """Return copies of f and violation (P,) with infinity where either is NaN or infinite, and the (P,) mask of these."""
     failed = ~(np.isfinite(f) & np.isfinite(violation))
     return np.where(failed, np.inf, f), np.where(failed, np.inf, violation), failed
 
@@ -46,45 +38,19 @@ class Rule:
     keys: Callable[[Array, Array], tuple[Array, Array]]
 
     def better(self, f1: Array, violation1: Array, f2: Array, violation2: Array) -> NDArray[np.bool_]:
-        """Compare pairs.
-
-        Args:
-            f1: (P,) objectives of the first points.
-            violation1: (P,) violations of the first points.
-            f2: (P,) objectives of the second points.
-            violation2: (P,) violations of the second points.
-
-        Returns:
-            (P,) True where the first point is strictly better.
-        """
+        """Compare pairs by objectives and violations (P,) each; return (P,) True where the first is strictly better."""
         major1, minor1 = self.keys(f1, violation1)
         major2, minor2 = self.keys(f2, violation2)
         better: NDArray[np.bool_] = (major1 < major2) | ((major1 == major2) & (minor1 < minor2))
         return better
 
     def order(self, f: Array, violation: Array) -> NDArray[np.intp]:
-        """Sort points.
-
-        Args:
-            f: (P,) objectives.
-            violation: (P,) violations.
-
-        Returns:
-            (P,) indices, best first; equals keep their order.
-        """
+        """Return the (P,) indices that sort points, best first; equals keep their order."""
         major, minor = self.keys(f, violation)
         return np.lexsort((minor, major))
 
     def best(self, f: Array, violation: Array) -> int:
-        """Find the best point.
-
-        Args:
-            f: (P,) objectives.
-            violation: (P,) violations.
-
-        Returns:
-            Index of the best point, the first of equals.
-        """
+        """Return the index of the best point, the first of equals."""
         return int(self.order(f, violation)[0])
 
 
@@ -96,14 +62,11 @@ class ConstraintHandling(Protocol):
         """Name in reports."""
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Give the rule in force.
+        """Return the current rule.
 
         Args:
             progress: Share of the evaluation budget used, 0 to 1.
             initial_violation: (P,) violations of the first generation; infinity where failed.
-
-        Returns:
-            The rule.
         """
 
 
@@ -125,7 +88,7 @@ class Deb:
     name: ClassVar[str] = "Deb's feasibility rules"
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Give `FEASIBILITY`, at any time; see `ConstraintHandling.rule`."""
+        """Return `FEASIBILITY`; see `ConstraintHandling.rule`."""
         return FEASIBILITY
 
 
@@ -147,7 +110,7 @@ class StaticPenalty:
         check_number(self, "weight", above=0.0)
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Give the penalty rule, the same at any time; see `ConstraintHandling.rule`."""
+        """Return the penalty rule; see `ConstraintHandling.rule`."""
         return Rule(keys=lambda f, violation: (np.zeros_like(f), f + self.weight * violation))
 
 
@@ -182,20 +145,12 @@ class EpsilonLevel:
         check_number(self, "control", above=0.0, at_most=1.0)
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Give the rule of the epsilon in force; see `ConstraintHandling.rule`."""
+        """Return the rule of the current epsilon; see `ConstraintHandling.rule`."""
         epsilon = self.epsilon(progress, initial_violation)
         return Rule(keys=lambda f, violation: (np.where(violation <= epsilon, 0.0, violation), f))
 
     def epsilon(self, progress: float, initial_violation: Array) -> float:
-        """Give the violation that counts as none.
-
-        Args:
-            progress: Share of the evaluation budget used, 0 to 1.
-            initial_violation: (P,) violations of the first generation; infinity where failed.
-
-        Returns:
-            Epsilon, in units of the violation; 0 if every initial evaluation failed.
-        """
+        """Return the violation that counts as none; 0 if every initial evaluation failed. See `rule`."""
         finite = np.sort(initial_violation[np.isfinite(initial_violation)])
         if progress >= self.control or not finite.size:
             return 0.0

@@ -31,13 +31,7 @@ class Evaluator:
     """
 
     def __init__(self, objective: BatchObjective, callback: Callback | None, thinned: bool = False) -> None:
-        """Start the clock.
-
-        Args:
-            objective: What to evaluate.
-            callback: Called after each generation; None for nothing.
-            thinned: Keep one entry of the history for each better point, and the last one.
-        """
+        """Start the clock; a thinned history has one entry for each better point, and the last one."""
         self._objective = objective
         self._callback = callback
         self._thinned = thinned
@@ -57,10 +51,7 @@ class Evaluator:
         return perf_counter() - self._started
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Evaluate a generation, record it and call the callback.
-
-        Args:
-            X: (P, n) points, P >= 1.
+        """Evaluate points (P, n), record them and call the callback.
 
         Returns:
             (P,) objectives and (P,) violations, new arrays, infinite where failed.

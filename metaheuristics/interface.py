@@ -40,14 +40,10 @@ class BatchObjective(Bounded, Protocol):
     """An objective to be minimised within bounds, called on many points at once."""
 
     def __call__(self, X: Array, /) -> tuple[Array, Array]:
-        """Evaluate points.
+        """Return objective values (P,) and total violations (P,) of points (P, n) within the bounds; P varies.
 
-        Args:
-            X: (P, n) points within the bounds, read-only. P varies from call to call.
-
-        Returns:
-            (P,) objective values, and (P,) total constraint violations: >= 0, and zero if and only if the point is
-            feasible. A NaN or an infinite value in either marks the evaluation of that point as failed.
+        A violation is >= 0, and zero if and only if the point is feasible. NaN or infinity in either value marks the
+        evaluation as failed. X is read-only.
         """
 
 
@@ -107,11 +103,7 @@ class Search(Protocol):
     """A run in progress: `ask`, evaluate, `tell`, `stop`, and again."""
 
     def ask(self) -> Array:
-        """Propose points.
-
-        Returns:
-            (P, n) points within the bounds. The search must not change the array afterwards; P may vary.
-        """
+        """Return points (P, n) within the bounds; P may vary. The search must not change the array afterwards."""
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule, /) -> None:
         """Learn from the points of the last `ask`.
@@ -127,11 +119,7 @@ class Search(Protocol):
         """
 
     def stop(self) -> tuple[str, ...]:
-        """Return the reasons why the search cannot usefully continue.
-
-        Returns:
-            Reasons in words; empty to continue.
-        """
+        """Return reasons in words why the search cannot usefully continue; empty to continue."""
 
 
 class PopulationSearch(Generic[Settings]):
@@ -164,14 +152,7 @@ class Algorithm(Protocol):
         """Number of starting points."""
 
     def start(self, start: Start, /) -> Search:
-        """Begin a run.
-
-        Args:
-            start: Bounds, starting points, budget and generator.
-
-        Returns:
-            The search, ready for `ask`.
-        """
+        """Begin a run with bounds, starting points, budget and generator."""
 
 
 # Evaluates points (P, n) as a generation; raises `Ended` once the run is over.

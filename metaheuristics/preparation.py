@@ -36,13 +36,7 @@ def prepare_start(
 
 
 def read_bounds(objective: Bounded) -> tuple[Array, Array]:
-    """Copy the bounds.
-
-    Args:
-        objective: Its names and bounds are read.
-
-    Returns:
-        (n,) lower and (n,) upper bounds, read-only.
+    """Return read-only copies of the lower and upper bounds, (n,) each.
 
     Raises:
         SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
@@ -242,17 +236,9 @@ def plain_entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
 def starting_points(
     lower: Array, upper: Array, population: int, given: ArrayLike | None, seed: np.random.SeedSequence
 ) -> Array:
-    """Draw uniform points and put the given ones first.
+    """Return uniform points (P, n), read-only, of which given ones (R, n) replace the first R.
 
-    Args:
-        lower: (n,) lower bounds.
-        upper: (n,) upper bounds.
-        population: Number of points, P.
-        given: (R, n) points that replace the first R, R <= P; None for none.
-        seed: Determines the draws. They fill row by row, so that the first rows do not depend on P.
-
-    Returns:
-        (P, n) points, read-only.
+    Draws fill row by row, so that the first rows do not depend on P.
 
     Raises:
         SearchError: The given points have another shape or lie outside the bounds.

@@ -90,9 +90,6 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
         name: A key of `ALGORITHMS` or `ADAPTERS`.
         settings: Settings that differ from the defaults.
 
-    Returns:
-        The algorithm.
-
     Raises:
         SearchError: Unknown name or setting (the nearest known ones are suggested), a value that is not allowed, or the
             package that it comes from is not installed.
@@ -112,15 +109,7 @@ def _package(name: str) -> str:
 
 
 def handling(name: str, /, **settings: object) -> ConstraintHandling:
-    """Make a constraint handling by name.
-
-    Args:
-        name: A key of `HANDLINGS`.
-        settings: Settings that differ from the defaults.
-
-    Raises:
-        SearchError: Unknown name or setting, a setting that is missing, or a value that is not allowed.
-    """
+    """Make a constraint handling by its name in `HANDLINGS`; raises SearchError as `algorithm` does."""
     return make_by_name("constraint handling", name, HANDLINGS, settings)
 
 
@@ -144,15 +133,7 @@ def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]]
 
 
 def front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
-    """Make an algorithm for several objectives by name.
-
-    Args:
-        name: A key of `FRONT_ALGORITHMS`.
-        settings: Settings that differ from the defaults.
-
-    Raises:
-        SearchError: Unknown name or setting, a value that is not allowed, or pymoo is not installed.
-    """
+    """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `algorithm` does."""
     return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
 

@@ -82,11 +82,7 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, result: Result) -> None:
-        """Store the partial result.
-
-        Args:
-            result: All complete generations; its reasons are ("interrupted",).
-        """
+        """Store the result of all complete generations; its reasons are ("interrupted",)."""
         super().__init__(result)
         self.result = result
 

@@ -22,18 +22,7 @@ def check_number(
     at_least: float | None = None,
     at_most: float | None = None,
 ) -> None:
-    """Check that a setting is a finite number within limits.
-
-    Args:
-        settings: Dataclass that holds the setting.
-        name: Name of the field to check.
-        above: Exclusive lower limit.
-        at_least: Inclusive lower limit.
-        at_most: Inclusive upper limit.
-
-    Raises:
-        SearchError: It is not a number, not finite, or outside the limits.
-    """
+    """Raise SearchError unless a field is a finite number within the limits; ``above`` is exclusive."""
     value: Any = getattr(settings, name)
     limits = [f"> {above}"] if above is not None else []
     limits += [f">= {at_least}"] if at_least is not None else []
@@ -50,17 +39,7 @@ def check_number(
 
 
 def check_count(settings: DataclassInstance, name: str, *, at_least: int, at_most: int | None = None) -> None:
-    """Check that a setting is a whole number within limits.
-
-    Args:
-        settings: Dataclass that holds the setting.
-        name: Name of the field to check.
-        at_least: Inclusive lower limit.
-        at_most: Inclusive upper limit; None for no limit.
-
-    Raises:
-        SearchError: It is not a whole number or outside the limits.
-    """
+    """Raise SearchError unless a field is a whole number within the inclusive limits."""
     value = getattr(settings, name)
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or value < at_least or (at_most is not None and value > at_most):
@@ -84,16 +63,7 @@ def check_installed(algorithm: str, package: str) -> None:
 
 
 def bad_setting(settings: DataclassInstance, name: str, allowed: str) -> SearchError:
-    """Describe a setting that is not allowed; the caller raises the error.
-
-    Args:
-        settings: Dataclass that holds the setting.
-        name: Name of the field.
-        allowed: What is allowed, to follow "must be".
-
-    Returns:
-        The error, which names setting, value, what is allowed and the default as a way out.
-    """
+    """Return the error for a field, to be raised by the caller; ``allowed`` follows "must be"."""
     message = f"{type(settings).__name__}: {name} must be {allowed}, got {abbreviate(getattr(settings, name))}"
     default = next(field.default for field in fields(settings) if field.name == name)
     return SearchError(message if default is MISSING else f"{message}; leave it out for the default, {default!r}")

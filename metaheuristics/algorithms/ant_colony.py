@@ -56,14 +56,9 @@ class AntColony:
 
 
 def kernel_probabilities(count: int, locality: float) -> Array:
-    """Probability that an ant picks each point of an archive sorted best first.
+    """Return the probabilities (k,) that an ant picks each point of an archive sorted best first.
 
-    Args:
-        count: Number of points in the archive (k).
-        locality: q, > 0.
-
-    Returns:
-        (count,) probabilities, falling as a half Gaussian of deviation q k over the rank.
+    They fall as a half Gaussian of deviation q k over the rank, with k the count and q the locality.
 
     Source:
         Socha, Dorigo (2008), the weights omega_l and their normalisation; the common factor 1 / (q k sqrt(2 pi))
@@ -75,15 +70,7 @@ def kernel_probabilities(count: int, locality: float) -> Array:
 
 
 def deviations(archive: Array, picked: Array, spread: float) -> Array:
-    """Mean distance of the archive from picked members of it, in every variable, times the spread.
-
-    Args:
-        archive: (k, n) archived points.
-        picked: (m, n) members of the archive.
-        spread: xi.
-
-    Returns:
-        (m, n) standard deviations.
+    """Return standard deviations (m, n): mean distance of the archive (k, n) from picked members (m, n), times the spread.
 
     Source:
         Socha, Dorigo (2008), sigma = xi sum_e |s_e - s_l| / (k - 1).

@@ -58,16 +58,13 @@ class AntColonyGrid:
 
 
 def renew(pheromone: Array, chosen: NDArray[np.intp], weights: Array, evaporation: float) -> Array:
-    """Evaporate and deposit.
+    """Return pheromone (n, L) after evaporation and deposits; each row remains a probability over L levels.
 
     Args:
-        pheromone: (n, L) pheromone, each row a probability over L levels.
+        pheromone: (n, L).
         chosen: (D, n) levels chosen by the points that deposit.
         weights: (D,) their weights, >= 0 and not all zero.
-        evaporation: Share lost, which the deposits make up for.
-
-    Returns:
-        (n, L) pheromone, each row a probability, a new array.
+        evaporation: Share lost, which the deposits replace.
 
     Source:
         Blum, Dorigo (2004), update rule of the hyper-cube framework.
@@ -79,15 +76,7 @@ def renew(pheromone: Array, chosen: NDArray[np.intp], weights: Array, evaporatio
 
 
 def pick(probability: Array, u: Array) -> NDArray[np.intp]:
-    """Pick a level for each random number.
-
-    Args:
-        probability: (n, L) weights of the levels of each variable.
-        u: (P, n) random numbers in [0, 1).
-
-    Returns:
-        (P, n) levels, 0..L-1.
-    """
+    """Return the levels (P, n), 0..L-1, that random numbers u (P, n) in [0, 1) pick by weights (n, L)."""
     cumulative = np.cumsum(probability, axis=1)
     passed = cumulative <= (u * cumulative[:, -1])[:, :, None]
     last = probability.shape[1] - 1  # the limit, as rounding may let u times the total reach the total

@@ -73,17 +73,14 @@ class DifferentialEvolution:
 def cross_over(
     members: Array, mutants: Array, first: NDArray[np.int64], draws: NDArray[np.bool_], exponential: bool
 ) -> Array:
-    """Return trials that take the variable `first` from their mutant, and others at random.
+    """Return trials (P, n) that take the variable `first` from their mutant, and others at random.
 
     Args:
         members: (P, n).
         mutants: (P, n).
         first: (P,) positions of variables.
         draws: (P, n) True where a variable is to be crossed.
-        exponential: Take variables in a row, from the first one on and round the end, until one is not to be crossed.
-
-    Returns:
-        (P, n) trials, a new array.
+        exponential: Take variables in a row, cyclically from the first one, until one is not to be crossed.
     """
     taken = draws.copy()
     if exponential:

@@ -86,18 +86,15 @@ class GeneticAlgorithm:
 
 
 def tournaments(places: int, population: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Hold tournaments among parents that are sorted best first, so that the lowest index wins.
+    """Return the winners (places,) of tournaments among parents sorted best first, so that the lowest index wins.
 
-    Competitors are drawn by shuffling all parents again and again: each competes equally often, but for a remainder.
+    Competitors are drawn by shuffling all parents repeatedly: each competes equally often, except for a remainder.
 
     Args:
         places: Number of tournaments.
         population: Number of parents.
         size: Competitors in each tournament.
         rng: Source of randomness.
-
-    Returns:
-        (places,) indices of the winners.
     """
     shuffles = -(-places * size // population)
     competitors = rng.random((shuffles, population)).argsort(axis=1).ravel()[: places * size]

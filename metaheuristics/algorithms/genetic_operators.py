@@ -22,50 +22,28 @@ class Crossover(Protocol):
     def __call__(
         self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator, /
     ) -> tuple[Array, Array]:
-        """Cross each row of A with the same row of B.
-
-        Args:
-            A: (M, n) first parents.
-            B: (M, n) second parents.
-            lower: (n,) lower bounds.
-            upper: (n,) upper bounds.
-            rng: Source of randomness.
-
-        Returns:
-            (M, n) and (M, n) children within the bounds, new arrays.
-        """
+        """Return children (M, n) and (M, n) within the bounds (n,) of each row of A and the same row of B, (M, n) each."""
 
 
 class Mutation(Protocol):
     """Changes points at random."""
 
     def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator, /) -> Array:
-        """Mutate.
-
-        Args:
-            X: (P, n) points.
-            lower: (n,) lower bounds.
-            upper: (n,) upper bounds.
-            rng: Source of randomness.
-
-        Returns:
-            (P, n) points within the bounds, a new array.
-        """
+        """Return mutated points (P, n) within the bounds (n,) as a new array."""
 
 
 def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array) -> tuple[Array, Array]:
-    """Spread two children about two parents, the spread limited by the bounds.
+    """Return the lower and the upper child (M, n) in each variable of parents A and B (M, n), within the bounds (n,).
+
+    Where the parents are equal, so are the children.
 
     Args:
         A: (M, n) first parents.
         B: (M, n) second parents.
-        lower: (n,) lower bounds.
-        upper: (n,) upper bounds.
+        lower: (n,).
+        upper: (n,).
         index: Distribution index; larger keeps children nearer to the parents.
         u: (M, n) random numbers in [0, 1).
-
-    Returns:
-        (M, n) the lower and (M, n) the upper child in each variable. Where the parents are equal, so are the children.
 
     Source:
         Deb, Agrawal (1995), Simulated binary crossover; bounded form as in Deb's NSGA-II code (crossover.c).
@@ -87,17 +65,9 @@ def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: floa
 
 
 def polynomial(X: Array, lower: Array, upper: Array, index: float, u: Array) -> Array:
-    """Shift every variable by a polynomially distributed step that cannot cross the bounds.
+    """Return points X (P, n) shifted by polynomially distributed steps within the bounds (n,).
 
-    Args:
-        X: (P, n) points.
-        lower: (n,) lower bounds.
-        upper: (n,) upper bounds.
-        index: Distribution index; larger makes smaller steps.
-        u: (P, n) random numbers in [0, 1); 0.5 leaves the variable as it is.
-
-    Returns:
-        (P, n) points, a new array.
+    A larger distribution index makes smaller steps. Random numbers u (P, n) are in [0, 1); 0.5 makes no step.
 
     Source:
         Deb, Goyal (1996), A combined genetic adaptive search; bounded form as in Deb's NSGA-II code (mutation.c).

@@ -60,18 +60,15 @@ class ParticleSwarm:
 
 
 def move(X: Array, V: Array, to_own: Array, to_swarm: Array, inertia: float, limit: Array) -> tuple[Array, Array]:
-    """Move particles by one iteration, regardless of the bounds.
+    """Return new positions and velocities (P, n) after one iteration, regardless of the bounds.
 
     Args:
         X: (P, n) positions.
         V: (P, n) velocities, per iteration.
-        to_own: (P, n) random weight times the way to the particle's own best.
-        to_swarm: (P, n) random weight times the way to the swarm's best.
+        to_own: (P, n) random weight times the distance to the particle's best.
+        to_swarm: (P, n) random weight times the distance to the swarm's best.
         inertia: Share of the velocity kept.
         limit: (n,) largest speed.
-
-    Returns:
-        (P, n) positions and (P, n) velocities, new arrays.
 
     Source:
         Kennedy, Eberhart (1995), with the inertia weight of Shi, Eberhart (1998).
@@ -81,17 +78,7 @@ def move(X: Array, V: Array, to_own: Array, to_swarm: Array, inertia: float, lim
 
 
 def reflect(X: Array, V: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Put particles back on the bounds that they crossed, with the velocity reversed in those variables.
-
-    Args:
-        X: (P, n) positions.
-        V: (P, n) velocities.
-        lower: (n,) lower bounds.
-        upper: (n,) upper bounds.
-
-    Returns:
-        (P, n) positions within the bounds and (P, n) velocities, new arrays.
-    """
+    """Return positions (P, n) clipped to the bounds (n,), and velocities (P, n) reversed where a bound was crossed."""
     inside = np.clip(X, lower, upper)
     return inside, np.where(inside == X, V, -V)
 

@@ -80,9 +80,6 @@ def places_to_take(
         places: (P,) in the order in which they are offered.
         most: that it may take.
 
-    Returns:
-        At most so many of the places.
-
     Source:
         Jain, Deb (2014), C-MOEA/D, as in PlatEMO.
     """
