@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import Any
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-import metaheuristics
 from compare.analysis.units import with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.drawing.labels import axis_label
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_starts
-from compare.questions.question import Answer
+from compare.questions.question import Answer, Question, Work
 from compare.report.document import Figure, text_table
-from compare.study.store import Store
 from compare.study.task import describe_problem
+from metaheuristics.minimize import minimize
+from metaheuristics.registry import algorithm
 from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import compile_objective
-from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import replace_nan
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import Certificate, certify
 from nlp_gait.proofs.certificate import hash_code, make_certificate_file
@@ -119,118 +118,126 @@ class Evidence:
         }
 
 
-def gather_evidence(
-    problem: GaitProblem,
-    store: Store,
-    *,
-    starts: int,
-    evaluations: int,
-    tolerance: float = 0.01,
-    time_limit_s: float = 1800.0,
-    seed: int = 0,
-    progress: Progress = ignore_progress,
-) -> Evidence:
-    """Gather evidence by many starts, a long search and, where possible, branch and bound.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Certainty(Question[Evidence]):
+    """How certain is it that the best known optimum is the global one: many starts, a long search and, if possible, a proof.
 
-    Args:
-        problem: with its current parameter values.
-        store: of finished results.
+    Attributes:
         starts: of IPOPT.
         evaluations: of CMA-ES; 0 for none.
         tolerance: of the proof, relative.
         time_limit_s: of the proof [s]; 0 for none.
         seed: of starts and search.
-        progress: receives a note at each step.
-
-    Raises:
-        InputError: no start converged, or tolerance or time limit are not allowed.
-        SearchError: CMA-ES is requested and not installed.
-        CompilerError: a search or a proof is requested and there is no compiler.
     """
-    if not (0.0 < tolerance < math.inf and 0.0 <= time_limit_s < math.inf):
-        raise InputError(
-            f"tolerance must be positive and finite, the time limit finite and >= 0 s; got {tolerance}, {time_limit_s} s"
-        )
-    if evaluations:
-        metaheuristics.algorithm("cma")  # checked before the starts, which take long
-    ends = run_starts(problem, store, starts=starts, seed=seed, progress=progress)
-    optima = cluster_ends(problem, ends)
-    if not optima:
-        raise InputError(f"none of {starts} starts of {problem.name} converged to a feasible point; try more starts")
-    best = optima[0]
-    identity = {**fingerprint(problem), "best": list(best.x)}
 
-    def prove() -> dict[str, Any]:
-        name = f"proof-{hash_json({**identity, 'tolerance': tolerance})[:12]}.npz"
-        checkpoint = None if store.folder is None else store.folder / name
-        proof = certify(problem, np.array(best.x), **limits, progress=progress, checkpoint=checkpoint)
-        return dict(replace_nan(asdict(proof)))
+    name: ClassVar[str] = "certainty"
 
-    search = certificate = None
-    if evaluations:
-        inputs = {**identity, "evaluations": evaluations, "seed": seed}
-        found = store.compute(
-            "cma", inputs, lambda: asdict(_search(problem, best.objective, evaluations, seed)), progress=progress
+    starts: int
+    evaluations: int
+    tolerance: float = 0.01
+    time_limit_s: float = 1800.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Validate the limits of the proof.
+
+        Raises:
+            InputError: tolerance or time limit are not allowed.
+            SearchError: CMA-ES is requested and not installed.
+        """
+        if not (0.0 < self.tolerance < math.inf and 0.0 <= self.time_limit_s < math.inf):
+            raise InputError(
+                "tolerance must be positive and finite, the time limit finite and >= 0 s; "
+                f"got {self.tolerance}, {self.time_limit_s} s"
+            )
+        if self.evaluations:
+            algorithm("cma")
+
+    def find(self, work: Work) -> Iterator[Evidence]:
+        """See ``Question``.
+
+        Raises:
+            InputError: no start converged.
+            CompilerError: a search or a proof is requested and there is no compiler.
+        """
+        problem, store, progress = self.problem, work.store, work.progress
+        ends = run_starts(problem, store, starts=self.starts, seed=self.seed, progress=progress)
+        optima = cluster_ends(problem, ends)
+        if not optima:
+            raise InputError(
+                f"none of {self.starts} starts of {problem.name} converged to a feasible point; try more starts"
+            )
+        best = optima[0]
+        identity = {**fingerprint(problem), "best": list(best.x)}
+        limits = {"tolerance": self.tolerance, "time_limit_s": self.time_limit_s}
+
+        def prove() -> Certificate:
+            name = f"proof-{hash_json({**identity, 'tolerance': self.tolerance})[:12]}.npz"
+            checkpoint = None if store.folder is None else store.folder / name
+            return certify(problem, np.array(best.x), **limits, progress=progress, checkpoint=checkpoint)
+
+        search = certificate = None
+        if self.evaluations:
+            inputs = {**identity, "evaluations": self.evaluations, "seed": self.seed}
+            function = partial(_search, problem, best.objective, self.evaluations, self.seed)
+            search = work.compute(LongSearch, "cma-{key}", inputs, function)
+            work.progress("long search")
+        if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
+            inputs = {**identity, **limits, "proof_code_sha256": hash_code(problem)}
+            certificate = work.compute(Certificate, "certificate-{key}", inputs, prove)
+        yield Evidence(
+            problem=problem,
+            starts=self.starts,
+            statuses=dict(Counter(ends.status)),
+            optima=tuple(optima),
+            unseen=estimate_unseen(optima),
+            search=search,
+            certificate=certificate,
         )
-        search = decode(LongSearch, found)
-    if time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
-        limits = {"tolerance": tolerance, "time_limit_s": time_limit_s}
-        inputs = {**identity, **limits, "proof_code_sha256": hash_code(problem)}
-        certificate = decode(Certificate, store.compute("certificate", inputs, prove, progress=progress))
-    return Evidence(
-        problem=problem,
-        starts=starts,
-        statuses=dict(Counter(ends.status)),
-        optima=tuple(optima),
-        unseen=estimate_unseen(optima),
-        search=search,
-        certificate=certificate,
-    )
+
+    def report(self, findings: Evidence) -> Answer:
+        """See ``Question``."""
+        problem, unit = findings.problem, findings.problem.objective.unit
+        stem = f"{problem.name}-certainty"
+        proof, estimate = findings.certificate, findings.unseen
+        optima = [
+            (with_unit(o.objective, unit), f"{o.count:,}", f"{100 * o.share:.2f} %") for o in findings.optima[:LISTED]
+        ]
+        covered = None if estimate.expected_covered is None else 100 * estimate.expected_covered
+        estimates = [
+            ("share of starts in unseen optima (Good, Turing)", f"{100 * estimate.good_turing:.3g} %"),
+            ("expected number of all optima (Boender, Rinnooy Kan)", with_unit(estimate.expected_optima, "1", ".4g")),
+            ("expected share of starts in seen optima (the same)", with_unit(covered, "%", ".4g")),
+            ("largest share of one unseen optimum, 95 % confidence", f"{100 * estimate.largest_missed:.3g} %"),
+        ]
+        statuses = [(status, f"{count:,}") for status, count in findings.statuses.items()]
+        listed = f"Distinct optima of {findings.starts:,} starts, {len(optima)} shown"
+        shown = "Ends of the starts, the proven bound and the end of the long search."
+        certificates = {}
+        if proof is not None and proof.closed:
+            certificates[f"{problem.name}-certificate"] = make_certificate_file(problem, proof).to_json()
+        return Answer(
+            stem=stem,
+            title=f"{problem.name}: certainty of the optimum",
+            verdict=(f"Proven: {findings.proven}.", f"Supported: {findings.supported}."),
+            parts=(
+                text_table((problem.objective.name, "starts", "share"), optima, listed),
+                text_table(("status", "starts"), statuses, "Status of the starts"),
+                text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"),
+                Figure(name=stem, caption=shown, drawing=plot_evidence(findings)),
+            ),
+            results=certificates,
+            data=findings.to_json(),
+        )
 
 
 def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:
     objective, sign = compile_objective(problem), problem.objective.sign
-    result = metaheuristics.minimize(objective, metaheuristics.algorithm("cma"), evaluations=evaluations, seed=seed)
+    result = minimize(objective, algorithm("cma"), evaluations=evaluations, seed=seed)
     if result.violation > FEASIBILITY_TOLERANCE:
         return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
     value = sign * result.objective
     return LongSearch(objective=value, evaluations=result.evaluations, gap=sign * (value - best) / abs(best))
-
-
-def certainty_answer(evidence: Evidence) -> Answer:
-    """Return the evidence as a report."""
-    problem, unit = evidence.problem, evidence.problem.objective.unit
-    stem = f"{problem.name}-certainty"
-    proof, estimate = evidence.certificate, evidence.unseen
-    optima = [
-        (with_unit(o.objective, unit), f"{o.count:,}", f"{100 * o.share:.2f} %") for o in evidence.optima[:LISTED]
-    ]
-    covered = None if estimate.expected_covered is None else 100 * estimate.expected_covered
-    estimates = [
-        ("share of starts in unseen optima (Good, Turing)", f"{100 * estimate.good_turing:.3g} %"),
-        ("expected number of all optima (Boender, Rinnooy Kan)", with_unit(estimate.expected_optima, "1", ".4g")),
-        ("expected share of starts in seen optima (the same)", with_unit(covered, "%", ".4g")),
-        ("largest share of one unseen optimum, 95 % confidence", f"{100 * estimate.largest_missed:.3g} %"),
-    ]
-    statuses = [(status, f"{count:,}") for status, count in evidence.statuses.items()]
-    listed = f"Distinct optima of {evidence.starts:,} starts, {len(optima)} shown"
-    shown = "Ends of the starts, the proven bound and the end of the long search."
-    certificates = {}
-    if proof is not None and proof.closed:
-        certificates[f"{problem.name}-certificate"] = make_certificate_file(problem, proof).to_json()
-    return Answer(
-        stem=stem,
-        title=f"{problem.name}: certainty of the optimum",
-        verdict=(f"Proven: {evidence.proven}.", f"Supported: {evidence.supported}."),
-        parts=(
-            text_table((problem.objective.name, "starts", "share"), optima, listed),
-            text_table(("status", "starts"), statuses, "Status of the starts"),
-            text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"),
-            Figure(name=stem, caption=shown, drawing=plot_evidence(evidence)),
-        ),
-        results=certificates,
-        data=evidence.to_json(),
-    )
 
 
 def plot_evidence(evidence: Evidence) -> Drawing:

@@ -9,10 +9,9 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import print_json, progress_bar, say, stdout
-from compare.cli.interrupts import interruptible
+from compare.cli.common import print_json, stdout
 from compare.cli.options import AnyProblem, AsJson, Code, Seed, name_all
-from compare.cli.questions.output import Output
+from compare.cli.questions.output import Folder, Output
 from nlp_gait.errors import InputError
 
 
@@ -34,7 +33,7 @@ def certainty(
     ] = None,
     paths: Annotated[int, typer.Option(min=1, max=100_000, help="Paths of a proof to check.")] = 200,
     code: Code = None,
-    out: Annotated[Path, typer.Option(help="Folder; finished results are stored in it.")] = Path("certainty"),
+    out: Folder = Path("certainty"),
     as_json: AsJson = False,
 ) -> None:
     """Gather evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
@@ -48,23 +47,11 @@ def certainty(
         name_all(code)
         _check(check, paths, seed, as_json)
         return
-    from compare.questions.certainty import certainty_answer, gather_evidence
-    from compare.study.store import Store
+    from compare.questions.certainty import Certainty
 
-    output = Output(out=out, as_json=as_json)
-    loaded = problem.spec().load()
-    with interruptible(out), progress_bar("starts, search, proof", None) as advance:
-        evidence = gather_evidence(
-            loaded,
-            Store(out, say),
-            starts=starts,
-            evaluations=evaluations,
-            tolerance=tolerance,
-            time_limit_s=time_limit,
-            seed=seed,
-            progress=advance,
-        )
-    output.write(certainty_answer(evidence))
+    limits = {"tolerance": tolerance, "time_limit_s": time_limit}
+    question = Certainty(problem=problem.spec().load(), starts=starts, evaluations=evaluations, **limits, seed=seed)
+    Output(out=out, as_json=as_json).answer(question)
 
 
 def _check(path: Path, paths: int, seed: int, as_json: bool) -> None:

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.options import NamedProblem, Seed
+from compare.cli.options import AsJson, NamedProblem, Seed
 from compare.cli.questions.output import Folder, Output
 from nlp_gait.errors import InputError
 
 SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Output(Output):
-    out: Folder = Path("pareto")
 
 
 @command
@@ -44,7 +38,8 @@ def pareto(
     runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search.")] = 11,
     seed: Seed = 0,
     problem: NamedProblem,
-    output: _Output,
+    out: Folder = Path("pareto"),
+    as_json: AsJson = False,
 ) -> None:
     """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
 
@@ -56,7 +51,7 @@ def pareto(
     from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
     from compare.questions.pareto.pareto_surface import ParetoSurface
 
-    names = parse_objectives(objectives)
+    names, output = parse_objectives(objectives), Output(out=out, as_json=as_json)
     searches = parse_searches(search or SEARCHES)
     effort = {"points": points, "starts": starts, "seed": seed}
     if len(names) == 1:

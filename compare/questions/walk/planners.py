@@ -86,9 +86,10 @@ def check_planners(names: Sequence[str], problem: GaitProblem) -> tuple[str, ...
         if name not in PLANNERS:
             raise InputError(f"a baseline is one of {', '.join(PLANNERS)}, got {name!r}")
     if CART_TABLE in names:
-        defaults = ProblemSpec(name=problem.address).load().options
+        shared = _shared_options(problem)
+        defaults = ProblemSpec(name=problem.address, options=shared).load().options
         for name, value in problem.options.items():
-            if name not in ("objective", *_shared_options(problem)) and value != defaults.get(name):
+            if name not in ("objective", *shared) and value != defaults.get(name):
                 raise InputError(f"the {CART_TABLE} walk does not support {name}={value}; leave that option out")
     return tuple(dict.fromkeys(names))
 

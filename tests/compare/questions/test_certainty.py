@@ -9,8 +9,9 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from compare.questions.certainty import certainty_answer, gather_evidence
+from compare.questions.certainty import Certainty
 from compare.questions.local_optima import Ends, LocalOptimum, cluster_ends, estimate_unseen, run_starts
+from compare.questions.question import Work, find
 from compare.study.store import Store
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint
@@ -102,11 +103,12 @@ def test_interrupted_starts_continue_to_the_same_end(tmp_path: Path, monkeypatch
 
 def test_evidence_is_proven_or_supported(tmp_path: Path) -> None:
     problem = toy(two_valleys, limit=-9.0)
-    evidence = gather_evidence(problem, Store(tmp_path), starts=12, evaluations=2000, time_limit_s=20.0)
+    question = Certainty(problem=problem, starts=12, evaluations=2000, time_limit_s=20.0)
+    evidence = find(question, Work(store=Store(tmp_path)))
     assert len(evidence.optima) == 2
     assert evidence.optima[0].x[0] < 0.0 < evidence.optima[1].x[0]
     assert evidence.certificate is not None and evidence.certificate.closed
     assert "no feasible x falls below" in evidence.proven
     assert evidence.search is not None and evidence.search.gap == pytest.approx(0.0, abs=1e-6)
-    assert all(path.stat().st_size > 0 for path in certainty_answer(evidence).write(tmp_path))
+    assert all(path.stat().st_size > 0 for path in question.report(evidence).write(tmp_path))
     evidence.to_json()
