@@ -56,7 +56,7 @@ LOAD_DEGREE = 4
 def torso_shares(hip_y: SX, rule: Division, feet_y: tuple[float, float] = (0.05, -0.05)) -> dict[str, SX]:
     """Compute the share of the torso's mass that each leg carries from the hip's distances to the feet; both add up to 1.
 
-    With signed distances, so that a hip beyond a foot gives a share beyond 0 and 1 and no kink.
+    Distances are signed, so that a hip outside the feet gives shares outside 0 and 1 and no kink.
 
     Args:
         hip_y: position of the hip across the walking direction [m].

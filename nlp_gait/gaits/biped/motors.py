@@ -48,7 +48,7 @@ SUPPLY = Parameter(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motors:
-    """Real motors as far as a problem takes them into account.
+    """Features of real motors that a problem takes into account.
 
     Attributes:
         features: see above.

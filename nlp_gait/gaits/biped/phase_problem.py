@@ -1,4 +1,4 @@
-"""From a phase or a cycle to a problem: its goal, its limits, its start points, and what drawing and simulation need."""
+"""The problem of a phase: its goal, its limits, its start points, and its robot for drawings and simulations."""
 
 from __future__ import annotations
 

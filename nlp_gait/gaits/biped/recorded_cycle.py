@@ -32,7 +32,7 @@ class RecordedGait:
     """A gait from elsewhere, as a problem whose only variables are its times.
 
     Attributes:
-        gait: name of the problem whose limits it is judged by.
+        gait: name of the problem with whose limits it is judged.
         problem: the recorded gait; its variables are the durations of its phases, and of a cycle the step length.
         x: (n,) its own durations and step.
         motion: on the left foot.

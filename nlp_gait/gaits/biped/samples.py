@@ -1,4 +1,4 @@
-"""One instant of a biped, and a phase at its samples: what plans return, and what limits and goals read."""
+"""One instant of a biped, which plans return, and a phase at its samples, which limits and goals read."""
 
 from __future__ import annotations
 

@@ -149,7 +149,8 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         motors: features of the real motors that are taken into account, see ``gaits.biped.motors``.
 
     Raises:
-        InputError: its legs are not such as are solved; GaitError as ``load_robot``.
+        InputError: its legs cannot be solved.
+        GaitError: as ``load_robot``.
     """
     biped = make_biped(load_robot(robot))
     left, (middle_x, _, middle_z) = biped.legs["left"], biped.hip_middle_m

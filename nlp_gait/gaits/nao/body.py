@@ -59,7 +59,7 @@ ARM_COORDINATE = Coordinate(
     bounds=(-LARGEST_SWING, LARGEST_SWING),
     largest_rate=LARGEST_RATE,
     image=-1.0,
-    words="left shoulder pitch beyond the middle, right one short of it",
+    words="left shoulder pitch above the middle, right one below it",
     rate_words="rate of the arms' swing",
 )
 
@@ -67,10 +67,10 @@ ARM_COORDINATE = Coordinate(
 def load_nao(robot: str) -> Robot:
     """Return the robot of a NAO problem: joints that no gait moves are locked at zero.
 
-    Of NAO these are the head and the neck, which become one with the torso; another robot may have fingers, or no neck.
+    NAO's head and neck become one with the torso; another robot may have fingers, or no neck.
 
     Raises:
-        InputError: the robot has not the joints that the gait moves, or its legs are of another kind.
+        InputError: the robot lacks joints that the gait moves, or the closed form does not solve its legs.
     """
     loaded = load_robot(robot)
     try:

@@ -36,7 +36,7 @@ def motion_of(angles: JointAngles, body: Body) -> Motion:
     """Return the motion of a robot on its left foot; mirrored if the right one stands.
 
     Args:
-        angles: of the legs, and of the arms as far as they are known.
+        angles: of the legs, and of any joints of the arms.
         body: the robot.
 
     Raises:
@@ -87,7 +87,7 @@ def make_recorded_gait(
         angles: of the whole gait; its last instant is its end.
         robot: name or file.
         intervals: of each phase, as in the planned problem.
-        gait: problem whose limits count; None to detect it.
+        gait: problem with whose limits it is judged; None to detect it.
         touch_down_s: where single support ends in a cycle; None to find it.
 
     Raises:
