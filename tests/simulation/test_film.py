@@ -46,7 +46,7 @@ for time_s in (0.4, 0.6):
     x = problem.check_x((0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, time_s))
     plan = make_plan(Result(problem=problem, x=x))
     shots.append(record_film("dsp", plan, partial(simulate_plan, plan), 0.8))
-np.savez(sys.argv[1], one=list(draw_pictures(shots[:1], (480, 360))), two=list(draw_pictures(shots, (640, 360), "slow")))
+np.savez(sys.argv[1], one=list(draw_pictures(shots[:1], (480, 360))), two=[next(draw_pictures(shots, (640, 360), "slow"))])
 """
 
 
@@ -158,7 +158,7 @@ def test_pictures_show_both_legs_pressure_and_captions_of_one_gait_or_two(tmp_pa
     with np.load(file) as found:
         one, two = found["one"].astype(int), found["two"].astype(int)
     assert one.shape[1:] == (360, 480, 3) and two.shape[1:] == (360, 640, 3)
-    assert len(one) == 2 and len(two) == 2
+    assert len(one) == 2 and len(two) == 1
     for area in (one[0], two[0][:, :318], two[0][:, 322:]):
         blue = (area[:, :, 2] > area[:, :, 0] + 90).sum()
         orange = (area[:, :, 0] > area[:, :, 2] + 90).sum()

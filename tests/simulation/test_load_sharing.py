@@ -99,7 +99,7 @@ def test_no_instant_costs_more_than_by_the_lever_rule(plan: Plan, support: Suppo
 
 @pytest.mark.slow
 def test_it_is_scipys_optimum_at_single_instants(plan: Plan, support: Support, shared: Plan) -> None:
-    for sample in np.linspace(support.first, support.last, 5).astype(int).tolist():
+    for sample in np.linspace(support.first, support.last, 3).astype(int).tolist():
         one = slice(sample, sample + 1)
         torque, gain, left, carried = (part[0] for part in compute_instants(plan, one))
         rate, rows = plan.signals.arrays["qd"][sample], make_sole_rows(plan.robot, Sharing().friction)
