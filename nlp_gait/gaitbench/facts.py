@@ -38,7 +38,13 @@ class Evidence:
         elif self.agreeing <= 1:
             parts.insert(0, "best known")
         if self.cma_runs:
-            parts.append("CMA-ES finds nothing feasible" if self.cma_gap is None else _cma(self.cma_gap))
+            if self.cma_gap is None:
+                parts.append("CMA-ES finds nothing feasible")
+            elif abs(self.cma_gap) < 1e-8:
+                parts.append("CMA-ES ends at the same value")
+            else:
+                side = "above" if self.cma_gap > 0 else "below"
+                parts.append(f"CMA-ES ends {100 * abs(self.cma_gap):.2g} % {side} it")
         return "; ".join(parts)
 
 
@@ -85,9 +91,3 @@ def load_facts() -> Mapping[str, Facts]:
     """Return the facts about all instances by id."""
     raw = json.loads(files("nlp_gait.gaitbench").joinpath("facts.json").read_text(encoding="utf-8"))
     return {id: decode(Facts, entry, id) for id, entry in raw.items()}
-
-
-def _cma(gap: float) -> str:
-    if abs(gap) < 1e-8:
-        return "CMA-ES ends at the same value"
-    return f"CMA-ES ends {100 * abs(gap):.2g} % {'above' if gap > 0 else 'below'} it"

@@ -133,7 +133,10 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     during = simulation.t <= plan.duration_s
     error = plan.at("q", simulation.t[during]) - simulation.q[during]
     torque, rate = simulation.torque[during], simulation.qd[during]
-    limits = np.array([drive.torque_limit(plan.robot.joint(name)) for name in plan.joints])
+    joints = [plan.robot.joint(name) for name in plan.joints]
+    limits = np.array([drive.torque_limit(joint) for joint in joints])
+    low, high = np.array([joint.limits_rad for joint in joints]).T
+    outside = (simulation.q[during] < low) | (simulation.q[during] > high)
     pressure, planned = average_pressure(simulation, drive.period_s), plan.at("zmp", simulation.t)
     raw = np.linalg.norm(simulation.pressure - planned, axis=1)[during]
     deviation = np.linalg.norm(pressure - planned, axis=1)[during]
@@ -161,7 +164,7 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
         measured=Power.compute(torque, rate, plan.heat_loss, lambda samples: float(samples.mean())),
         saturated=_by_joint(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
         beyond_limit=_by_joint(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
-        joint_limits=_beyond_range(plan, simulation.q[during]),
+        joint_limits=tuple(_by_joint(plan, outside.any(axis=0), above=0)),
     )
 
 
@@ -241,12 +244,6 @@ def _landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
 
 def _by_joint(plan: Plan, shares: Array, above: float) -> dict[str, float]:
     return {name: share for name, share in zip(plan.joints, shares.tolist(), strict=True) if share > above}
-
-
-def _beyond_range(plan: Plan, q: Array) -> tuple[str, ...]:
-    ranges = np.array([plan.robot.joint(name).limits_rad for name in plan.joints])
-    beyond = np.any((q < ranges[:, 0]) | (q > ranges[:, 1]), axis=0).tolist()
-    return tuple(name for name, hit in zip(plan.joints, beyond, strict=True) if hit)
 
 
 def _rms(values: Array) -> float:

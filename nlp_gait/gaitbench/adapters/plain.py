@@ -80,10 +80,10 @@ def to_pygmo(instance: Instance) -> Any:
     """Return a problem of pygmo."""
     import pygmo
 
-    return pygmo.problem(PygmoProblem(instance))
+    return pygmo.problem(_PygmoProblem(instance))
 
 
-class PygmoProblem:
+class _PygmoProblem:
     """User-defined problem of pygmo: the objective, then every row as an inequality, with dense gradients."""
 
     def __init__(self, instance: Instance) -> None:
@@ -100,7 +100,6 @@ class PygmoProblem:
         return np.hstack([f[:, None], self.instance.rows(X)]).ravel()
 
     def has_batch_fitness(self) -> bool:
-        """Return True."""
         return True
 
     def gradient(self, x: Array) -> Array:
@@ -108,18 +107,14 @@ class PygmoProblem:
         return np.vstack([self.instance.gradient(x), self.instance.jacobian(x)]).ravel()
 
     def get_bounds(self) -> tuple[Array, Array]:
-        """Return the lower (n,) and the upper (n,) bounds."""
         return self.instance.lower, self.instance.upper
 
     def get_nic(self) -> int:
-        """Return the number of inequalities, m."""
         return len(self.instance.row_names)
 
     def get_name(self) -> str:
-        """Return the id of the instance."""
         return f"GaitBench {self.instance.id}"
 
     def get_extra_info(self) -> str:
-        """Return the title and the best known objective."""
         instance = self.instance
         return f"\t{instance.definition.what}\n\tbest known: {instance.best_known!r}, {instance.evidence}"
