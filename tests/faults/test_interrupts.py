@@ -77,7 +77,7 @@ def test_solve_within_a_later_start_keeps_the_best_of_the_earlier_ones(
     assert 2 <= starts < 50 and kept["feasible"] and kept["objective"] >= whole.objective - 1e-6
     assert kept["starts"][-1]["status"] == "was interrupted" or kept["starts"][-1]["claimed"]
     assert kept["status"].startswith(f"interrupted in start {starts} of 50; ")
-    assert f"interrupted in start {starts} of 50; the best point until then is in {out}" in done.stderr
+    assert f"interrupted in start {starts} of 50; the best point so far is in {out}" in done.stderr
     assert "walk12: f " in done.stdout
 
 
@@ -148,7 +148,7 @@ def test_search_shows_the_finished_runs(tmp_path: Path, monkeypatch: pytest.Monk
     folder = ["--out", str(tmp_path / "study")] if with_folder else []
     done = run("search", "walk12", "--runs", "9", "--evaluations", "500", *folder)
     assert "interrupted after 2 of 9 runs; finished runs are" in done.stderr
-    assert ("kept in" in done.stderr) == with_folder and ("kept nowhere" in done.stderr) != with_folder
+    assert ("stored in" in done.stderr) == with_folder and ("not stored" in done.stderr) != with_folder
     assert done.stdout.count("evaluation budget used") == 2
     assert len(list(tmp_path.glob("study/records/*/*.json"))) == 2 * with_folder
 
