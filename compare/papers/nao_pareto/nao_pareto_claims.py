@@ -115,9 +115,9 @@ def _is_moderate(runs: dict[str, Measures]) -> Case:
 
 
 def _is_faster(runs: dict[str, Measures]) -> Case:
-    early = {n: float(np.median(m.hypervolume[:, m.find_look(EARLY * m.budget)])) for n, m in runs.items()}
+    early = {n: float(np.median(m.hypervolume[:, m.find_look(EARLY * m.evaluations[-1])])) for n, m in runs.items()}
     cmopso = runs["CMOPSO"]
-    at = cmopso.evaluations[cmopso.find_look(EARLY * cmopso.budget)]
+    at = cmopso.evaluations[cmopso.find_look(EARLY * cmopso.evaluations[-1])]
     until = ", ".join(f"{NAMES[n]} {_format_count(float(np.median(m.until(NEAR))))}" for n, m in runs.items())
     numbers = f"after {at:,.0f} {_list_shares(early)}; {100 * NEAR:.0f} % are reached after {until}"
     return _first(early, max) == "CMOPSO", numbers

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, FrontRun, ParetoEffort
+from compare.papers.nao_pareto.nao_pareto_runs import Case, ParetoEffort, Run
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_nondominated
 from compare.questions.pareto.pareto_front import SEARCH_NAMES
@@ -25,8 +25,6 @@ NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them
 class Measures:
     """Measures of R runs of one search with one budget at L looks."""
 
-    algorithm: str  # name of the search
-    budget: int  # allowed evaluations
     evaluations: Array  # (L,) before each look
     # (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point
     hypervolume: Array
@@ -56,7 +54,7 @@ class PhaseFindings:
     criterion: CompetingObjective  # the second objective
     first_front: Sequence[FrontPoint]  # of the gradient method alone, whose ranges count as 1 in the searches
     answer: Challenge  # the front after solving from the searches' best points
-    runs: Sequence[FrontRun]  # of all searches
+    runs: Mapping[Case, Sequence[Run]]
 
     @property
     def front(self) -> tuple[FrontPoint, ...]:
@@ -71,20 +69,19 @@ class PhaseFindings:
     @cached_property
     def budgets(self) -> tuple[int, ...]:
         """Budgets of the runs."""
-        return tuple(dict.fromkeys(run.budget for run in self.runs))
+        return tuple(dict.fromkeys(budget for _, budget in self.runs))
 
     @cached_property
-    def measures(self) -> dict[tuple[str, int], Measures]:
+    def measures(self) -> dict[Case, Measures]:
         """Measures by search and budget."""
-        return {(name, budget): self._measure(name, budget) for budget in self.budgets for name in ALGORITHMS}
+        return {case: self._measure(runs) for case, runs in self.runs.items()}
 
     def points(self, algorithm: str, budget: int) -> tuple[Array, Array]:
         """Return criterion and power [W] of all points at the ends of all runs."""
         scale = Scale(self.first_front)
-        F = [run.looks[-1].F for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
-        return scale.undo(np.concatenate(F))
+        return scale.undo(np.concatenate([run[-1].F for run in self.runs[algorithm, budget]]))
 
-    def _measure(self, algorithm: str, budget: int) -> Measures:
+    def _measure(self, runs: Sequence[Run]) -> Measures:
         from pymoo.indicators.hv import HV
         from pymoo.indicators.igd import IGD
 
@@ -93,13 +90,10 @@ class PhaseFindings:
         true = scale(values, powers)
         hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(spread_evenly(true))
         whole = float(hypervolume(true))
-        runs = [run for run in self.runs if (run.algorithm, run.budget) == (algorithm, budget)]
-        fronts = [[scale(*first.undo(look.F)) for look in run.looks] for run in runs]
-        ends = [run.looks[-1] for run in runs]
+        fronts = [[scale(*first.undo(look.F)) for look in run] for run in runs]
+        ends = [run[-1] for run in runs]
         return Measures(
-            algorithm=algorithm,
-            budget=budget,
-            evaluations=np.array([look.evaluations for look in runs[0].looks], dtype=float),
+            evaluations=np.array([look.evaluations for look in runs[0]], dtype=float),
             hypervolume=np.array([[float(hypervolume(F)) / whole if len(F) else 0.0 for F in row] for row in fronts]),
             igd=np.array([[float(distance(F)) if len(F) else math.inf for F in row] for row in fronts]),
             feasible=np.array([end.feasible / end.evaluations for end in ends]),
@@ -124,12 +118,12 @@ def spread_evenly(front: Array) -> Array:
     return np.column_stack([np.interp(places, along, column) for column in front.T])
 
 
-def collect_points(front: Sequence[FrontPoint], runs: Sequence[FrontRun]) -> list[FrontPoint]:
+def collect_points(front: Sequence[FrontPoint], runs: Iterable[Run]) -> list[FrontPoint]:
     """Return the points of all runs that no other point dominates."""
     scale = Scale(front)
     found = []
     for run in runs:
-        values, powers = scale.undo(run.looks[-1].F)
-        for value, power, x in zip(values.tolist(), powers.tolist(), run.looks[-1].X.tolist(), strict=True):
+        values, powers = scale.undo(run[-1].F)
+        for value, power, x in zip(values.tolist(), powers.tolist(), run[-1].X.tolist(), strict=True):
             found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
     return select_nondominated(found)

@@ -50,11 +50,11 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFinding
     question = ParetoFront(problem=problem, objective=CRITERION, points=effort.points, starts=effort.starts)
     front, criterion = find(question, work).front, question.criterion
     problem = criterion.drop_demand(problem)
-    results = runner.compute(
-        make_searches(phase, front, effort), code=(nao_pareto_runs, constrained_moead, dynamic_nsga3, pymoo)
-    )
-    runs = tuple(make_run(result) for result in results.values())
-    points = collect_points(front, runs)
+    searches = make_searches(phase, front, effort)
+    code = (nao_pareto_runs, constrained_moead, dynamic_nsga3, pymoo)
+    results = runner.compute([search for of_case in searches.values() for search in of_case], code)
+    runs = {case: [make_run(results[search.name]) for search in of_case] for case, of_case in searches.items()}
+    points = collect_points(front, (run for of_case in runs.values() for run in of_case))
     solve = partial(challenge_front, problem, criterion, front, points, work.solver(), work.progress)
     step = Computation(
         name=f"{phase}-challenge",

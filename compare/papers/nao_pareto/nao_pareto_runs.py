@@ -38,14 +38,11 @@ class ParetoEffort(Effort):
     intervals: int = 10  # between the samples of a phase, as in the paper of 2023
 
 
-@dataclass(frozen=True, kw_only=True)
-class FrontRun:
-    """Run of a search."""
+Case = tuple[str, int]
+"""A search and its budget."""
 
-    algorithm: str  # name of the search
-    run: int  # number of the run
-    budget: int  # allowed evaluations
-    looks: tuple[Snapshot, ...]  # in the order of their evaluations; only the last one, the end, has points
+Run = Sequence[Snapshot]
+"""Looks at a run, in the order of their evaluations; only the last one, the end, has points."""
 
 
 def make_spec(phase: str, effort: ParetoEffort) -> ProblemSpec:
@@ -60,28 +57,24 @@ def choose_looks(budget: int) -> list[int]:
     return [int(g) * FIRST_LOOK for g in np.unique([*generations, budget // FIRST_LOOK])]
 
 
-def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> list[Computation]:
-    """Return every run of a phase as a computation; ``make_run`` takes its result."""
+def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> dict[Case, list[Computation]]:
+    """Return all runs by search and budget; ``make_run`` takes the result of one."""
     spec, ends = make_spec(phase, effort), [[end.value, end.power_W] for end in (front[0], front[-1])]
-    return [
-        make_computation(
-            f"{phase}-{name.lower()}-{budget}-{run:02d}",
-            spec,
-            partial(run_search, spec),
-            ends=ends,
-            algorithm=name,
-            budget=budget,
-            run=run,
-        )
+
+    def make_search(name: str, budget: int, run: int) -> Computation:
+        title, search = f"{phase}-{name.lower()}-{budget}-{run:02d}", partial(run_search, spec)
+        return make_computation(title, spec, search, ends=ends, algorithm=name, budget=budget, seed=run)
+
+    return {
+        (name, budget): [make_search(name, budget, run) for run in range(effort.runs)]
         for budget in effort.budgets
         for name in ALGORITHMS
-        for run in range(effort.runs)
-    ]
+    }
 
 
 def run_search(
-    spec: ProblemSpec, ends: Sequence[Sequence[float]], algorithm: str, budget: int, run: int
-) -> dict[str, Any]:
+    spec: ProblemSpec, ends: Sequence[Sequence[float]], algorithm: str, budget: int, seed: int
+) -> list[dict[str, Any]]:
     """Return a run as plain data; ``ends`` are criterion and power at those of the front, whose ranges count as 1."""
     problem = spec.load()
     criterion = make_competing_objective(CRITERION, problem)
@@ -89,18 +82,13 @@ def run_search(
         [FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=()) for value, power in ends]
     )
     objectives = PowerAndCompeting(compile_objective(criterion.drop_demand(problem), threads=1), criterion, scale)
-    snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=run)
+    snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=seed)
     points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
-    looks = [
+    return [
         {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()} for snapshot, X in zip(snapshots, points, strict=True)
     ]
-    return {"algorithm": algorithm, "run": run, "budget": budget, "looks": looks}
 
 
-def make_run(result: Mapping[str, Any]) -> FrontRun:
+def make_run(looks: Sequence[Mapping[str, Any]]) -> Run:
     """Return the run of a computation's result."""
-    looks = tuple(
-        Snapshot(**{**look, "X": np.array(look["X"]), "F": np.array(look["F"]).reshape(-1, 2)})
-        for look in result["looks"]
-    )
-    return FrontRun(**{**result, "looks": looks})
+    return [Snapshot(**{**look, "X": np.array(look["X"]), "F": np.array(look["F"]).reshape(-1, 2)}) for look in looks]
