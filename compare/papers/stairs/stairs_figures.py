@@ -56,7 +56,7 @@ def _planned(findings: StairsFindings, case: int) -> Mapping[str, Array]:
 
 
 def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
-    """Treads from the rear ankle's on; an edge lies a setback behind the ankle that stands on it."""
+    """Treads from the rear ankle's on; an edge is a setback behind the ankle on its step."""
     tread, rise = step
     corners = [(-0.25, 0.0)]
     for k in range(1, count):

@@ -194,7 +194,7 @@ def _list_table_4(findings: StairsFindings) -> Rows:
 
 
 def _list_tracks(findings: StairsFindings, case: int) -> Rows:
-    """Best run of each solver beside the ideal."""
+    """Best run of each solver next to the ideal."""
     ideal = findings.best("ideal", case).verdict.indexes["energy_J"]
     rows: list[Sequence[Value]] = []
     for solver in (*ALGORITHMS, IPOPT):

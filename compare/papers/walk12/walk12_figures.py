@@ -124,7 +124,7 @@ def _sole(axes: Axes, robot: PointMassBiped) -> None:
 
 
 def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) -> Figure:
-    """The Pareto front of Q and s beside the optima of the weighted sum, and the latter over lambda."""
+    """The Pareto front of Q and s next to the optima of the weighted sum, and the latter over lambda."""
 
     def plane_of(path: Sequence[PathPoint]) -> tuple[list[float], list[float]]:
         return [MILLIMETRES * at.step_length_m for at in path], [1e3 * at.Q_m2s for at in path]
@@ -155,8 +155,8 @@ def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
     figure = new_figure(3.6, 3.4)
     axes = figure.subplots()
     axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")
-    for side, stands, colour in (("left", 1.0, COLOURS["pso"]), ("right", 0.0, COLOURS["ga"])):
-        prints = np.unique(np.round(arrays[f"{side}_ankle"][arrays["left_stance"] == stands], 9), axis=0)
+    for side, stance, colour in (("left", 1.0, COLOURS["pso"]), ("right", 0.0, COLOURS["ga"])):
+        prints = np.unique(np.round(arrays[f"{side}_ankle"][arrays["left_stance"] == stance], 9), axis=0)
         axes.plot(prints[:, 0], prints[:, 1], "s", markersize=3, color=colour, label=f"{side} foot")
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.legend(loc="center")
