@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,16 @@ def parse_xml(data: bytes) -> Any:
         return etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
     except etree.XMLSyntaxError as error:
         raise ValueError(" ".join(str(error).split())) from error
+
+
+def make_pose(place: Sequence[float] | Array, roll_pitch_yaw: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
+    """Return the pose (4, 4) of a place (3,) [m] and angles about fixed axes [rad]."""
+    from scipy.spatial.transform import Rotation
+
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_euler("xyz", roll_pitch_yaw).as_matrix()
+    pose[:3, 3] = place
+    return pose
 
 
 def box_points(half: Array) -> Array:

@@ -211,12 +211,7 @@ def _shape_points(model: Any, geom: int, pose: Array) -> Array:
 
 
 def _pose(place: Array, quaternion: Array) -> Array:
-    w, x, y, z = (float(part) for part in quaternion)
-    pose = np.eye(4)
-    pose[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    pose[:3, 3] = place
+    rotation, pose = np.zeros(9), np.eye(4)
+    import_module("mujoco").mju_quat2Mat(rotation, quaternion)
+    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), place
     return pose

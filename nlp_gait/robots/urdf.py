@@ -18,7 +18,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.inertia import Array, Mass, combine_masses, point_inertia
-from nlp_gait.robots.meshes import box_points, cylinder_points, find_mesh, mesh_points, parse_xml
+from nlp_gait.robots.meshes import box_points, cylinder_points, find_mesh, make_pose, mesh_points, parse_xml
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 
 # Elements that are read; shapes, transmissions and plugins are removed before parsing.
@@ -85,7 +85,9 @@ def collision_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
             continue
         for shape in shapes.get(name, ()):
             kinds = [kind for geometry in shape.findall("geometry") for kind in geometry]
-            pose = np.linalg.inv(_at(frames[link][:3, 3])) @ frame @ _shape_pose(shape.find("origin"), name)
+            origin = {} if shape.find("origin") is None else shape.find("origin").attrib
+            place, angles = (_numbers(origin.get(key, "0 0 0"), 3, name) for key in ("xyz", "rpy"))
+            pose = make_pose(-frames[link][:3, 3]) @ frame @ make_pose(place, angles)
             for kind in kinds:
                 points = _shape_points(kind, pose, Path(path), name)
                 if points is None:
@@ -113,21 +115,6 @@ def _shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None
     else:
         return np.zeros((0, 3))
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
-
-
-def _shape_pose(origin: Any, link: str) -> Array:
-    if origin is None:
-        return np.eye(4)
-    pose = _at(np.array(_numbers(origin.get("xyz", "0 0 0"), 3, link)))
-    roll, pitch, yaw = _numbers(origin.get("rpy", "0 0 0"), 3, link)
-    pose[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
-    return pose
-
-
-def _at(place: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, 3] = place
-    return pose
 
 
 def _numbers(text: str, count: int, link: str) -> list[float]:
@@ -256,22 +243,9 @@ def _joint_record(joint: Any, frames: dict[str, Array], carriers: dict[str, str]
 
 
 def _pose(origin: Any, owner: str) -> Array:
-    """Return the pose (4, 4) of an ``<origin>``: roll, pitch, yaw about fixed axes, then the position."""
-    pose = np.eye(4)
+    """Return the pose (4, 4) of an ``<origin>``."""
     if origin is None:
-        return pose
+        return np.eye(4)
     if not are_plausible([*(origin.rpy or ()), *(origin.xyz or ())]):
         raise ValueError(f"{owner}: <origin> must hold finite numbers, got xyz {origin.xyz}, rpy {origin.rpy}")
-    roll, pitch, yaw = origin.rpy or (0.0, 0.0, 0.0)
-    pose[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
-    pose[:3, 3] = origin.xyz or (0.0, 0.0, 0.0)
-    return pose
-
-
-def _turn(axis: int, angle: float) -> Array:
-    """Return a rotation (3, 3) about a coordinate axis; exact for the angle zero."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    rotation = np.eye(3)
-    rotation[[i, j], [i, j]] = math.cos(angle)
-    rotation[i, j], rotation[j, i] = -math.sin(angle), math.sin(angle)
-    return rotation
+    return make_pose(origin.xyz or (0.0, 0.0, 0.0), origin.rpy or (0.0, 0.0, 0.0))
