@@ -16,19 +16,12 @@ DELIMITERS = ",;\t"
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Table of numbers.
+    """Table of numbers."""
 
-    Attributes:
-        owner: the file, for messages.
-        header: names of the columns; empty if the file has none.
-        rows: of equal length; NaN where a cell is empty.
-        lines: line of each row in the file.
-    """
-
-    owner: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[float, ...], ...]
-    lines: tuple[int, ...]
+    owner: str  # the file, for messages
+    header: tuple[str, ...]  # names of the columns; empty if the file has none
+    rows: tuple[tuple[float, ...], ...]  # of equal length; NaN where a cell is empty
+    lines: tuple[int, ...]  # line of each row in the file
 
     @property
     def width(self) -> int:

@@ -37,15 +37,10 @@ _allowed: dict[str, str] = {}
 
 
 class Reference(NamedTuple):
-    """Place of an object in user code.
+    """Place of an object in user code."""
 
-    Attributes:
-        home: absolute path of a file, or dotted name of a module.
-        name: of the object in it.
-    """
-
-    home: str
-    name: str
+    home: str  # absolute path of a file, or dotted name of a module
+    name: str  # of the object in it
 
     @property
     def is_file(self) -> bool:

@@ -37,40 +37,24 @@ DRAWN, LISTED = 20, 10  # best distinct optima
 
 @dataclass(frozen=True, kw_only=True)
 class LongSearch:
-    """One long run of CMA-ES with restarts, which shares only the exact functions with IPOPT.
+    """One long run of CMA-ES with restarts, which shares only the exact functions with IPOPT."""
 
-    Attributes:
-        objective: best feasible one, in the problem's sense; None if there was none.
-        evaluations: used.
-        gap: relative distance to the best optimum; negative if it is better.
-    """
-
-    objective: float | None
-    evaluations: int
-    gap: float | None
+    objective: float | None  # best feasible one, in the problem's sense; None if there was none
+    evaluations: int  # used
+    gap: float | None  # relative distance to the best optimum; negative if it is better
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
-    """Evidence that the best known optimum is the global one.
+    """Evidence that the best known optimum is the global one."""
 
-    Attributes:
-        problem: with its parameter values.
-        starts: of IPOPT.
-        statuses: number of starts by their status.
-        optima: distinct local optima, best first.
-        unseen: estimates of others.
-        search: None if it was not requested.
-        certificate: None if it was not requested, or branch and bound is not possible.
-    """
-
-    problem: GaitProblem
-    starts: int
-    statuses: dict[str, int]
-    optima: tuple[LocalOptimum, ...]
-    unseen: UnseenOptima
-    search: LongSearch | None
-    certificate: Certificate | None
+    problem: GaitProblem  # with its parameter values
+    starts: int  # of IPOPT
+    statuses: dict[str, int]  # number of starts by their status
+    optima: tuple[LocalOptimum, ...]  # distinct local optima, best first
+    unseen: UnseenOptima  # estimates of others
+    search: LongSearch | None  # None if it was not requested
+    certificate: Certificate | None  # None if it was not requested, or branch and bound is not possible
 
     @property
     def proven(self) -> str:

@@ -29,58 +29,38 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ends:
-    """Ends of all starts.
+    """Ends of all starts."""
 
-    Attributes:
-        x: (N, n) end points.
-        objective: (N,) exact values, in the problem's sense.
-        feasible: (N,) converged, and feasible for the exact functions.
-        status: (N,) in words.
-    """
-
-    x: Array
-    objective: Array
-    feasible: np.ndarray[Any, np.dtype[np.bool_]]
-    status: tuple[str, ...]
+    x: Array  # (N, n) end points
+    objective: Array  # (N,) exact values, in the problem's sense
+    feasible: np.ndarray[Any, np.dtype[np.bool_]]  # (N,) converged, and feasible for the exact functions
+    status: tuple[str, ...]  # (N,) in words
 
 
 @dataclass(frozen=True, kw_only=True)
 class LocalOptimum:
-    """Distinct local optimum.
+    """Distinct local optimum."""
 
-    Attributes:
-        objective: of its best end, in the problem's sense.
-        count: number of starts that reached it.
-        share: of the starts that converged.
-        x: of its best end.
-    """
-
-    objective: float
-    count: int
-    share: float
-    x: tuple[float, ...]
+    objective: float  # of its best end, in the problem's sense
+    count: int  # number of starts that reached it
+    share: float  # of the starts that converged
+    x: tuple[float, ...]  # of its best end
 
 
 @dataclass(frozen=True, kw_only=True)
 class UnseenOptima:
     """Estimates from N starts of the optima that none of them reached. They are support, not proof: N is finite.
 
-    Attributes:
-        good_turing: share of starts that would reach an unseen optimum: the optima reached once, divided by N.
-        expected_optima: expected number of all local optima, for a uniform prior on their number and shares; None if the sample
-            is too small.
-        expected_covered: expected share of starts that reach seen optima, for the same prior; None likewise.
-        largest_missed: upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts.
-
     Source:
         Good (1953), The population frequencies of species and the estimation of population parameters; Boender, Rinnooy Kan
         (1987), Bayesian stopping rules for multistart global optimization methods, Mathematical Programming 37.
     """
 
-    good_turing: float
+    good_turing: float  # share of starts that would reach an unseen optimum: the optima reached once, divided by N
+    # Expected number of all local optima, for a uniform prior on their number and shares; None if the sample is too small
     expected_optima: float | None
-    expected_covered: float | None
-    largest_missed: float
+    expected_covered: float | None  # expected share of starts that reach seen optima, for the same prior; None likewise
+    largest_missed: float  # upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
 
 
 def run_starts(

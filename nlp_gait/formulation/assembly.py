@@ -82,17 +82,12 @@ def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Param
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """Instants at which a problem evaluates its motion.
+    """Instants at which a problem evaluates its motion."""
 
-    Attributes:
-        intervals: equal parts to which limits on changes apply.
-        samples_per_interval: above 1 for more samples than these limits need.
-        refined_by: option of the problem's maker to multiply for a denser grid; None if the variables depend on the grid, so
-            that it cannot be refined.
-    """
-
-    intervals: int
-    samples_per_interval: int = 1
+    intervals: int  #: equal parts to which limits on changes apply
+    samples_per_interval: int = 1  #: above 1 for more samples than these limits need
+    #: Option of the problem's maker to multiply for a denser grid; None if the variables depend on the grid, so that it cannot
+    #: be refined
     refined_by: Literal["intervals", "samples_per_interval"] | None = None
 
     def __post_init__(self) -> None:
@@ -123,27 +118,17 @@ class Objective:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Constraint:
-    """Rows lower <= value <= upper; a missing bound is None.
+    """Rows lower <= value <= upper; a missing bound is None."""
 
-    Attributes:
-        name: of the group, for example ``"torque_change"``.
-        labels: one per row, naming joint or side and sample; empty for a single row without a label.
-        unit: of value and bounds.
-        scale: violation of this size counts as 1 in the total violation [unit].
-        value: (m, 1).
-        lower: (m, 1) or scalar, a function of parameters only.
-        upper: likewise.
-        over: part of the motion that the rows refer to; None if unknown. Labels of rows at samples end with a comma and the
-            sample.
-    """
-
-    name: str
+    name: str  #: of the group, for example ``"torque_change"``
+    #: One per row, naming joint or side and sample; empty for a single row without a label
     labels: tuple[str, ...] = ()
-    unit: str
-    scale: float
-    value: MX
-    lower: MX | None = None
-    upper: MX | None = None
+    unit: str  #: of value and bounds
+    scale: float  #: violation of this size counts as 1 in the total violation [unit]
+    value: MX  #: (m, 1)
+    lower: MX | None = None  #: (m, 1) or scalar, a function of parameters only
+    upper: MX | None = None  #: likewise
+    #: Part of the motion that the rows refer to; None if unknown. Labels of rows at samples end with a comma and the sample.
     over: Over | None = None
 
     def __post_init__(self) -> None:
@@ -198,17 +183,11 @@ def _short(value: object) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assembly:
-    """A problem's mathematics under one interpretation of the non-smooth operations.
+    """A problem's mathematics under one interpretation of the non-smooth operations."""
 
-    Attributes:
-        objective: scalar, in the problem's own sense.
-        constraints: groups of rows.
-        indexes: named performance figures (scalars); meaningful under ``Exact`` only.
-    """
-
-    objective: MX
-    constraints: tuple[Constraint, ...]
-    indexes: Mapping[str, MX]
+    objective: MX  #: scalar, in the problem's own sense
+    constraints: tuple[Constraint, ...]  #: groups of rows
+    indexes: Mapping[str, MX]  #: named performance figures (scalars); meaningful under ``Exact`` only
 
     def __post_init__(self) -> None:
         for owner, value in (("objective", self.objective), *((f"index {n!r}", v) for n, v in self.indexes.items())):
@@ -231,17 +210,11 @@ class Assembly:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PointOf(Generic[Expression]):
-    """A point of a problem, read by name: ``point["hip_height_m"]``.
+    """A point of a problem, read by name: ``point["hip_height_m"]``."""
 
-    Attributes:
-        x: (n, 1) decision variables.
-        p: (k, 1) parameters.
-        positions: of each name in x or in p.
-    """
-
-    x: Expression
-    p: Expression
-    positions: Mapping[str, tuple[Literal["x", "p"], int]]
+    x: Expression  #: (n, 1) decision variables
+    p: Expression  #: (k, 1) parameters
+    positions: Mapping[str, tuple[Literal["x", "p"], int]]  #: of each name in x or in p
 
     @classmethod
     def of(
@@ -282,22 +255,16 @@ NumericPoint: TypeAlias = PointOf[Any]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RowsOverTime:
-    """Rows of one phase of a motion as functions of time, which also defines them between samples.
+    """Rows of one phase of a motion as functions of time, which also defines them between samples."""
 
-    Attributes:
-        name: of the phase; empty if the motion has one phase only.
-        assemble: from a point, times (1, k) as fractions of the phase and an interpretation to the rows and indexes with samples
-            at these times; ``Constraint.over`` tells how a row depends on them.
-        times: from the values of variables and parameters by name to the start and the end of the phase [s].
-        intervals: equal parts to which limits on changes apply.
-        means: indexes that are means or integrals over time: with all samples at one time, the value that is averaged. Those of
-            the same name in several phases are added.
-        kinks: fractions of the phase at which a formula changes, such as a spline's knots.
-    """
-
-    name: str = ""
+    name: str = ""  #: of the phase; empty if the motion has one phase only
+    #: From a point, times (1, k) as fractions of the phase and an interpretation to the rows and indexes with samples at these
+    #: times; ``Constraint.over`` tells how a row depends on them
     assemble: Callable[[Point, MX, Nonsmooth], Assembly]
+    #: From the values of variables and parameters by name to the start and the end of the phase [s]
     times: Callable[[Mapping[str, float]], tuple[float, float]]
-    intervals: int = 1
+    intervals: int = 1  #: equal parts to which limits on changes apply
+    #: Indexes that are means or integrals over time; with all samples at one time, the value that is averaged. Those of the
+    #: same name in several phases are added.
     means: tuple[str, ...] = ()
-    kinks: tuple[float, ...] = ()
+    kinks: tuple[float, ...] = ()  #: fractions of the phase at which a formula changes, such as a spline's knots

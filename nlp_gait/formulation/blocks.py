@@ -15,23 +15,14 @@ from nlp_gait.formulation.signals import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Variables ``<quantity>_<row>_<unit>[<column>]``, for example ``angle_HK_rad[12]``.
+    """Variables ``<quantity>_<row>_<unit>[<column>]``, for example ``angle_HK_rad[12]``."""
 
-    Attributes:
-        quantity: for example ``"angle"``.
-        unit: of all values, for example ``"rad/s^2"``.
-        rows: names of the rows.
-        columns: number of columns.
-        limits: lower and upper bound of every row [unit].
-        description: of a row.
-    """
-
-    quantity: str
-    unit: str
-    rows: tuple[str, ...]
-    columns: int
-    limits: tuple[tuple[float, float], ...]
-    description: str
+    quantity: str  # for example ``"angle"``
+    unit: str  # of all values, for example ``"rad/s^2"``
+    rows: tuple[str, ...]  # names of the rows
+    columns: int  # number of columns
+    limits: tuple[tuple[float, float], ...]  # lower and upper bound of every row [unit]
+    description: str  # of a row
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -57,13 +48,9 @@ class Block:
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Layout of x: consecutive blocks.
+    """Layout of x: consecutive blocks."""
 
-    Attributes:
-        blocks: in the order of x.
-    """
-
-    blocks: tuple[Block, ...]
+    blocks: tuple[Block, ...]  # in the order of x
 
     @property
     def variables(self) -> tuple[Variable, ...]:

@@ -28,55 +28,35 @@ SIMULATED = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tread:
-    """Level part of a staircase, from its edge to the next one.
+    """Level part of a staircase, from its edge to the next one."""
 
-    Attributes:
-        edge_m: x of its edge.
-        height_m: above the floor.
-    """
-
-    edge_m: float
-    height_m: float
+    edge_m: float  # x of its edge
+    height_m: float  # above the floor
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulationModel:
-    """What a physics engine needs of a problem.
+    """What a physics engine needs of a problem."""
 
-    Attributes:
-        robot: as the engine models it: links that never move are welded.
-        gravity: [m/s^2].
-        heat_loss: parameter with the heat constant K [W/(Nm)^2]; None for motors without known heat.
-        repeats: several steps can be simulated one after the other.
-        motion: from a point and a number of steps to time histories on a dense grid, in the robot's joints and with the arrays
-            of ``SIMULATED``; None if those of the problem are that already, and the next step is the mirror image.
-        ground: from a point and a number of steps to the stairs; None for a flat floor.
-        planar: the root moves in the sagittal plane only.
-    """
-
-    robot: RobotModel
-    gravity: float
-    heat_loss: str | None = None
-    repeats: bool = False
+    robot: RobotModel  #: as the engine models it, where links that never move are welded
+    gravity: float  #: [m/s^2]
+    heat_loss: str | None = None  #: parameter with the heat constant K [W/(Nm)^2]; None for motors without known heat
+    repeats: bool = False  #: several steps can be simulated one after the other
+    #: From a point and a number of steps to time histories on a dense grid, in the robot's joints and with the arrays of
+    #: ``SIMULATED``; None if those of the problem are that already, and the next step is the mirror image
     motion: Callable[[NumericPoint, int], Signals] | None = None
+    #: From a point and a number of steps to the stairs; None for a flat floor
     ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None
-    planar: bool = False
+    planar: bool = False  #: the root moves in the sagittal plane only
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Display:
-    """What shows the gaits of a problem; no solver reads it.
+    """What shows the gaits of a problem; no solver reads it."""
 
-    Attributes:
-        motion: time histories at a point of numbers.
-        skeleton: stick figures from time histories and the parameters by name.
-        simulation_model: what a physics engine needs.
-        robot: whose joints move, if it is a tree of rigid links.
-        durations: variables with the duration of each phase, in order.
-    """
-
-    motion: Callable[[NumericPoint], Signals] | None = None
+    motion: Callable[[NumericPoint], Signals] | None = None  #: time histories at a point of numbers
+    #: Stick figures from time histories and the parameters by name
     skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
-    simulation_model: SimulationModel | None = None
-    robot: RobotModel | None = None
-    durations: tuple[str, ...] = ()
+    simulation_model: SimulationModel | None = None  #: what a physics engine needs
+    robot: RobotModel | None = None  #: whose joints move, if it is a tree of rigid links
+    durations: tuple[str, ...] = ()  #: variables with the duration of each phase, in order

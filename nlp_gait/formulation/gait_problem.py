@@ -55,22 +55,18 @@ class Origin(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolverHints:
-    """What solvers may use; it changes no problem.
+    """What solvers may use; it changes no problem."""
 
-    Attributes:
-        start: start point (n,) for gradient methods from the parameters by name and a generator; None for a uniform one within
-            the bounds.
-        hessian: of the Lagrangian: exact, or approximated where that was measured to be better.
-        amplifies_rounding: a rounding error may decide a jump, so that the result depends on libm's rounding. Compiled code then
-            rounds as the virtual machine does, on every lane count, and is slower.
-        starts: default number of starts: fewer where all lead to the same point, or each takes long.
-        searchable: False for a problem that only gradient methods can solve, with thousands of variables tied by equations.
-    """
-
+    #: Start point (n,) for gradient methods from the parameters by name and a generator; None for a uniform one within the
+    #: bounds
     start: Start | None = None
+    #: Of the Lagrangian, exact or approximated where that was measured to be better
     hessian: Literal["exact", "limited-memory"] = "exact"
+    #: A rounding error may decide a jump, so that the result depends on libm's rounding. Compiled code then rounds as the
+    #: virtual machine does, on every lane count, and is slower.
     amplifies_rounding: bool = False
-    starts: int = 20
+    starts: int = 20  #: default number of starts; fewer where all lead to the same point, or each takes long
+    #: False for a problem that only gradient methods can solve, with thousands of variables tied by equations
     searchable: bool = True
 
 
@@ -80,40 +76,28 @@ class GaitProblem:
 
     Copies made by ``with_values`` share everything that was built from the mathematics; ``derive`` changes the mathematics. A
     problem may be used by several threads. It is pickled as its maker's name, options and values.
-
-    Attributes:
-        name: for example ``"nao-ssp"``.
-        title: one line.
-        variables: in the order of x.
-        own_parameters: limits and weights, without the variables' bounds.
-        objective: name, unit, sense.
-        assemble: builds objective and constraints from symbols and an interpretation.
-        options: what the mathematics was built with (robot, intervals, ...); written by ``formulation.registry.maker``.
-        values: parameters that differ from their defaults.
-        refine: makes the same problem with a number of times as many samples; None if there is no finer grid.
-        grid: samples, or None if the problem has none.
-        rows_over_time: the motion's rows as functions of time, one entry per phase; empty if they are defined on samples only.
-        power_form: makes the problem's least-power form for proofs; None if it has none.
-        display: what shows its gaits.
-        hints: for solvers.
-        loaded_as: argument of ``load``, if that is not the name: user code.
     """
 
-    name: str
-    title: str
-    variables: tuple[Variable, ...]
-    own_parameters: tuple[Parameter, ...]
-    objective: Objective
+    name: str  #: for example ``"nao-ssp"``
+    title: str  #: one line
+    variables: tuple[Variable, ...]  #: in the order of x
+    own_parameters: tuple[Parameter, ...]  #: limits and weights, without the variables' bounds
+    objective: Objective  #: name, unit, sense
+    #: Builds objective and constraints from symbols and an interpretation
     assemble: Callable[[Point, Nonsmooth], Assembly]
+    #: What the mathematics was built with (robot, intervals, ...); written by ``formulation.registry.maker``
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)  #: parameters that differ from their defaults
+    #: Makes the same problem with a number of times as many samples; None if there is no finer grid
     refine: Callable[[int], GaitProblem] | None = None
-    grid: Grid | None = None
+    grid: Grid | None = None  #: samples, or None if the problem has none
+    #: The motion's rows as functions of time, one entry per phase; empty if they are defined on samples only
     rows_over_time: tuple[RowsOverTime, ...] = ()
+    #: Makes the problem's least-power form for proofs; None if it has none
     power_form: Callable[[GaitProblem], PowerForm] | None = None
-    display: Display = Display()
-    hints: SolverHints = SolverHints()
-    loaded_as: str = ""
+    display: Display = Display()  #: what shows its gaits
+    hints: SolverHints = SolverHints()  #: for solvers
+    loaded_as: str = ""  #: argument of ``load``, if that is not the name but user code
     # No arguments: only copies made by ``with_values`` and ``with_origin`` share them.
     _cache: Cache = field(default_factory=Cache, init=False, repr=False)
     _origin: Origin | None = field(default=None, init=False, repr=False)

@@ -23,54 +23,31 @@ class PowerRows:
     """Roles of the outputs of a function: rows with bounds, and the terms of the cost.
 
     The cost is the sum of weight |torque rate| over K terms, divided by the duration, plus the sum of loss times heat.
-
-    Attributes:
-        row: (R,) outputs that are limited.
-        lower: (R,) their bounds.
-        upper: (R,).
-        power: (K,) outputs torque times rate.
-        torque: (K,) outputs.
-        rate: (K,) outputs, in unit time.
-        weight: (K,) positive.
-        heat: (L,) outputs that are never negative.
-        loss: (L,) positive.
-        duration: input.
-        ranges: (n,) widths of the inputs, in which boxes are measured.
     """
 
-    row: Integers
-    lower: Array
-    upper: Array
-    power: Integers
-    torque: Integers
-    rate: Integers
-    weight: Array
-    heat: Integers
-    loss: Array
-    duration: int
-    ranges: Array
+    row: Integers  # (R,) outputs that are limited
+    lower: Array  # (R,) their bounds
+    upper: Array  # (R,)
+    power: Integers  # (K,) outputs torque times rate
+    torque: Integers  # (K,) outputs
+    rate: Integers  # (K,) outputs, in unit time
+    weight: Array  # (K,) positive
+    heat: Integers  # (L,) outputs that are never negative
+    loss: Array  # (L,) positive
+    duration: int  # input
+    ranges: Array  # (n,) widths of the inputs, in which boxes are measured
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PowerForm:
-    """A least-power problem as a function of z, into which every x is mapped.
+    """A least-power problem as a function of z, into which every x is mapped."""
 
-    Attributes:
-        to_z: maps points (..., n) to their z (..., n).
-        box: (n, 2) box that contains the z of every x within its bounds.
-        function: maps z to all outputs.
-        rows: roles of these outputs. Their bounds contain every point that the judge accepts.
-        poses: maps z to the outputs of the rows that cost little, which are bounded first.
-        pose_rows: (E,) numbers of these rows in ``rows``.
-        indexes: maps z to indexes of the problem, under the same names; they are compared with the exact functions.
-        domain: prefix of the names of the rows that must be satisfied where the two are compared.
-    """
-
-    to_z: Callable[[Array], Array]
-    box: Array
-    function: ca.Function
-    rows: PowerRows
-    poses: ca.Function
-    pose_rows: Integers
+    to_z: Callable[[Array], Array]  # maps points (..., n) to their z (..., n)
+    box: Array  # (n, 2) box that contains the z of every x within its bounds
+    function: ca.Function  # maps z to all outputs
+    rows: PowerRows  # roles of these outputs. Their bounds contain every point that the judge accepts
+    poses: ca.Function  # maps z to the outputs of the rows that cost little, which are bounded first
+    pose_rows: Integers  # (E,) numbers of these rows in ``rows``
+    # Maps z to indexes of the problem, under the same names; they are compared with the exact functions
     indexes: ca.Function
-    domain: str
+    domain: str  # prefix of the names of the rows that must be satisfied where the two are compared

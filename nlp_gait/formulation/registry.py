@@ -122,15 +122,10 @@ def _user_maker(name: str) -> Maker:
 
 @dataclass(frozen=True)
 class UserMaker:
-    """Maker of a user-defined problem in the process where the problem is unpickled.
+    """Maker of a user-defined problem in the process where the problem is unpickled."""
 
-    Attributes:
-        name: see ``find_maker``.
-        source: hash of its source.
-    """
-
-    name: str
-    source: str
+    name: str  # see ``find_maker``
+    source: str  # hash of its source
 
     def __call__(self, **options: Any) -> GaitProblem:
         """Return the problem; raise InputError if its source has changed."""

@@ -25,21 +25,13 @@ FINE_INTERVALS = 1000  # of a grid that splines are fitted to: their error is be
 
 @dataclass(frozen=True, kw_only=True)
 class StoredProblem:
-    """A problem in a study's record.
+    """A problem in a study's record."""
 
-    Attributes:
-        name: argument of ``load``.
-        options: of its maker.
-        parameters: that differ from the defaults.
-        sha256: hash of the mathematics and the parameters.
-        source_sha256: hash of the source of a user-defined problem.
-    """
-
-    name: str
-    options: Mapping[str, str | int | float | bool]
-    parameters: Mapping[str, float]
-    sha256: str
-    source_sha256: str = ""
+    name: str  # argument of ``load``
+    options: Mapping[str, str | int | float | bool]  # of its maker
+    parameters: Mapping[str, float]  # that differ from the defaults
+    sha256: str  # hash of the mathematics and the parameters
+    source_sha256: str = ""  # hash of the source of a user-defined problem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,15 +57,10 @@ class _ResultFile:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Result:
-    """A point of a problem.
+    """A point of a problem."""
 
-    Attributes:
-        problem: with the options and parameter values that it was solved with.
-        x: (n,) decision variables.
-    """
-
-    problem: GaitProblem
-    x: Array
+    problem: GaitProblem  #: with the options and parameter values that it was solved with
+    x: Array  #: (n,) decision variables
 
 
 def load_result(path: Path) -> Result:

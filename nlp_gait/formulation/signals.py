@@ -19,15 +19,10 @@ JOINT_UNITS = {"q": "rad", "qd": "rad/s", "qdd": "rad/s^2", "tau": "Nm"}
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """Description of the columns of one time history.
+    """Description of the columns of one time history."""
 
-    Attributes:
-        unit: of all of them.
-        labels: one per column.
-    """
-
-    unit: str
-    labels: tuple[str, ...] = ("",)
+    unit: str  #: of all of them
+    labels: tuple[str, ...] = ("",)  #: one per column
 
 
 def vector_columns(unit: str, axes: str = "xyz") -> Columns:
@@ -37,37 +32,25 @@ def vector_columns(unit: str, axes: str = "xyz") -> Columns:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointAngles:
-    """Angles of some joints over time.
+    """Angles of some joints over time."""
 
-    Attributes:
-        owner: the file, for messages.
-        joints: names of the columns.
-        t: (T,) ascending [s].
-        q: (T, J) [rad].
-    """
-
-    owner: str
-    joints: tuple[str, ...]
-    t: Array
-    q: Array
+    owner: str  # the file, for messages
+    joints: tuple[str, ...]  # names of the columns
+    t: Array  # (T,) ascending [s]
+    q: Array  # (T, J) [rad]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Signals:
     """Time histories of one gait.
 
-    Attributes:
-        joints: names of the columns of q, qd, qdd and tau.
-        arrays: by name; the first axis is time, ``"t"`` is time itself [s].
-        columns: unit and labels of every array but ``"t"`` and those of the joints.
-
     Raises:
         InputError: the columns of an array are not described, or their number differs.
     """
 
-    joints: tuple[str, ...]
-    arrays: Mapping[str, Array]
-    columns: Mapping[str, Columns]
+    joints: tuple[str, ...]  #: names of the columns of q, qd, qdd and tau
+    arrays: Mapping[str, Array]  #: by name; the first axis is time, ``"t"`` is time itself [s]
+    columns: Mapping[str, Columns]  #: unit and labels of every array but ``"t"`` and those of the joints
 
     def __post_init__(self) -> None:
         for name, _, labels, table in self._tables():

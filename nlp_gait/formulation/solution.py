@@ -20,23 +20,14 @@ SHOWN = 20  # variables, and constraints with a price, in a notebook
 
 @dataclass(frozen=True, kw_only=True)
 class ActiveConstraint:
-    """An active bound.
+    """An active bound."""
 
-    Attributes:
-        name: row or variable bound, for example ``"dbm_y_mean"`` or ``"bounds[hip_height_m]"``.
-        side: ``"lower"`` or ``"upper"``.
-        bound: value of the bound [unit].
-        unit: of the bound.
-        price: change of the optimal objective per unit of the bound.
-        price_unit: for example ``"W per m"``.
-    """
-
-    name: str
-    side: str
-    bound: float
-    unit: str
-    price: float
-    price_unit: str
+    name: str  #: row or variable bound, for example ``"dbm_y_mean"`` or ``"bounds[hip_height_m]"``
+    side: str  #: ``"lower"`` or ``"upper"``
+    bound: float  #: value of the bound [unit]
+    unit: str  #: of the bound
+    price: float  #: change of the optimal objective per unit of the bound
+    price_unit: str  #: for example ``"W per m"``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,64 +80,37 @@ class Best(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Guess:
-    """Primal and dual point of the lifted NLP, for a warm start of a neighbouring problem.
+    """Primal and dual point of the lifted NLP, for a warm start of a neighbouring problem."""
 
-    Attributes:
-        primal: scaled variables, then the lifted ones.
-        bounds: multipliers of their bounds, positive at an upper bound.
-        rows: multipliers of all rows, those of the problem first.
-        width: sigmoid width of that NLP.
-    """
-
-    primal: Array
-    bounds: Array
-    rows: Array
-    width: float
+    primal: Array  # scaled variables, then the lifted ones
+    bounds: Array  # multipliers of their bounds, positive at an upper bound
+    rows: Array  # multipliers of all rows, those of the problem first
+    width: float  # sigmoid width of that NLP
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcome:
-    """One run of an NLP solver from one start point.
+    """One run of an NLP solver from one start point."""
 
-    Attributes:
-        solver: its name.
-        x0: (n,) start point.
-        x: (n,) end point, within the bounds.
-        claimed: the solver claims a solution.
-        status: reason why it ended.
-        objective: exact value at x, in the problem's sense.
-        cost: the minimised value: negated if the problem maximises the objective.
-        violation: exact total violation at x.
-        iterations: over all stages, if the solver counts them.
-        evaluations: over all stages.
-        time_s: wall time of the run itself [s].
-        build_s: time to build the symbolic NLP, also if an earlier run built it [s].
-        compile_s: time to make the solver, with derivatives and their compilation, also if an earlier run did [s].
-        functions: ``"compiled"`` or ``"interpreted"``.
-        linear_solver: used by the solver, if it reports it.
-        guess: warm start with multipliers, if the solver has one.
-        history: best so far, if the solver records it.
-        objective_s: part of the time in the exact functions, NaN if unknown [s].
-    """
-
-    solver: str
-    x0: Array
-    x: Array
-    claimed: bool
-    status: str
-    objective: float
-    cost: float
-    violation: float
-    iterations: int
-    evaluations: Evaluations
-    time_s: float
-    build_s: float = 0.0
+    solver: str  #: its name
+    x0: Array  #: (n,) start point
+    x: Array  #: (n,) end point, within the bounds
+    claimed: bool  #: the solver claims a solution
+    status: str  #: reason why it ended
+    objective: float  #: exact value at x, in the problem's sense
+    cost: float  #: the minimised value, negated if the problem maximises the objective
+    violation: float  #: exact total violation at x
+    iterations: int  #: over all stages, if the solver counts them
+    evaluations: Evaluations  #: over all stages
+    time_s: float  #: wall time of the run itself [s]
+    build_s: float = 0.0  #: time to build the symbolic NLP, also if an earlier run built it [s]
+    #: Time to make the solver, with derivatives and their compilation, also if an earlier run did [s]
     compile_s: float = 0.0
-    functions: str = "interpreted"
-    linear_solver: str = ""
-    guess: Guess | None = None
-    history: tuple[Best, ...] = ()
-    objective_s: float = math.nan
+    functions: str = "interpreted"  #: ``"compiled"`` or ``"interpreted"``
+    linear_solver: str = ""  #: used by the solver, if it reports it
+    guess: Guess | None = None  #: warm start with multipliers, if the solver has one
+    history: tuple[Best, ...] = ()  #: best so far, if the solver records it
+    objective_s: float = math.nan  #: part of the time in the exact functions, NaN if unknown [s]
 
     @property
     def feasible(self) -> bool:
@@ -168,51 +132,28 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Solution:
-    """Best of all starts, judged by the exact functions.
+    """Best of all starts, judged by the exact functions."""
 
-    Attributes:
-        problem: name.
-        options: of the problem.
-        parameters: values that differ from the defaults.
-        claimed: the solver claims that x is a solution.
-        status: reason why the best start ended, and the obstacle if none converged.
-        objective: exact value, in the problem's sense.
-        objective_name: for example ``"power"``.
-        objective_unit: for example ``"W"``.
-        x: by variable name.
-        violation: exact total violation.
-        worst_violations: violated rows, worst first.
-        iterations: of the best start.
-        evaluations: over all starts.
-        time_s: over all starts.
-        solver: for example ``"ipopt"``.
-        linear_solver: used by the solver; empty if it does not report it.
-        functions: ``"compiled"`` or ``"interpreted"``.
-        active_constraints: bounds with a price, highest first.
-        starts: outcome of every start.
-        seed: of the start points.
-    """
-
-    problem: str
-    options: dict[str, Any]
-    parameters: dict[str, float]
-    claimed: bool
-    status: str
-    objective: float
-    objective_name: str
-    objective_unit: str
-    x: dict[str, float]
-    violation: float
-    worst_violations: tuple[ConstraintValue, ...]
-    iterations: int
-    evaluations: Evaluations
-    time_s: SolveTime
-    solver: str
-    linear_solver: str
-    functions: str
-    active_constraints: tuple[ActiveConstraint, ...]
-    starts: tuple[Outcome, ...]
-    seed: int
+    problem: str  #: name
+    options: dict[str, Any]  #: of the problem
+    parameters: dict[str, float]  #: values that differ from the defaults
+    claimed: bool  #: the solver claims that x is a solution
+    status: str  #: reason why the best start ended, and the obstacle if none converged
+    objective: float  #: exact value, in the problem's sense
+    objective_name: str  #: for example ``"power"``
+    objective_unit: str  #: for example ``"W"``
+    x: dict[str, float]  #: by variable name
+    violation: float  #: exact total violation
+    worst_violations: tuple[ConstraintValue, ...]  #: violated rows, worst first
+    iterations: int  #: of the best start
+    evaluations: Evaluations  #: over all starts
+    time_s: SolveTime  #: over all starts
+    solver: str  #: for example ``"ipopt"``
+    linear_solver: str  #: used by the solver; empty if it does not report it
+    functions: str  #: ``"compiled"`` or ``"interpreted"``
+    active_constraints: tuple[ActiveConstraint, ...]  #: bounds with a price, highest first
+    starts: tuple[Outcome, ...]  #: outcome of every start
+    seed: int  #: of the start points
 
     @property
     def feasible(self) -> bool:

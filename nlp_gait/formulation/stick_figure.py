@@ -15,55 +15,33 @@ LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limb:
-    """Chain of joints from end to end.
+    """Chain of joints from end to end."""
 
-    Attributes:
-        side: left, right or trunk; determines the colour.
-        points: (T, K, 3) [m].
-    """
-
-    side: str
-    points: Array
+    side: str  # left, right or trunk; determines the colour
+    points: Array  # (T, K, 3) [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sole:
-    """Outline of a foot.
+    """Outline of a foot."""
 
-    Attributes:
-        side: left or right.
-        corners: (T, K, 3) [m].
-        supports: (T,) whether it carries load.
-    """
-
-    side: str
-    corners: Array
-    supports: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    side: str  # left or right
+    corners: Array  # (T, K, 3) [m]
+    supports: np.ndarray[tuple[int], np.dtype[np.bool_]]  # (T,) whether it carries load
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Skeleton:
-    """Drawing of a gait; x forward, y left, z up.
+    """Drawing of a gait; x forward, y left, z up."""
 
-    Attributes:
-        t: (T,) [s].
-        limbs: lines.
-        soles: outlines.
-        ground: (K, 2) line (x, z) of the floor or stair, seen from the side [m].
-        com: (T, 3) centre of mass [m], if known.
-        zmp: (T, 3) zero-moment point on the ground [m], if known.
-        planar: only the side view is meaningful.
-        title: one line.
-    """
-
-    t: Array
-    limbs: tuple[Limb, ...]
-    soles: tuple[Sole, ...]
-    ground: Array
-    com: Array | None
-    zmp: Array | None
-    planar: bool = False
-    title: str = ""
+    t: Array  # (T,) [s]
+    limbs: tuple[Limb, ...]  # lines
+    soles: tuple[Sole, ...]  # outlines
+    ground: Array  # (K, 2) line (x, z) of the floor or stair, seen from the side [m]
+    com: Array | None  # (T, 3) centre of mass [m], if known
+    zmp: Array | None  # (T, 3) zero-moment point on the ground [m], if known
+    planar: bool = False  # only the side view is meaningful
+    title: str = ""  # one line
 
     def support(self, k: int) -> Array | None:
         """Return the support polygon (M, 2) at a sample, the hull of the loaded soles from above [m]; None without one."""

@@ -38,19 +38,12 @@ CODE = (affine, quadratic, quadratic_tape, boxes, bounds, branch_and_bound)
 
 @dataclass(frozen=True, kw_only=True)
 class CertificateFile:
-    """A certificate and its problem.
+    """A certificate and its problem."""
 
-    Attributes:
-        schema: version of the file format.
-        problem: name, options, parameters, and the hash of its mathematics.
-        code_sha256: hash of the code that made the proof, see ``hash_code``.
-        certificate: the proven bound.
-    """
-
-    schema: Literal[1] = 1
-    problem: Mapping[str, Any]
-    code_sha256: str
-    certificate: Certificate
+    schema: Literal[1] = 1  # version of the file format
+    problem: Mapping[str, Any]  # name, options, parameters, and the hash of its mathematics
+    code_sha256: str  # hash of the code that made the proof, see ``hash_code``
+    certificate: Certificate  # the proven bound
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -59,21 +52,13 @@ class CertificateFile:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """Result of following random paths.
+    """Result of following random paths."""
 
-    Attributes:
-        paths: number of paths, each from the root to a box of which both halves are dropped.
-        pieces: number of boxes dropped on the way; each is proven to contain nothing better.
-        deepest: number of halvings on the longest path.
-        boxes: estimated number of boxes of the whole tree (Knuth 1975).
-        same_code: whether this code made the file; otherwise the paths prove what this code would prove.
-    """
-
-    paths: int
-    pieces: int
-    deepest: int
-    boxes: float
-    same_code: bool
+    paths: int  # number of paths, each from the root to a box of which both halves are dropped
+    pieces: int  # number of boxes dropped on the way; each is proven to contain nothing better
+    deepest: int  # number of halvings on the longest path
+    boxes: float  # estimated number of boxes of the whole tree (Knuth 1975)
+    same_code: bool  # whether this code made the file; otherwise the paths prove what this code would prove
 
 
 def make_certificate_file(problem: GaitProblem, certificate: Certificate) -> CertificateFile:

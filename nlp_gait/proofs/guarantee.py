@@ -17,23 +17,14 @@ from nlp_gait.proofs.time_search import GRAIN, ROUNDING, TimeSearch, bound_viola
 
 @dataclass(frozen=True, kw_only=True)
 class RowViolation:
-    """A row that is violated at some time, or not proven to be satisfied at all times.
+    """A row that is violated at some time, or not proven to be satisfied at all times."""
 
-    Attributes:
-        row: its name.
-        unit: of the row.
-        from_s: start of the first piece of time in which it is not proven to be satisfied [s].
-        to_s: end of that piece [s].
-        least: lower bound of the largest violation over all times [unit]; 0 if none is proven.
-        most: upper bound of it [unit]; None if there is none.
-    """
-
-    row: str
-    unit: str
-    from_s: float
-    to_s: float
-    least: float
-    most: float | None
+    row: str  # its name
+    unit: str  # of the row
+    from_s: float  # start of the first piece of time in which it is not proven to be satisfied [s]
+    to_s: float  # end of that piece [s]
+    least: float  # lower bound of the largest violation over all times [unit]; 0 if none is proven
+    most: float | None  # upper bound of it [unit]; None if there is none
 
     def __str__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
@@ -47,24 +38,18 @@ class RowViolation:
 
 @dataclass(frozen=True, kw_only=True)
 class Guarantee:
-    """What is proven about a gait between its samples.
+    """What is proven about a gait between its samples."""
 
-    Attributes:
-        satisfied: True if all rows over time are satisfied at all times, to 1e-6 in their units; False if a violation is proven;
-            None if neither is proven.
-        violations: rows that are not proven to be satisfied, by the time at which that begins.
-        sampled: rows that are defined on samples only; the judge checks them there.
-        means: bounds of true time means and integrals, by the name of the index.
-        pieces: number of pieces of time that were enclosed.
-        reason: why nothing is proven, or empty.
-    """
-
+    # True if all rows over time are satisfied at all times, to 1e-6 in their units; False if a violation is proven; None if
+    # neither is proven
     satisfied: bool | None
+    # Rows that are not proven to be satisfied, by the time at which that begins
     violations: tuple[RowViolation, ...] = ()
-    sampled: tuple[str, ...] = ()
+    sampled: tuple[str, ...] = ()  # rows that are defined on samples only; the judge checks them there
+    # Bounds of true time means and integrals, by the name of the index
     means: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    pieces: int = 0
-    reason: str = ""
+    pieces: int = 0  # number of pieces of time that were enclosed
+    reason: str = ""  # why nothing is proven, or empty
 
     def __str__(self) -> str:
         if self.reason:

@@ -52,33 +52,20 @@ class Enclosed:
 
 
 class EnclosedPart(NamedTuple):
-    """Group of values.
+    """Group of values."""
 
-    Attributes:
-        function: computes them, and possibly others.
-        columns: indices of the group in the function's results.
-        work: of an evaluation, relative to that of all values.
-    """
-
-    function: AffineFunction
-    columns: Numbers
-    work: float
+    function: AffineFunction  # computes them, and possibly others
+    columns: Numbers  # indices of the group in the function's results
+    work: float  # of an evaluation, relative to that of all values
 
 
 class TimeRows(NamedTuple):
-    """Functions of time of one kind: (x, p, phase) or (x, p, phase, phase an interval later) to values.
+    """Functions of time of one kind: (x, p, phase) or (x, p, phase, phase an interval later) to values."""
 
-    Attributes:
-        names: of the values.
-        units: of the values; empty for indexes, which have no bounds.
-        values: enclosed; rows of every time with one name are a group. None if there are none.
-        bounds: p to lower and upper bounds.
-    """
-
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    values: Enclosed | None
-    bounds: ca.Function
+    names: tuple[str, ...]  # of the values
+    units: tuple[str, ...]  # of the values; empty for indexes, which have no bounds
+    values: Enclosed | None  # enclosed; rows of every time with one name are a group. None if there are none
+    bounds: ca.Function  # p to lower and upper bounds
 
     @lock_casadi
     def bound(self, p: Array) -> tuple[Array, Array]:
@@ -88,23 +75,14 @@ class TimeRows(NamedTuple):
 
 
 class TimeFunctions(NamedTuple):
-    """Rows over time of one phase as enclosed functions.
+    """Rows over time of one phase as enclosed functions."""
 
-    Attributes:
-        source: the rows over time.
-        instants: rows of each instant, followed by those values whose time means are rows or indexes.
-        plain: number of the rows of instants.
-        squares: indices of squares whose mean limits a root mean square.
-        changes: rows of each interval.
-        sampled: rows that are defined on samples only.
-    """
-
-    source: RowsOverTime
-    instants: TimeRows
-    plain: int
-    squares: frozenset[int]
-    changes: TimeRows
-    sampled: tuple[str, ...]
+    source: RowsOverTime  # the rows over time
+    instants: TimeRows  # rows of each instant, followed by those values whose time means are rows or indexes
+    plain: int  # number of the rows of instants
+    squares: frozenset[int]  # indices of squares whose mean limits a root mean square
+    changes: TimeRows  # rows of each interval
+    sampled: tuple[str, ...]  # rows that are defined on samples only
 
 
 @lock_casadi

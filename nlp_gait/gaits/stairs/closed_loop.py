@@ -42,36 +42,22 @@ TORSO = LINKS.index("UH")
 
 
 class Rollout(NamedTuple):
-    """The closed loop at the end of every quantum; columns are quanta.
+    """The closed loop at the end of every quantum; columns are quanta."""
 
-    Attributes:
-        desired: (18, m) desired angles and rates.
-        state: (18, m) angles [rad] and rates [rad/s] of the nine links.
-        torque: (9, m) generalised torques of the links [Nm].
-        zmp: (1, m) ahead of the stance ankle, on the virtual slope in double support [m].
-    """
-
-    desired: MX
-    state: MX
-    torque: MX
-    zmp: MX
+    desired: MX  # (18, m) desired angles and rates
+    state: MX  # (18, m) angles [rad] and rates [rad/s] of the nine links
+    torque: MX  # (9, m) generalised torques of the links [Nm]
+    zmp: MX  # (1, m) ahead of the stance ankle, on the virtual slope in double support [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedLoop:
-    """Closed loop over whole quanta of time.
+    """Closed loop over whole quanta of time."""
 
-    Attributes:
-        quanta: number of steps of the rollout.
-        scheme: of the quantised dynamics.
-        gains: number of different K_p, and of different K_d: 1 or one for each link.
-        inverse_kinematics: source of the desired angles of both legs.
-    """
-
-    quanta: int
-    scheme: Scheme
-    gains: int
-    inverse_kinematics: InverseKinematics = "closed-form"
+    quanta: int  # number of steps of the rollout
+    scheme: Scheme  # of the quantised dynamics
+    gains: int  # number of different K_p, and of different K_d: 1 or one for each link
+    inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
         """Return states, torques and ZMP.

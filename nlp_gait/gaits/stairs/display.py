@@ -62,25 +62,15 @@ def _sagittal(points: Array) -> Array:
 
 
 class StepMotion(NamedTuple):
-    """A step to simulate; rows are instants.
+    """A step to simulate; rows are instants."""
 
-    Attributes:
-        t: (T,) [s].
-        q: (T, 9) absolute angles of all links in the order of LINKS [rad].
-        qd: (T, 9) [rad/s].
-        qdd: (T, 9) [rad/s^2].
-        tau: (T, 8) of the robot's joints [Nm].
-        pressure: (T,) centre of pressure of both feet, ahead of the stance ankle [m].
-        double_support_s: duration of load on the rear foot, finally on its toe.
-    """
-
-    t: Array
-    q: Array
-    qd: Array
-    qdd: Array
-    tau: Array
-    pressure: Array
-    double_support_s: float
+    t: Array  # (T,) [s]
+    q: Array  # (T, 9) absolute angles of all links in the order of LINKS [rad]
+    qd: Array  # (T, 9) [rad/s]
+    qdd: Array  # (T, 9) [rad/s^2]
+    tau: Array  # (T, 8) of the robot's joints [Nm]
+    pressure: Array  # (T,) centre of pressure of both feet, ahead of the stance ankle [m]
+    double_support_s: float  # duration of load on the rear foot, finally on its toe
 
 
 def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repeats: bool = False) -> SimulationModel:

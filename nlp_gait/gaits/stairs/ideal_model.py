@@ -24,19 +24,12 @@ AXES = ("x", "z")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IdealModel:
-    """Mathematics of one step.
+    """Mathematics of one step."""
 
-    Attributes:
-        layout: of the variables.
-        intervals: N, equal parts of the step.
-        sole_off: number of intervals with load on the rear sole.
-        toe_off: number of intervals with load on the rear toe: the double support.
-    """
-
-    layout: Layout
-    intervals: int
-    sole_off: int
-    toe_off: int
+    layout: Layout  # of the variables
+    intervals: int  # N, equal parts of the step
+    sole_off: int  # number of intervals with load on the rear sole
+    toe_off: int  # number of intervals with load on the rear toe: the double support
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return objective and constraints; everything is smooth."""

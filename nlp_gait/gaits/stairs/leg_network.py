@@ -113,22 +113,14 @@ class NetworkSettings:
     """Hyperparameters of the network (Table II, but for the learning rule).
 
     With the printed rule, plain gradient steps of 1e-4, a pose in twenty converges within the printed 5,000 iterations.
-
-    Attributes:
-        hidden: nodes of the hidden layer.
-        rule: plain gradient steps as in (30), or Adam.
-        rate: learning rate.
-        iterations: most steps for one pose.
-        tolerance_m2: squared distance of the ankle at which the training of a pose ends [m^2].
-        seed: of the first weights.
     """
 
-    hidden: int = 10
-    rule: Rule = "adam"
-    rate: float = 0.01
-    iterations: int = 5000
-    tolerance_m2: float = 1e-6
-    seed: int = 0
+    hidden: int = 10  # nodes of the hidden layer
+    rule: Rule = "adam"  # plain gradient steps as in (30), or Adam
+    rate: float = 0.01  # learning rate
+    iterations: int = 5000  # most steps for one pose
+    tolerance_m2: float = 1e-6  # squared distance of the ankle at which the training of a pose ends [m^2]
+    seed: int = 0  # of the first weights
 
     def __post_init__(self) -> None:
         """Validate the settings."""
@@ -154,19 +146,12 @@ LEGS = (("HK", "KA"), ("HK'", "K'A'"))
 
 
 class NetworkPath(NamedTuple):
-    """Result for m poses.
+    """Result for m poses."""
 
-    Attributes:
-        angles: (m, 2) absolute angles of thigh and shank, clockwise from the forward axis [rad].
-        error_m2: (m,) squared distance of the ankle from its target [m^2].
-        iterations: (m,) steps taken.
-        time_s: (m,) wall time.
-    """
-
-    angles: Array
-    error_m2: Array
-    iterations: Array
-    time_s: Array
+    angles: Array  # (m, 2) absolute angles of thigh and shank, clockwise from the forward axis [rad]
+    error_m2: Array  # (m,) squared distance of the ankle from its target [m^2]
+    iterations: Array  # (m,) steps taken
+    time_s: Array  # (m,) wall time
 
 
 def network_angles(

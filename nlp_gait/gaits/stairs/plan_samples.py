@@ -24,46 +24,27 @@ GROUND_SHARE = 0.1
 
 
 class PlanSamples(NamedTuple):
-    """A step at its samples; columns are samples, both ends of each phase included.
+    """A step at its samples; columns are samples, both ends of each phase included."""
 
-    Attributes:
-        time: (1, m) [s].
-        q: (7, m) link angles in the order of MOVING [rad], qd and qdd their derivatives.
-        qd: (7, m) [rad/s].
-        qdd: (7, m) [rad/s^2].
-        reach: (2, m) cosines of swing and stance knee.
-        torque: (7, m) of the joints [Nm], in the order of JOINTS.
-        power: (7, m) of the joints [W], signed.
-        stance_force: (2, m) of the ground on the stance foot [N].
-        stance_pressure: (1, m) its centre ahead of the stance ankle [m].
-        zmp: (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m].
-        hip: (2, m) [m].
-        ankle: (2, m) of the swing leg [m].
-    """
-
-    time: MX
-    q: MX
-    qd: MX
-    qdd: MX
-    reach: MX
-    torque: MX
-    power: MX
-    stance_force: MX
-    stance_pressure: MX
-    zmp: MX
-    hip: MX
-    ankle: MX
+    time: MX  # (1, m) [s]
+    q: MX  # (7, m) link angles in the order of MOVING [rad], qd and qdd their derivatives
+    qd: MX  # (7, m) [rad/s]
+    qdd: MX  # (7, m) [rad/s^2]
+    reach: MX  # (2, m) cosines of swing and stance knee
+    torque: MX  # (7, m) of the joints [Nm], in the order of JOINTS
+    power: MX  # (7, m) of the joints [W], signed
+    stance_force: MX  # (2, m) of the ground on the stance foot [N]
+    stance_pressure: MX  # (1, m) its centre ahead of the stance ankle [m]
+    zmp: MX  # (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m]
+    hip: MX  # (2, m) [m]
+    ankle: MX  # (2, m) of the swing leg [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlannedStep:
-    """Per-sample functions of a planned step and their grid.
+    """Per-sample functions of a planned step and their grid."""
 
-    Attributes:
-        per_phase: equal parts of each phase.
-    """
-
-    per_phase: int
+    per_phase: int  # equal parts of each phase
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:

@@ -135,17 +135,11 @@ E = TypeVar("E")
 
 
 class StanceLoads(NamedTuple, Generic[E]):
-    """Joint torques and ground reaction.
+    """Joint torques and ground reaction."""
 
-    Attributes:
-        torque: (7,) of the joints [Nm], in the order of JOINTS.
-        stance_force: (2,) of the ground on the stance foot [N].
-        stance_pressure: its centre of pressure, ahead of the stance ankle [m].
-    """
-
-    torque: E
-    stance_force: E
-    stance_pressure: E
+    torque: E  # (7,) of the joints [Nm], in the order of JOINTS
+    stance_force: E  # (2,) of the ground on the stance foot [N]
+    stance_pressure: E  # its centre of pressure, ahead of the stance ankle [m]
 
 
 def link_angles(q: SX) -> SX:

@@ -28,51 +28,29 @@ E = TypeVar("E")
 
 
 class Stair(NamedTuple, Generic[E]):
-    """Two equal steps; the stance ankle stands at the origin, the rear ankle one tread back and one rise down.
+    """Two equal steps; the stance ankle stands at the origin, the rear ankle one tread back and one rise down."""
 
-    Attributes:
-        tread: X, from ankle to ankle of neighbouring steps [m].
-        rise: Z, of one step [m].
-    """
-
-    tread: E
-    rise: E
+    tread: E  # X, from ankle to ankle of neighbouring steps [m]
+    rise: E  # Z, of one step [m]
 
 
 class StairPlan(NamedTuple):
-    """Governing parameters of a step (Tables III and IV).
+    """Governing parameters of a step (Tables III and IV)."""
 
-    Attributes:
-        hip_height: z_Ci, of the hip above the rear ankle at the start [m].
-        hip_start: x of the hip at the start, from the rear ankle [m].
-        zmp_start: planned ZMP at the start, from the rear ankle [m].
-        zmp_end: planned ZMP at the end, from the stance ankle [m].
-        end_rate: rate of the cycloid's angle at the end [rad/s].
-        torso_pitch: from the forward axis, counter-clockwise [rad].
-        t1: end of the first phase [s].
-        t2: end of the double support [s].
-        t_bc: end of the Bezier bridge [s].
-        foot_pitch: upward pitch of the foot while it tracks the cycloid [rad].
-        t3: end of the step [s].
-        sole_angle: theta_a, largest angle of the sole [rad].
-        toe_angle: theta_b, of the toe at the end of the double support [rad].
-        catch_angle: Delta theta_c0, half of what the bridge covers on the cycloid [rad].
-    """
-
-    hip_height: SX
-    hip_start: SX
-    zmp_start: SX
-    zmp_end: SX
-    end_rate: SX
-    torso_pitch: SX
-    t1: SX
-    t2: SX
-    t_bc: SX
-    foot_pitch: SX
-    t3: SX
-    sole_angle: SX
-    toe_angle: SX
-    catch_angle: SX
+    hip_height: SX  # z_Ci, of the hip above the rear ankle at the start [m]
+    hip_start: SX  # x of the hip at the start, from the rear ankle [m]
+    zmp_start: SX  # planned ZMP at the start, from the rear ankle [m]
+    zmp_end: SX  # planned ZMP at the end, from the stance ankle [m]
+    end_rate: SX  # rate of the cycloid's angle at the end [rad/s]
+    torso_pitch: SX  # from the forward axis, counter-clockwise [rad]
+    t1: SX  # end of the first phase [s]
+    t2: SX  # end of the double support [s]
+    t_bc: SX  # end of the Bezier bridge [s]
+    foot_pitch: SX  # upward pitch of the foot while it tracks the cycloid [rad]
+    t3: SX  # end of the step [s]
+    sole_angle: SX  # theta_a, largest angle of the sole [rad]
+    toe_angle: SX  # theta_b, of the toe at the end of the double support [rad]
+    catch_angle: SX  # Delta theta_c0, half of what the bridge covers on the cycloid [rad]
 
     @property
     def durations(self) -> SX:
@@ -234,19 +212,12 @@ def _first_cycloid_angle(m: SX) -> SX:
 
 
 class Posture(NamedTuple):
-    """Planned motion of the whole robot at one instant, origin at the stance ankle.
+    """Planned motion of the whole robot at one instant, origin at the stance ankle."""
 
-    Attributes:
-        q: (7,) absolute link angles in the order of ``loads.MOVING`` [rad], with rates and accelerations.
-        reach: (2,) cosines of the swing and the stance knee: above 1 the ankle is out of reach.
-        hip: (2,) [m].
-        ankle: (2,) of the swing leg [m].
-    """
-
-    q: Motion
-    reach: SX
-    hip: Motion
-    ankle: Motion
+    q: Motion  # (7,) absolute link angles in the order of ``loads.MOVING`` [rad], with rates and accelerations
+    reach: SX  # (2,) cosines of the swing and the stance knee: above 1 the ankle is out of reach
+    hip: Motion  # (2,) [m]
+    ankle: Motion  # (2,) of the swing leg [m]
 
 
 def posture(

@@ -18,17 +18,11 @@ DEFAULT_FILE = resources.files("nlp_gait.gaits.stairs") / "biped.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanarLink:
-    """Slender rod.
+    """Slender rod."""
 
-    Attributes:
-        name: its two ends, for example ``"HK"``.
-        length_m: between the ends.
-        mass_kg: uniformly distributed.
-    """
-
-    name: str
-    length_m: float
-    mass_kg: float
+    name: str  # its two ends, for example ``"HK"``
+    length_m: float  # between the ends
+    mass_kg: float  # uniformly distributed
 
     def __post_init__(self) -> None:
         """Check that length and mass are positive."""
@@ -39,20 +33,14 @@ class PlanarLink:
 class ToeFootBiped:
     """Two legs of thigh, shank, sole and toe, and a torso.
 
-    Attributes:
-        name: of the robot.
-        source: of the numbers.
-        inertia: formula of the moments of inertia.
-        links: in the order of ``planar_biped.LINKS``; both legs are equal.
-
     Source:
         Bhardwaj, Mishra, Sukavanam, Balasubramanian, Table I. The paper gives no moments of inertia: m l^2 / 12.
     """
 
-    name: str
-    source: str
-    inertia: str
-    links: tuple[PlanarLink, ...]
+    name: str  # of the robot
+    source: str  # of the numbers
+    inertia: str  # formula of the moments of inertia
+    links: tuple[PlanarLink, ...]  # in the order of ``planar_biped.LINKS``; both legs are equal
 
     def __post_init__(self) -> None:
         """Reject missing links and legs that differ."""

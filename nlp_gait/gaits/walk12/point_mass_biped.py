@@ -18,44 +18,26 @@ DEFAULT_FILE = resources.files("nlp_gait.gaits.walk12") / "point_mass_biped.json
 class PointMassBiped:
     """Two legs of a thigh and a shank each, with point masses at knees, hips, waist and feet.
 
-    Attributes:
-        name: of the robot.
-        description: one line.
-        source: of the numbers.
-        knee_mass_kg: m1, at each knee.
-        waist_mass_kg: m2, in the middle between the hips.
-        foot_mass_kg: m3, at each foot.
-        hip_mass_kg: m4, at each hip.
-        thigh_m: d1, hip to knee.
-        shank_m: d2, knee to ankle.
-        hip_distance_m: w, between the hips.
-        foot_com_height_m: L, from the ankle up the shank to the foot's mass.
-        waist_length_m: Bx.
-        waist_width_m: By.
-        foot_back_m: Fx1, from the ankle to the rear edge of the sole.
-        foot_front_m: Fx2, from the ankle to the front edge.
-        foot_width_m: Fy; the ankle is in the middle.
-
     Source:
         Goswami, Vadakkepat, Phung (2008), section 2.
     """
 
-    name: str
-    description: str
-    source: str
-    knee_mass_kg: float
-    waist_mass_kg: float
-    foot_mass_kg: float
-    hip_mass_kg: float
-    thigh_m: float
-    shank_m: float
-    hip_distance_m: float
-    foot_com_height_m: float
-    waist_length_m: float
-    waist_width_m: float
-    foot_back_m: float
-    foot_front_m: float
-    foot_width_m: float
+    name: str  # of the robot
+    description: str  # one line
+    source: str  # of the numbers
+    knee_mass_kg: float  # m1, at each knee
+    waist_mass_kg: float  # m2, in the middle between the hips
+    foot_mass_kg: float  # m3, at each foot
+    hip_mass_kg: float  # m4, at each hip
+    thigh_m: float  # d1, hip to knee
+    shank_m: float  # d2, knee to ankle
+    hip_distance_m: float  # w, between the hips
+    foot_com_height_m: float  # L, from the ankle up the shank to the foot's mass
+    waist_length_m: float  # Bx
+    waist_width_m: float  # By
+    foot_back_m: float  # Fx1, from the ankle to the rear edge of the sole
+    foot_front_m: float  # Fx2, from the ankle to the front edge
+    foot_width_m: float  # Fy; the ankle is in the middle
 
     def __post_init__(self) -> None:
         """Check that every mass and every length is positive."""

@@ -31,20 +31,14 @@ Zmp = Literal["exact", "appendix", "appendix-as-printed", "moment-free"]
 
 
 class LegMotion(NamedTuple):
-    """One leg.
+    """One leg."""
 
-    Attributes:
-        ankle: (3,) [m].
-        hip: (3,) [m].
-        joints: (5,) ankle roll, ankle pitch, knee, hip pitch, hip roll in the paper's signs [rad]: theta 1, 2, 3, 5, 6 of
-            the stance leg and 12, 11, 10, 8, 7 of the swing leg.
-        heading: (3, 3) rotation of the leg's axes, about z.
-    """
-
-    ankle: Motion
-    hip: Motion
+    ankle: Motion  # (3,) [m]
+    hip: Motion  # (3,) [m]
+    # (5,) ankle roll, ankle pitch, knee, hip pitch, hip roll in the paper's signs [rad]: theta 1, 2, 3, 5, 6 of the stance leg
+    # and 12, 11, 10, 8, 7 of the swing leg
     joints: Motion
-    heading: SX
+    heading: SX  # (3, 3) rotation of the leg's axes, about z
 
 
 # From a leg and heights (1, k) above the ankle to (3, k) points of the shank, relative to the ankle and in the leg's axes [m].
