@@ -9,7 +9,7 @@ a rough floor limit both.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import casadi as ca
@@ -23,7 +23,7 @@ from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
-from nlp_gait.robots import Foot, Robot
+from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import (
     SOLE_FRICTION,
@@ -132,7 +132,7 @@ class PlannedLoad(LoadSharing):
         self._degree, self._weight = degree, body.weight
         self._count = degree + 1 + RAMPS  # coefficients of each component
         self.variables = self._coefficients(body.robot.feet["right"])
-        self.loads = make_planned_loads(body.robot, body.gravity, body.upright)
+        self.loads = make_planned_loads(body)
         self.limits = (FootLimits(body, self.load_slope),)
 
     def _coefficients(self, foot: Foot) -> tuple[Variable, ...]:
@@ -191,26 +191,20 @@ def load_basis(degree: int, phase: SX) -> SX:
     )
 
 
-def make_planned_loads(robot: Robot, gravity: float, upright: Collection[str]) -> Loader:
-    """Return a function of the torques from the left foot with the planned wrench on the right one, and the ZMP of both feet.
-
-    Args:
-        robot: with links welded that never move.
-        gravity: [m/s^2].
-        upright: links that never turn.
-    """
-    tree, weight = tree_from(robot, robot.feet["left"].link), robot.mass_kg * gravity
-    left, right = robot.feet["left"], robot.feet["right"]
+def make_planned_loads(body: Body) -> Loader:
+    """Return a function of the torques from the left foot with the planned wrench on the right one, and the ZMP of both feet."""
+    left, right = body.robot.feet["left"], body.robot.feet["right"]
+    tree = tree_from(body.robot, left.link)
 
     def loads(now: Instant) -> Instant:
         q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
         feet, wrench = {side: ankle[:2] for side, ankle in now.ankles.items()}, now.wrench
         pushes = {right.link: shift_up(wrench, right.ankle_height_m)}
-        torques, at_ankle = newton_euler(tree, q, qd, qdd, gravity, upright=upright, pushes=pushes)
+        torques, at_ankle = newton_euler(tree, q, qd, qdd, body.gravity, upright=body.upright, pushes=pushes)
         own = shift_down(at_ankle, left.ankle_height_m)
         arm = ca.vertcat(feet["R"] - feet["L"], 0)
         both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
-        offset = zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, weight)
+        offset = zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, body.weight)
         return now._replace(torques=torques, zmp=feet["L"] + offset, wrenches={"L": own, "R": wrench})
 
     return loads
