@@ -42,7 +42,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     ),
     "nlp_gait/gaits/stairs/stair.py": ("tests/gaits/stairs/test_plan.py", "tests/gaits/stairs/test_gait.py"),
     "nlp_gait/gaits/biped/motors.py": ("tests/gaits/nao/test_motor_model.py",),
-    "nlp_gait/gaits/nao/motors.py": ("tests/gaits/nao/test_motor_model.py",),
+    "nlp_gait/gaits/nao/ankle_coupling.py": ("tests/gaits/nao/test_motor_model.py",),
     "nlp_gait/gaits/biped/cycle.py": ("tests/gaits/nao/test_cycle.py",),
     "nlp_gait/gaits/biped/cycle_motion.py": ("tests/gaits/nao/test_cycle.py",),
     "nlp_gait/gaits/biped/preview_control.py": ("tests/gaits/nao/test_cart_table.py",),

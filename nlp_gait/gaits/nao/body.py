@@ -13,6 +13,7 @@ from nlp_gait.formulation.stick_figure import Skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins
 from nlp_gait.gaits.biped.samples import Instant
+from nlp_gait.gaits.nao.ankle_coupling import parse_nao_motors
 from nlp_gait.gaits.nao.joints import (
     HELD_ARM_ANGLES,
     JOINTS,
@@ -22,7 +23,6 @@ from nlp_gait.gaits.nao.joints import (
     RESTING_ARM_ANGLES,
     measure_leg,
 )
-from nlp_gait.gaits.nao.motors import parse_nao_motors
 from nlp_gait.gaits.nao.skeleton import make_skeleton
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.mirror import partner

@@ -1,4 +1,4 @@
-"""NAO's motors: which joints share one, and the limit of the ankles' roll by their pitch."""
+"""NAO's motors: the limit of the ankles' roll by their pitch, and the joints that share a motor."""
 
 from __future__ import annotations
 
