@@ -23,7 +23,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.humanoid.body import GRAVITY
-from nlp_gait.robots.biped import NAO_LEG_M, make_biped
+from nlp_gait.robots.biped import NAO_LEG_M, make_biped_model
 from tests.pinocchio_oracle import floating_model, stand
 
 SHARE = "share/example-robot-data/robots"
@@ -291,7 +291,7 @@ def watts(textbook: float, optimum: float) -> str:
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
     assert problem.display.robot is not None
-    return make_biped(problem.display.robot).leg_length_m
+    return make_biped_model(problem.display.robot).leg_length_m
 
 
 GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {

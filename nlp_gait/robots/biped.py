@@ -94,7 +94,7 @@ class Biped:
         return "NAO's, scaled by power over squared torque, because no URDF has it"
 
 
-def make_biped(robot: Robot) -> Biped:
+def make_biped_model(robot: Robot) -> Biped:
     """Convert a robot to a biped.
 
     Raises:

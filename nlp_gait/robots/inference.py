@@ -11,7 +11,7 @@ import numpy as np
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.inertia import Array
 from nlp_gait.robots.leg import LEG_JOINT_COUNT
-from nlp_gait.robots.mirror import are_mirrored
+from nlp_gait.robots.mirror import are_mirror_images
 from nlp_gait.robots.repair import Records, turn_records
 
 Side = Literal["left", "right"]
@@ -223,7 +223,7 @@ def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
 def _are_mirror_chains(one: Chain, other: Chain) -> bool:
     """Return whether two chains are mirror images in x or in y."""
     return any(
-        all(are_mirrored(a.place, a.axis, b.place, b.axis, across) for a, b in zip(one, other, strict=True))
+        all(are_mirror_images(a.place, a.axis, b.place, b.axis, across) for a, b in zip(one, other, strict=True))
         and abs(one[0].place[across] - other[0].place[across]) > LEAST_WIDTH_M
         for across in (1, 0)
     )

@@ -29,7 +29,7 @@ def partners(robot: Robot) -> Mapping[str, str]:
 
     def image(name: str) -> str:
         named = partner(name)
-        fitting = [o for o in places if are_mirrored(places[name], axes[name], places[o], axes[o])]
+        fitting = [o for o in places if are_mirror_images(places[name], axes[name], places[o], axes[o])]
         if named in fitting or not fitting:
             return named if named in places else name
         return fitting[0]
@@ -37,7 +37,7 @@ def partners(robot: Robot) -> Mapping[str, str]:
     return {name: image(name) for name in places}
 
 
-def are_mirrored(
+def are_mirror_images(
     place: np.ndarray, axis: np.ndarray, other_place: np.ndarray, other_axis: np.ndarray, across: int = 1
 ) -> bool:
     """Return whether two joints are mirror images in the plane through the root across an axis."""

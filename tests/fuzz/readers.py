@@ -27,7 +27,7 @@ from nlp_gait.files import replace_nan
 from nlp_gait.formulation import load, load_result
 from nlp_gait.proofs.certificate import check_certificate, read_certificate
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.biped import make_biped
+from nlp_gait.robots.biped import make_biped_model
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml
 from tests.fuzz.trial import Misread
 
@@ -125,7 +125,7 @@ def read_urdf(path: Path) -> None:
 
 def read_biped(path: Path) -> None:
     """A robot from a URDF alone, as a biped: all masses of the file are in it, and its legs' limits are those of the file."""
-    biped, root = make_biped(load_robot(str(path))), ElementTree.fromstring(path.read_bytes())
+    biped, root = make_biped_model(load_robot(str(path))), ElementTree.fromstring(path.read_bytes())
     masses = [float(mass.get("value", "")) for mass in root.iterfind("link/inertial/mass")]
     near(math.fsum(masses), biped.model.mass_kg, "mass")
     for name in biped.joints:
@@ -140,7 +140,7 @@ def read_mjcf(path: Path) -> None:
     import mujoco
 
     robot = load_robot(str(path))
-    make_biped(robot)
+    make_biped_model(robot)
     model = mujoco.MjModel.from_xml_path(str(path))
     tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
     near(max(float(model.body_subtreemass[i]) for i in tops), robot.mass_kg, "mass")

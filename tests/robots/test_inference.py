@@ -12,7 +12,7 @@ import pytest
 
 from nlp_gait.errors import GaitError, InputError, RobotDataError
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.biped import make_biped
+from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.mirror import partner, partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
@@ -45,7 +45,7 @@ def test_feet_soles_and_sides_are_found_by_geometry(robot: Robot) -> None:
 
 def test_a_biped_is_its_legs_and_one_body_in_a_posture(robot: Robot) -> None:
     """Arms are held at the nearest limit, 0.2 rad; the finger without mass and the hand with a bad tensor are part of them."""
-    biped = make_biped(robot)
+    biped = make_biped_model(robot)
     assert biped.joints == tuple(f"{prefix}_{name}" for prefix in "AB" for name in LEG)
     assert biped.posture_rad == {"A_shoulder": 0.2, "B_shoulder": 0.2}
     assert len(biped.model.links) == 13
@@ -101,7 +101,7 @@ def test_the_robot_file_overrides_the_urdf(tmp_path: Path) -> None:
         posture_rad={"A_shoulder": 1.0},
         heat_loss_W_per_Nm2=0.001,
     )
-    biped = make_biped(load_robot(path))
+    biped = make_biped_model(load_robot(path))
     assert biped.model.feet["left"].front_m == 0.2 and biped.model.feet["right"].front_m == pytest.approx(0.105)
     assert biped.posture_rad == {"A_shoulder": 1.0, "B_shoulder": 0.2}
     assert biped.heat_W_per_Nm2 == 0.001 and biped.heat_source == "from the robot's file"
@@ -182,11 +182,11 @@ def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
 )
 def test_an_impossible_posture_is_refused(tmp_path: Path, posture: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        make_biped(load_robot(override(crooked(tmp_path), posture_rad=posture)))
+        make_biped_model(load_robot(override(crooked(tmp_path), posture_rad=posture)))
 
 
 def test_five_joints_are_no_leg(tmp_path: Path) -> None:
     extents = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04}
     feet = {side: {"link": f"{x}_ankle_pitch_link", **extents} for side, x in (("left", "A"), ("right", "B"))}
     with pytest.raises(GaitError, match=r"left leg must have 6 turning joints .* got 5"):
-        make_biped(load_robot(override(crooked(tmp_path), feet=feet)))
+        make_biped_model(load_robot(override(crooked(tmp_path), feet=feet)))

@@ -11,7 +11,7 @@ import pytest
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.robots import load_robot, mjcf
-from nlp_gait.robots.biped import make_biped
+from nlp_gait.robots.biped import make_biped_model
 from tests.robots.crooked import crooked, crooked_urdf
 
 mujoco = pytest.importorskip("mujoco", reason="extra sim is not installed")
@@ -38,7 +38,10 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
-    found, wanted = make_biped(load_robot(path)), make_biped(load_robot(str(Path(path).with_suffix(".urdf"))))
+    found, wanted = (
+        make_biped_model(load_robot(path)),
+        make_biped_model(load_robot(str(Path(path).with_suffix(".urdf")))),
+    )
     assert found.joints == wanted.joints
     assert found.posture_rad == pytest.approx(wanted.posture_rad, abs=DIGITS)
     for side in ("left", "right"):

@@ -16,7 +16,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.humanoid.body import compute_residuals, count_newton_steps
 from nlp_gait.gaits.nao.joints import LEG_JOINTS, measure_leg
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.biped import make_biped
+from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import Leg
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion, sample_flat_foot_poses
@@ -36,7 +36,7 @@ STEP_S, DIFFERENCE_TOLERANCE = 1e-4, 1e-5
 @cache
 def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
     """From the hips' middle over the foot's origin with both derivatives, and roll and pitch likewise, to the leg's motion."""
-    leg = make_biped(robot).legs[side]
+    leg = make_biped_model(robot).legs[side]
     place = Motion(*(SX.sym(name, 3) for name in ("p", "v", "a")))
     roll, pitch = (Motion(*(SX.sym(f"{angle}{k}") for k in range(3))) for angle in ("roll", "pitch"))
     turn = axis_rotation((0, 1, 0), pitch.position)
@@ -72,7 +72,7 @@ def test_the_foot_is_flat_and_where_it_is_asked_for(robots: dict[str, Robot], na
     """By forward kinematics of the whole robot, from the torso down."""
     robot = robots[name]
     leg, solve = leg_function(robot, side)
-    model = make_biped(robot).model
+    model = make_biped_model(robot).model
     q, tree = SX.sym("q", 6), tree_from(model, model.root)
     angles = {joint: SX(0) for joint in model.joints} | {joint: q[i] for i, joint in enumerate(leg.joints)}
     found = forward_kinematics(tree, angles, SX.zeros(3))[[b.link.name for b in tree].index(model.feet[side].link)]
@@ -90,7 +90,7 @@ def test_the_foot_is_flat_and_where_it_is_asked_for(robots: dict[str, Robot], na
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_the_guess_is_exact_where_hip_and_ankle_axes_meet(robots: dict[str, Robot], side: str) -> None:
     """Also with axes askew, of which none are parallel or at right angles, and which reach most poses, not all."""
-    leg = make_biped(robots["crooked"]).legs[side]
+    leg = make_biped_model(robots["crooked"]).legs[side]
     meeting = np.array([*[leg.hip_m] * 3, leg.points[3], *[leg.ankle_m] * 2])
     turns = Rotation.from_rotvec(0.2 * np.random.default_rng(3).standard_normal((6, 3)))
     skew = replace(leg, points=meeting, axes=turns.apply(leg.axes))
@@ -156,7 +156,7 @@ def test_nothing_is_ever_nan_and_a_leg_out_of_reach_stands_still(robots: dict[st
 
 
 def test_what_is_no_leg_is_refused(robots: dict[str, Robot]) -> None:
-    leg = make_biped(robots["crooked"]).legs["left"]
+    leg = make_biped_model(robots["crooked"]).legs["left"]
     parallel = leg.axes.copy()
     parallel[5] = parallel[4]
     flat = leg.axes.copy()

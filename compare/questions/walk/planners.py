@@ -26,7 +26,7 @@ from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.biped.body import LIFT
 from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.capabilities import CART_TABLE_BODIES, resolve
-from nlp_gait.robots.biped import make_biped
+from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Walk
 
@@ -172,7 +172,7 @@ def compute_height_step(problem: GaitProblem) -> float:
     """Return the step between the hip's heights that are tried, in proportion to the legs [m]."""
     robot = problem.display.robot
     assert robot is not None  # a cycle has a robot; for the type checker
-    return HEIGHT_STEP_M * round(make_biped(robot).length_scale, 12)
+    return HEIGHT_STEP_M * round(make_biped_model(robot).length_scale, 12)
 
 
 def plan_least_torque(

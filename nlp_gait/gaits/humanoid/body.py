@@ -19,7 +19,7 @@ from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.single_support import make_nearest_edge_margins
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.biped import Biped, make_biped
+from nlp_gait.robots.biped import Biped, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.general_leg import (
     POSES,
@@ -152,7 +152,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         InputError: its legs cannot be solved.
         GaitError: as ``load_robot``.
     """
-    biped = make_biped(load_robot(robot))
+    biped = make_biped_model(load_robot(robot))
     left, (middle_x, _, middle_z) = biped.legs["left"], biped.hip_middle_m
     above = biped.model.feet["left"].ankle_height_m + float(left.ankle_m[2] - left.foot_m[2])
     rate = float(f"{LARGEST_LEAN_RATE / biped.time_scale:.4g}")
