@@ -143,7 +143,6 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
 
 
 def _list_results(findings: StairsFindings, step: str, keys: Sequence[str]) -> Rows:
-    """Values of a result in each case."""
     return [[case, *(findings.others[f"{step}-{case}"][key] for key in keys)] for case in findings.cases]
 
 
@@ -194,7 +193,6 @@ def _list_table_4(findings: StairsFindings) -> Rows:
 
 
 def _list_tracks(findings: StairsFindings, case: int) -> Rows:
-    """Best run of each solver next to the ideal."""
     ideal = findings.best("ideal", case).verdict.indexes["energy_J"]
     rows: list[Sequence[Value]] = []
     for solver in (*ALGORITHMS, IPOPT):
@@ -207,7 +205,6 @@ def _list_tracks(findings: StairsFindings, case: int) -> Rows:
 
 
 def _list_ideal(findings: StairsFindings, case: int) -> Sequence[Value]:
-    """Full trajectory optimisation."""
     runs, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
     every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in runs)
     energies = [verdict.indexes["energy_J"], findings.best("plan", case).verdict.objective]
@@ -216,13 +213,11 @@ def _list_ideal(findings: StairsFindings, case: int) -> Sequence[Value]:
 
 
 def _list_jerk(findings: StairsFindings, case: int) -> Sequence[Value]:
-    """Plan of least peak jerk."""
     verdict = findings.best("jerk", case).verdict
     return [case, TABLE_4[case].jerk, verdict.objective, verdict.indexes["energy_J"]]
 
 
 def _list_fixed_hip(findings: StairsFindings, case: int) -> Sequence[Value]:
-    """Plans with the paper's hip height."""
     runs, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
     feasible = sum(run.verdict.feasible for run in runs)
     return [case, f"{feasible} of {len(runs)}", "; ".join(verdict.violated[:3]) or "nothing"]
@@ -236,7 +231,6 @@ def _list_differences(findings: StairsFindings, case: int) -> Sequence[Value]:
 
 
 def _list_other_stairs(findings: StairsFindings) -> Rows:
-    """Stairs that the paper did not try."""
     rows = []
     for tread, rise in findings.effort.other_stairs:
         cells: list[Value] = [tread, rise]
