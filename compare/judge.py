@@ -21,37 +21,22 @@ DENSE_INTERVALS = 1000  # least number of intervals of the dense grid
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation:
-    """Exact values of a problem at a point.
-
-    Attributes:
-        problem: name.
-        options: of the problem.
-        parameters: values that differ from the defaults.
-        x: by variable name.
-        objective: name, value and unit.
-        indexes: performance figures at the problem's samples.
-        constraints: all rows, the variables' bounds last.
-        violation: total over all rows, each divided by its scale.
-        feasible: total violation at most 1e-6.
-        dense: the same indexes on the dense grid; None for a problem without samples.
-        dense_violations: rows violated on the dense grid, worst first; times are samples of that grid.
-        dense_intervals: number of intervals of the dense grid.
-        guaranteed: what is proven between the samples; None for an infeasible point.
-    """
+    """Exact values of a problem at a point."""
 
     problem: str
     options: Mapping[str, Any]
-    parameters: Mapping[str, float]
-    x: Mapping[str, float]
-    objective: Mapping[str, Any]
-    indexes: Mapping[str, float]
-    constraints: tuple[ConstraintValue, ...]
-    violation: float
-    feasible: bool
-    dense: Mapping[str, float] | None
+    parameters: Mapping[str, float]  #: values that differ from the defaults
+    x: Mapping[str, float]  #: by variable name
+    objective: Mapping[str, Any]  #: name, value and unit
+    indexes: Mapping[str, float]  #: performance figures at the problem's samples
+    constraints: tuple[ConstraintValue, ...]  #: all rows, the variables' bounds last
+    violation: float  #: total over all rows, each divided by its scale
+    feasible: bool  #: total violation at most 1e-6
+    dense: Mapping[str, float] | None  #: the same indexes on the dense grid; None for a problem without samples
+    #: Rows violated on the dense grid, worst first; times are samples of that grid
     dense_violations: tuple[ConstraintValue, ...]
-    dense_intervals: int | None
-    guaranteed: Guarantee | None
+    dense_intervals: int | None  #: number of intervals of the dense grid
+    guaranteed: Guarantee | None  #: what is proven between the samples; None for an infeasible point
 
     @property
     def violations(self) -> tuple[ConstraintValue, ...]:

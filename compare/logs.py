@@ -37,19 +37,13 @@ COCO_HEADER = (
 
 @dataclass(frozen=True, kw_only=True)
 class Trace:
-    """Best so far of a run.
+    """Best so far of a run."""
 
-    Attributes:
-        run: its number.
-        x: (n,) final point; empty if there is none.
-        lines: evaluations and gap, each time the best improves; the first is at one evaluation, as readers expect.
-        total: evaluations of the whole run.
-    """
-
-    run: int
-    x: tuple[float, ...]
+    run: int  #: its number
+    x: tuple[float, ...]  #: (n,) final point; empty if there is none
+    #: Evaluations and gap, each time the best improves; the first is at one evaluation, as readers expect
     lines: tuple[tuple[int, float], ...]
-    total: int
+    total: int  #: evaluations of the whole run
 
     @property
     def best(self) -> tuple[int, float]:
@@ -89,25 +83,15 @@ def write_coco(comparisons: Sequence[Comparison], folder: Path, suite: str = "nl
 
 @dataclass(frozen=True, kw_only=True)
 class _Log:
-    """Runs of one solver on one problem.
-
-    Attributes:
-        folder: of the solver.
-        stem: of the files' names.
-        number: of the problem, a function in these formats.
-        problem: label.
-        dimension: number of variables; 1 if no run has a point.
-        solver: label.
-        runs: traces of all runs.
-    """
+    """Runs of one solver on one problem."""
 
     folder: Path
-    stem: str
-    number: int
+    stem: str  #: of the files' names
+    number: int  #: of the problem, a function in these formats
     problem: str
-    dimension: int
+    dimension: int  #: number of variables; 1 if no run has a point
     solver: str
-    runs: tuple[Trace, ...]
+    runs: tuple[Trace, ...]  #: traces of all runs
 
 
 def _write_logs(comparisons: Sequence[Comparison], folder: Path, write: Callable[[_Log], Sequence[Path]]) -> list[Path]:

@@ -36,19 +36,12 @@ LONGEST = 30
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolverRuns:
-    """All runs of one solver, by number.
-
-    Attributes:
-        name: of the solver.
-        records: ascending in the run's number.
-        curves: of each run.
-        costs: judge's objective of each run, to be minimised; infinite where it is not feasible.
-    """
+    """All runs of one solver, by number."""
 
     name: str
-    records: tuple[RunRecord, ...]
+    records: tuple[RunRecord, ...]  #: ascending in the run's number
     curves: tuple[Curve, ...]
-    costs: tuple[float, ...]
+    costs: tuple[float, ...]  #: judge's objective of each run, to be minimised; infinite where it is not feasible
 
     @property
     def feasible(self) -> list[float]:
@@ -82,19 +75,11 @@ class SolverRuns:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """All solvers on one problem, the best median first.
-
-    Attributes:
-        problem: label.
-        objective: name, unit, sense.
-        reference: best known objective, from which gaps are measured; NaN if nothing feasible was found.
-        weighting: of calls.
-        solvers: with their runs.
-    """
+    """All solvers on one problem, the best median first."""
 
     problem: str
     objective: Objective
-    reference: float
+    reference: float  #: best known objective, from which gaps are measured; NaN if nothing feasible was found
     weighting: Weighting
     solvers: tuple[SolverRuns, ...]
 

@@ -19,24 +19,15 @@ FEWEST = 3  # gaits for a rank correlation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """Agreement of model and engine over the gaits that did not fall.
+    """Agreement of model and engine over the gaits that did not fall."""
 
-    Attributes:
-        gaits: number simulated.
-        fallen: number that fell.
-        spearman: rank correlation; None for fewer than three gaits, or if all values of one are equal.
-        mean_error: mean of |engine / model - 1|; None if all fell.
-        largest_error: of these.
-        spread: the model's largest energy divided by its smallest, minus 1; None if all fell.
-        error_spread: largest minus smallest signed error; gaits closer than this in the model have no certain order.
-    """
-
-    gaits: int
-    fallen: int
-    spearman: float | None
-    mean_error: float | None
-    largest_error: float | None
-    spread: float | None
+    gaits: int  #: number simulated
+    fallen: int  #: number that fell
+    spearman: float | None  #: rank correlation; None for fewer than three gaits, or if all values of one are equal
+    mean_error: float | None  #: mean of |engine / model - 1|; None if all fell
+    largest_error: float | None  #: of these
+    spread: float | None  #: the model's largest energy divided by its smallest, minus 1; None if all fell
+    #: Largest minus smallest signed error; gaits closer than this in the model have no certain order
     error_spread: float | None
 
     def describe(self) -> str:

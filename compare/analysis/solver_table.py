@@ -32,45 +32,29 @@ HEADER = (
 
 @dataclass(frozen=True, kw_only=True)
 class SolverSummary:
-    """All runs of one solver on one problem; objectives in the problem's sense, None without a feasible run.
-
-    Attributes:
-        solver: its name.
-        runs: their number.
-        claimed: number whose solver claims a feasible result; None for imported results without claims.
-        feasible: number that the judge finds feasible at the problem's samples.
-        dense_feasible: number also feasible between the samples; None without a dense grid.
-        guaranteed: number proven to satisfy all limits at all times; None where that was not requested or is impossible.
-        best_claim: best objective that a run claims to be feasible.
-        best: best objective that the judge finds feasible; likewise ``median`` and ``worst`` over the feasible runs.
-        median_interval: 95 % bootstrap interval of the median.
-        gap: relative distance of the median from the best known objective.
-        evaluations: median equivalent evaluations of a run.
-        time_s: median wall time of a run [s].
-        build_s: longest time to build the symbolic problem [s].
-        compile_s: longest time to compile the objective, or to make derivatives and solver [s].
-        expected_evaluations: expected running time to each of ``TARGETS``; infinite if it was never reached.
-        expected_s: the same in seconds.
-    """
+    """All runs of one solver on one problem; objectives in the problem's sense, None without a feasible run."""
 
     solver: str
     runs: int
-    claimed: int | None
-    feasible: int
-    dense_feasible: int | None
+    claimed: int | None  #: number whose solver claims a feasible result; None for imported results without claims
+    feasible: int  #: number that the judge finds feasible at the problem's samples
+    dense_feasible: int | None  #: number also feasible between the samples; None without a dense grid
+    #: Number proven to satisfy all limits at all times; None where that was not requested or is impossible
     guaranteed: int | None
-    best_claim: float | None
+    best_claim: float | None  #: best objective that a run claims to be feasible
+    #: Best objective that the judge finds feasible; likewise ``median`` and ``worst`` over the feasible runs
     best: float | None
     median: float | None
     worst: float | None
-    median_interval: tuple[float, float] | None
-    gap: float | None
-    evaluations: float
-    time_s: float
-    build_s: float
-    compile_s: float
+    median_interval: tuple[float, float] | None  #: 95 % bootstrap interval of the median
+    gap: float | None  #: relative distance of the median from the best known objective
+    evaluations: float  #: median equivalent evaluations of a run
+    time_s: float  #: median wall time of a run [s]
+    build_s: float  #: longest time to build the symbolic problem [s]
+    compile_s: float  #: longest time to compile the objective, or to make derivatives and solver [s]
+    #: Expected running time to each of ``TARGETS``; infinite if it was never reached
     expected_evaluations: tuple[float, ...]
-    expected_s: tuple[float, ...]
+    expected_s: tuple[float, ...]  #: the same in seconds
 
 
 def summarise(comparison: Comparison) -> list[SolverSummary]:
@@ -144,21 +128,13 @@ def count(number: float) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Failure:
-    """Failed runs of one solver on one problem.
-
-    Attributes:
-        problem: title.
-        solver: title.
-        failed: number of runs without a point.
-        runs: number of runs.
-        reason: status of the first.
-    """
+    """Failed runs of one solver on one problem."""
 
     problem: str
     solver: str
-    failed: int
+    failed: int  #: number of runs without a point
     runs: int
-    reason: str
+    reason: str  #: status of the first
 
     @property
     def sentence(self) -> str:

@@ -23,22 +23,14 @@ SIGNIFICANT = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """Two solvers; p-values are Holm-corrected over all pairs of the problem.
+    """Two solvers; p-values are Holm-corrected over all pairs of the problem."""
 
-    Attributes:
-        first: solver with the better median.
-        second: the other.
-        rank_sum: p-value over all runs of both.
-        signed_rank: p-value over the runs that both have; None if fewer than two or if they do not share starting points.
-        a12: probability that a run of the first is better.
-        paired_runs: their number.
-    """
-
-    first: str
-    second: str
-    rank_sum: float
+    first: str  #: solver with the better median
+    second: str  #: the other
+    rank_sum: float  #: p-value over all runs of both
+    #: p-value over the runs that both have; None if fewer than two or if they do not share starting points
     signed_rank: float | None
-    a12: float
+    a12: float  #: probability that a run of the first is better
     paired_runs: int
 
 

@@ -22,58 +22,38 @@ SAME = 1e-8
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """A solver's place on the suite.
-
-    Attributes:
-        solver: its name.
-        mean_rank: of its expected running time, over all pairs of instance and target (``TARGETS``) that a solver reached; equals
-            share a rank.
-        solved: share of all triples of instance, run and target (31, from 100 % to 1e-4 % above the best known) that it solved.
-        solved_rank: place by that share.
-        feasible: share of its runs that end feasible.
-        reached: number of instances on which it reached a target at least once, by target.
-    """
+    """A solver's place on the suite."""
 
     solver: str
+    #: Of its expected running time, over all pairs of instance and target (``TARGETS``) that a solver reached; equals share a
+    #: rank
     mean_rank: float
+    #: Share of all triples of instance, run and target (31, from 100 % to 1e-4 % above the best known) that it solved
     solved: float
-    solved_rank: int
-    feasible: float
-    reached: tuple[int, ...]
+    solved_rank: int  #: place by that share
+    feasible: float  #: share of its runs that end feasible
+    reached: tuple[int, ...]  #: number of instances on which it reached a target at least once, by target
 
 
 @dataclass(frozen=True, kw_only=True)
 class Duel:
-    """Comparison of a solver with another one, Holm-corrected.
+    """Comparison of a solver with another one, Holm-corrected."""
 
-    Attributes:
-        other: name of the other solver.
-        better: number of instances on which the rank-sum test finds the solver better, corrected over all duels and instances.
-        worse: likewise.
-        undecided: number of the other instances.
-        mean_a12: probability that a run of the solver is better, mean over instances.
-        signed_rank: p-value over the median gaps of all instances, corrected over all duels.
-    """
-
-    other: str
+    other: str  #: name of the other solver
+    #: Number of instances on which the rank-sum test finds the solver better, corrected over all duels and instances
     better: int
-    worse: int
-    undecided: int
-    mean_a12: float
-    signed_rank: float
+    worse: int  #: likewise
+    undecided: int  #: number of the other instances
+    mean_a12: float  #: probability that a run of the solver is better, mean over instances
+    signed_rank: float  #: p-value over the median gaps of all instances, corrected over all duels
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Leaderboard:
-    """All solvers on some instances.
+    """All solvers on some instances."""
 
-    Attributes:
-        comparisons: one for each instance, with gaps from the best known objective.
-        standings: best mean rank first.
-    """
-
-    comparisons: tuple[Comparison, ...]
-    standings: tuple[Standing, ...]
+    comparisons: tuple[Comparison, ...]  #: one for each instance, with gaps from the best known objective
+    standings: tuple[Standing, ...]  #: best mean rank first
 
     def place(self, solver: str) -> int:
         """Return the place of a solver, from 1."""

@@ -45,19 +45,12 @@ def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GaitCurves:
-    """Time histories of a gait for a figure.
+    """Time histories of a gait for a figure."""
 
-    Attributes:
-        skeleton: over time; None for a problem that has none.
-        t: (T,) [s].
-        power: (T,) sum of the joints' |torque x rate| [W]; None for a problem without torques.
-        margin: (T,) of ``Skeleton.margin``, in millimetres; None where no instant has one.
-    """
-
-    skeleton: Skeleton | None
-    t: Array
-    power: Array | None
-    margin: Array | None
+    skeleton: Skeleton | None  #: over time; None for a problem that has none
+    t: Array  #: (T,) [s]
+    power: Array | None  #: (T,) sum of the joints' |torque x rate| [W]; None for a problem without torques
+    margin: Array | None  #: (T,) of ``Skeleton.margin``, in millimetres; None where no instant has one
 
 
 @lock_casadi

@@ -34,21 +34,14 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Table of values with all digits, and their format on a page.
+    """Table of values with all digits, and their format on a page."""
 
-    Attributes:
-        columns: heading, with its unit, to the format of its numbers on a page, such as ``".4f"``; an empty one shows all digits.
-        rows: one value for each column.
-        name: stem of its CSV file; empty for a table without a CSV file.
-        caption: description.
-        prose: the cells are sentences: all columns are left-aligned.
-    """
-
+    #: heading, with its unit, to the format of its numbers on a page, such as ``".4f"``; an empty one shows all digits
     columns: Mapping[str, str]
-    rows: Rows
-    name: str = ""
-    caption: str = ""
-    prose: bool = False
+    rows: Rows  #: one value for each column
+    name: str = ""  #: stem of its CSV file; empty for a table without a CSV file
+    caption: str = ""  #: description
+    prose: bool = False  #: the cells are sentences: all columns are left-aligned
 
     @property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
@@ -94,17 +87,11 @@ Part = str | Prose | Table | Figure | Section
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Document:
-    """A report.
+    """A report."""
 
-    Attributes:
-        title: of the page.
-        verdict: summary in at most three sentences; may be empty.
-        parts: the rest, in order.
-    """
-
-    title: str
-    verdict: Sequence[str] = ()
-    parts: Sequence[Part]
+    title: str  #: of the page
+    verdict: Sequence[str] = ()  #: summary in at most three sentences; may be empty
+    parts: Sequence[Part]  #: the rest, in order
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", prose: bool = False) -> Table:

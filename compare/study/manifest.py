@@ -28,23 +28,14 @@ PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "d
 
 @dataclass(frozen=True, kw_only=True)
 class Session:
-    """One command that ran a part of a study.
-
-    Attributes:
-        command: command line.
-        started: date and time, UTC.
-        machine: processor, system, number of usable processors.
-        versions: of Python and the installed packages.
-        kernel: compiler and flags of the objective, or why it is interpreted.
-        jobs: worker processes, or the address of the scheduler.
-    """
+    """One command that ran a part of a study."""
 
     command: str
-    started: str
-    machine: Mapping[str, str]
-    versions: Mapping[str, str]
-    kernel: str
-    jobs: str
+    started: str  #: date and time, UTC
+    machine: Mapping[str, str]  #: processor, system, number of usable processors
+    versions: Mapping[str, str]  #: of Python and the installed packages
+    kernel: str  #: compiler and flags of the objective, or why it is interpreted
+    jobs: str  #: worker processes, or the address of the scheduler
 
     @classmethod
     def begin(cls, command: str, jobs: str) -> Session:

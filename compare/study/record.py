@@ -35,34 +35,21 @@ HEADER = (
 
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """Best so far over a run.
+    """Best so far over a run."""
 
-    Attributes:
-        evaluations: calls of f so far.
-        objective: in the problem's sense; None before the first feasible point.
-    """
-
-    evaluations: tuple[int, ...]
-    objective: tuple[float | None, ...]
+    evaluations: tuple[int, ...]  #: calls of f so far
+    objective: tuple[float | None, ...]  #: in the problem's sense; None before the first feasible point
 
 
 @dataclass(frozen=True, kw_only=True)
 class Times:
-    """Wall times [s], the only difference between two equal runs.
+    """Wall times [s], the only difference between two equal runs."""
 
-    Attributes:
-        build: of the symbolic problem and NLP; near 0 if the process had them already.
-        compile: of the objective, or of derivatives and solver; likewise.
-        solve: of the run itself.
-        objective: share of ``solve`` in the objective; NaN if unknown.
-        history: at each entry of the history, from the start of the solve.
-    """
-
-    build: float
-    compile: float
+    build: float  #: of the symbolic problem and NLP; near 0 if the process had them already
+    compile: float  #: of the objective, or of derivatives and solver; likewise
     solve: float
-    objective: float
-    history: tuple[float, ...]
+    objective: float  #: share of ``solve`` in the objective; NaN if unknown
+    history: tuple[float, ...]  #: at each entry of the history, from the start of the solve
 
     @classmethod
     def make_unknown(cls, solve: float, history: tuple[float, ...]) -> Times:
@@ -72,27 +59,17 @@ class Times:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The judge's verdict on the point of a run.
+    """The judge's verdict on the point of a run."""
 
-    Attributes:
-        objective: exact value, in the problem's sense; NaN without a point.
-        violation: exact total violation; infinite without a point.
-        feasible: at the problem's samples.
-        indexes: performance figures.
-        dense: the same on the dense grid; None without one.
-        dense_feasible: whether all rows are satisfied on the dense grid; None without one.
-        violated: names of the worst violated rows with their violation, those at the problem's samples first.
-        guaranteed: what is proven between the samples; None if the point is infeasible.
-    """
-
-    objective: float
-    violation: float
-    feasible: bool
+    objective: float  #: exact value, in the problem's sense; NaN without a point
+    violation: float  #: exact total violation; infinite without a point
+    feasible: bool  #: at the problem's samples
     indexes: Mapping[str, float]
-    dense: Mapping[str, float] | None
-    dense_feasible: bool | None
+    dense: Mapping[str, float] | None  #: the same on the dense grid; None without one
+    dense_feasible: bool | None  #: whether all rows are satisfied on the dense grid; None without one
+    #: Names of the worst violated rows with their violation, those at the problem's samples first
     violated: tuple[str, ...]
-    guaranteed: Guarantee | None
+    guaranteed: Guarantee | None  #: what is proven between the samples; None if the point is infeasible
 
     @classmethod
     def make_plain(cls, objective: float = math.nan, violation: float = math.inf, feasible: bool = False) -> Verdict:
@@ -126,44 +103,24 @@ class Verdict:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RunRecord:
-    """One run of a solver on a problem: the claim, the judge's verdict, the cost.
+    """One run of a solver on a problem: the claim, the judge's verdict, the cost."""
 
-    Attributes:
-        problem: label, or name without one.
-        solver: label, or name without one.
-        run: number within the study.
-        seed: of this run.
-        definition: everything that the result depends on, see ``Task.definition``.
-        settings: of the solver, defaults included.
-        status: why the run ended, in words.
-        claimed: whether the solver claims a feasible result.
-        x: by variable name; empty without a point.
-        claimed_objective: in the problem's sense; None without a claim.
-        claimed_violation: total; None without a claim.
-        verdict: what the judge finds at x.
-        evaluations: calls by kind: f (with all constraints), g, gradient, jacobian, hessian.
-        failed_evaluations: calls that returned NaN or infinity.
-        iterations: generations of a population, iterations of an NLP solver.
-        active_constraints: bounds with a price, largest first, from solvers with multipliers.
-        history: best so far.
-        time_s: wall times.
-    """
-
-    problem: str
-    solver: str
-    run: int
-    seed: int
-    definition: Mapping[str, Any]
-    settings: Mapping[str, Any]
-    status: str
-    claimed: bool
-    x: Mapping[str, float]
-    claimed_objective: float | None
-    claimed_violation: float | None
-    verdict: Verdict
-    evaluations: Mapping[str, int]
-    failed_evaluations: int
-    iterations: int
+    problem: str  #: label, or name without one
+    solver: str  #: label, or name without one
+    run: int  #: number within the study
+    seed: int  #: of this run
+    definition: Mapping[str, Any]  #: everything that the result depends on, see ``Task.definition``
+    settings: Mapping[str, Any]  #: of the solver, defaults included
+    status: str  #: why the run ended, in words
+    claimed: bool  #: whether the solver claims a feasible result
+    x: Mapping[str, float]  #: by variable name; empty without a point
+    claimed_objective: float | None  #: in the problem's sense; None without a claim
+    claimed_violation: float | None  #: total; None without a claim
+    verdict: Verdict  #: what the judge finds at x
+    evaluations: Mapping[str, int]  #: calls by kind: f (with all constraints), g, gradient, jacobian, hessian
+    failed_evaluations: int  #: calls that returned NaN or infinity
+    iterations: int  #: generations of a population, iterations of an NLP solver
+    #: Bounds with a price, largest first, from solvers with multipliers
     active_constraints: tuple[ActiveConstraint, ...]
     history: History
     time_s: Times

@@ -25,21 +25,13 @@ from nlp_gait.progress import Progress
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Study:
-    """What to run.
+    """What to run."""
 
-    Attributes:
-        tasks: all runs, in any order; a run may polish the result of another.
-        folder: where records are written (see ``compare.study.record_files``); None writes none.
-        jobs: worker processes; 1 runs in this process.
-        scheduler: address of a Dask scheduler to use instead of local processes.
-        run: function that performs one run; it may store more than the record.
-    """
-
-    tasks: tuple[Task, ...]
-    folder: Path | None = None
-    jobs: int = 1
-    scheduler: str | None = None
-    run: Run = run_task
+    tasks: tuple[Task, ...]  #: all runs, in any order; a run may polish the result of another
+    folder: Path | None = None  #: where records are written (see ``compare.study.record_files``); None writes none
+    jobs: int = 1  #: worker processes; 1 runs in this process
+    scheduler: str | None = None  #: address of a Dask scheduler to use instead of local processes
+    run: Run = run_task  #: function that performs one run; it may store more than the record
 
     def __post_init__(self) -> None:
         """Validate the study."""

@@ -22,44 +22,26 @@ MOST_RUNS = 100_000
 
 @dataclass(frozen=True, kw_only=True)
 class SolverSpec:
-    """A solver of a study.
+    """A solver of a study."""
 
-    Attributes:
-        name: as in ``nlp-gait list``, or user code as ``file.py:name`` or ``module:name``.
-        label: its name in the study; empty for ``name``.
-        runs: number; None for the study's.
-        settings: that differ from its defaults.
-        polish: whether IPOPT starts from each of its results, as another solver ``<label>+ipopt``.
-    """
-
-    name: str
-    label: str = ""
-    runs: int | None = None
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    polish: bool = False
+    name: str  #: as in ``nlp-gait list``, or user code as ``file.py:name`` or ``module:name``
+    label: str = ""  #: its name in the study; empty for ``name``
+    runs: int | None = None  #: number; None for the study's
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: that differ from its defaults
+    polish: bool = False  #: whether IPOPT starts from each of its results, as another solver ``<label>+ipopt``
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudySettings:
-    """Everything that determines what a study computes.
-
-    Attributes:
-        problems: at least one.
-        solvers: at least one.
-        runs: of each search algorithm.
-        starts: of each NLP solver; each is one run.
-        handling: of constraints, in searches.
-        stop: of each run.
-        seed: run k has the seed ``seed + k``.
-    """
+    """Everything that determines what a study computes."""
 
     problems: tuple[ProblemSpec, ...]
     solvers: tuple[SolverSpec, ...]
-    runs: int = 11
-    starts: int = 20
-    handling: Handling = field(default_factory=Handling)
+    runs: int = 11  #: of each search algorithm
+    starts: int = 20  #: of each NLP solver; each is one run
+    handling: Handling = field(default_factory=Handling)  #: of constraints, in searches
     stop: Stop = field(default_factory=Stop)
-    seed: int = 0
+    seed: int = 0  #: run k has the seed ``seed + k``
 
     def __post_init__(self) -> None:
         """Check counts and seed."""

@@ -30,31 +30,19 @@ REMEDY = "delete it and rerun with --engine"
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedGait:
-    """A gait in the engine and in the model.
+    """A gait in the engine and in the model."""
 
-    Attributes:
-        problem: label, as in the record.
-        solver: label, likewise.
-        run: number, likewise.
-        drive: actuator model.
-        steps: of a cycle; None for a phase.
-        unit: W, mean power over a phase, or J/m, energy of a cycle for each planned metre; mechanical and heat.
-        model: value of the model.
-        engine: value of the engine; None after a fall.
-        fell_at_s: time of the fall; None if there was none.
-        walked_share: walked share of the planned distance; None for a phase and after a fall.
-    """
-
-    problem: str
+    problem: str  #: label, as in the record
     solver: str
     run: int
     drive: Drive
-    steps: int | None
+    steps: int | None  #: of a cycle; None for a phase
+    #: W, mean power over a phase, or J/m, energy of a cycle for each planned metre; mechanical and heat
     unit: Literal["W", "J/m"]
-    model: float
-    engine: float | None
-    fell_at_s: float | None
-    walked_share: float | None
+    model: float  #: value of the model
+    engine: float | None  #: value of the engine; None after a fall
+    fell_at_s: float | None  #: time of the fall; None if there was none
+    walked_share: float | None  #: walked share of the planned distance; None for a phase and after a fall
 
 
 def simulate_records(

@@ -43,19 +43,14 @@ def list_solvers() -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class ProblemSpec:
-    """A problem as plain data.
+    """A problem as plain data."""
 
-    Attributes:
-        name: as in ``nlp-gait list``, or user code (see ``nlp_gait.formulation.registry.problem_maker``), or a ``GaitProblem``.
-        options: that differ from the defaults; none for a ``GaitProblem``.
-        values: parameters that differ from the defaults.
-        label: its name in a study; empty for ``name``, without file or module.
-    """
-
+    #: As in ``nlp-gait list``, or user code (see ``nlp_gait.formulation.registry.problem_maker``), or a ``GaitProblem``
     name: str | GaitProblem
+    #: That differ from the defaults; none for a ``GaitProblem``
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    label: str = ""
+    values: Mapping[str, float] = field(default_factory=dict)  #: parameters that differ from the defaults
+    label: str = ""  #: its name in a study; empty for ``name``, without file or module
 
     @property
     def address(self) -> str:
@@ -103,50 +98,31 @@ class Handling:
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """When a run ends.
+    """When a run ends."""
 
-    Attributes:
-        evaluations: budget of a search and of SLSQP; other NLP solvers end by themselves.
-        target: feasible objective that ends a search, in the problem's sense.
-        stagnation: generations without improvement that end a search.
-        time_limit_s: wall time [s]; not for solvers without a time limit (fatrop).
-    """
-
-    evaluations: int = 10_000
-    target: float | None = None
-    stagnation: int | None = None
-    time_limit_s: float | None = None
+    evaluations: int = 10_000  #: budget of a search and of SLSQP; other NLP solvers end by themselves
+    target: float | None = None  #: feasible objective that ends a search, in the problem's sense
+    stagnation: int | None = None  #: generations without improvement that end a search
+    time_limit_s: float | None = None  #: wall time [s]; not for solvers without a time limit (fatrop)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One run.
-
-    Attributes:
-        problem: what is solved.
-        solver: name, or user code as ``file.py:name`` or ``module:name``, or a picklable search algorithm or plain function (see
-            ``metaheuristics.as_algorithm``).
-        settings: of the named solver, that differ from its defaults.
-        handling: of constraints, in searches.
-        stop: criteria.
-        seed: of the study.
-        run: number of the run; its seed is ``seed + run``, so that equal runs of all solvers start alike.
-        label: of the solver in the study; empty for its name.
-        polishes: label of the search whose run of this number gives the start point; empty for a random start.
-        polished: that run, if it is known.
-        start: values of all variables by name at which an NLP solver starts; empty for a random point.
-    """
+    """One run."""
 
     problem: ProblemSpec
+    #: name, or user code as ``file.py:name`` or ``module:name``, or a picklable search algorithm or plain function (see
+    #: ``metaheuristics.as_algorithm``)
     solver: str | Algorithm | Callable[..., object]
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    handling: Handling = field(default_factory=Handling)
-    stop: Stop = field(default_factory=Stop)
-    seed: int = 0
-    run: int = 0
-    label: str = ""
-    polishes: str = ""
-    polished: Task | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: of the named solver, that differ from its defaults
+    handling: Handling = field(default_factory=Handling)  #: of constraints, in searches
+    stop: Stop = field(default_factory=Stop)  #: criteria
+    seed: int = 0  #: of the study
+    run: int = 0  #: number of the run; its seed is ``seed + run``, so that equal runs of all solvers start alike
+    label: str = ""  #: of the solver in the study; empty for its name
+    polishes: str = ""  #: label of the search whose run of this number gives the start point; empty for a random start
+    polished: Task | None = None  #: that run, if it is known
+    #: Values of all variables by name at which an NLP solver starts; empty for a random point
     start: Mapping[str, float] = field(default_factory=dict)
 
     @property

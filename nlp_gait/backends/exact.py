@@ -18,41 +18,24 @@ from nlp_gait.symbolic.nonsmooth import Exact
 
 
 class ExactValues(NamedTuple):
-    """Exact values at a point.
+    """Exact values at a point."""
 
-    Attributes:
-        cost: sign * objective, which is minimised.
-        violation: sum over all rows, each divided by its scale; NaN if a row is NaN.
-        g: (m,) rows, the variables last.
-        lower: (m,).
-        upper: (m,).
-        indexes: performance figures by name.
-    """
-
-    cost: float
-    violation: float
-    g: Array
-    lower: Array
-    upper: Array
-    indexes: dict[str, float]
+    cost: float  #: sign * objective, which is minimised
+    violation: float  #: sum over all rows, each divided by its scale; NaN if a row is NaN
+    g: Array  #: (m,) rows, the variables last
+    lower: Array  #: (m,)
+    upper: Array  #: (m,)
+    indexes: dict[str, float]  #: performance figures by name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExactModel:
-    """Exact function of a problem and the names of its outputs.
+    """Exact function of a problem and the names of its outputs."""
 
-    Attributes:
-        function: (x, p) to the parts of ``ExactValues``, in their order.
-        row_names: (m,) names of the constraint rows; the last n are the variables' bounds.
-        row_units: (m,).
-        row_scales: (m,) scales of the violations [unit of the row].
-        index_names: names of the indexes.
-    """
-
-    function: ca.Function
-    row_names: tuple[str, ...]
-    row_units: tuple[str, ...]
-    row_scales: Array
+    function: ca.Function  #: (x, p) to the parts of ``ExactValues``, in their order
+    row_names: tuple[str, ...]  #: (m,) names of the constraint rows; the last n are the variables' bounds
+    row_units: tuple[str, ...]  #: (m,)
+    row_scales: Array  #: (m,) scales of the violations [unit of the row]
     index_names: tuple[str, ...]
 
     @lock_casadi

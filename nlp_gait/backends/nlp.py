@@ -28,33 +28,20 @@ SENSE_TOLERANCE = 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NlpModel:
-    """NLP of a problem.
+    """NLP of a problem."""
 
-    Attributes:
-        nlp: CasADi's dictionary: x = (z, s), p = (problem parameters, sigmoid width), f, g.
-        variables: n, the number of problem variables.
-        row_names: names of the problem's rows, the first rows of g.
-        offset: (n,) x at z = 0.
-        scale: (n,) range of x.
-        row_bounds: function p -> (lower, upper) of the problem's rows.
-        lift_start: function (z, p, width) -> s at the exact values.
-        lifted: number of lifted variables.
-        tie_upper: upper bounds of the rows that tie them, the last rows of g: infinite, or 0 for an equation; the lower is 0.
-        smoothed: whether a jump is smoothed, so that the width matters.
-        build_s: time of the construction [s].
-    """
-
-    nlp: dict[str, MX]
-    variables: int
-    row_names: tuple[str, ...]
-    offset: Array
-    scale: Array
-    row_bounds: ca.Function
-    lift_start: ca.Function
-    lifted: int
+    nlp: dict[str, MX]  #: CasADi's dictionary: x = (z, s), p = (problem parameters, sigmoid width), f, g
+    variables: int  #: n, the number of problem variables
+    row_names: tuple[str, ...]  #: names of the problem's rows, the first rows of g
+    offset: Array  #: (n,) x at z = 0
+    scale: Array  #: (n,) range of x
+    row_bounds: ca.Function  #: function p -> (lower, upper) of the problem's rows
+    lift_start: ca.Function  #: function (z, p, width) -> s at the exact values
+    lifted: int  #: number of lifted variables
+    #: Upper bounds of the rows that tie them, the last rows of g: infinite, or 0 for an equation; the lower is 0
     tie_upper: Array
-    smoothed: bool
-    build_s: float
+    smoothed: bool  #: whether a jump is smoothed, so that the width matters
+    build_s: float  #: time of the construction [s]
 
     @property
     def widths(self) -> tuple[float, ...]:

@@ -26,17 +26,11 @@ class Ground(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A point that may touch the ground.
+    """A point that may touch the ground."""
 
-    Attributes:
-        height: above the ground [m].
-        normal: (n,) derivative of the height by the coordinates.
-        tangent: (n,) derivative of the forward position by the coordinates.
-    """
-
-    height: SX
-    normal: SX
-    tangent: SX
+    height: SX  #: above the ground [m]
+    normal: SX  #: (n,) derivative of the height by the coordinates
+    tangent: SX  #: (n,) derivative of the forward position by the coordinates
 
 
 class Equations(NamedTuple):

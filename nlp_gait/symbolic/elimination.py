@@ -20,17 +20,12 @@ CANDIDATES, NEARLY_BEST = 60, 0.8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Factors:
-    """Factors of a matrix, with rows and columns in the order of elimination.
+    """Factors of a matrix, with rows and columns in the order of elimination."""
 
-    Attributes:
-        order: (row, column) of each pivot.
-        factors: (n, n) multipliers below the pivots and remaining entries above them, in the places of the matrix.
-        inverses: of the pivots.
-    """
-
-    order: tuple[tuple[int, int], ...]
+    order: tuple[tuple[int, int], ...]  #: (row, column) of each pivot
+    #: (n, n) multipliers below the pivots and remaining entries above them, in the places of the matrix
     factors: Sequence[Sequence[SX]]
-    inverses: Sequence[SX]
+    inverses: Sequence[SX]  #: of the pivots
 
     def solve(self, right: SX) -> SX:
         """Return the solution (n,) for a right-hand side (n,)."""

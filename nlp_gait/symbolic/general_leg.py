@@ -41,53 +41,32 @@ LEAN_PITCH, LEAN_ROLL = 0.3, 0.15
 
 
 class TorsoMotion(NamedTuple):
-    """Motion of the torso relative to a standing or swinging flat foot, in the world's axes.
+    """Motion of the torso relative to a standing or swinging flat foot, in the world's axes."""
 
-    Attributes:
-        rotation: (3, 3) from the torso's axes.
-        spin: (3,) [rad/s].
-        spin_rate: (3,) [rad/s^2].
-        point_m: (3,) a point of the torso from its origin, in its axes [m].
-        place: (3,) position of that point from the origin of the foot's link [m].
-    """
-
-    rotation: SX
-    spin: SX
-    spin_rate: SX
-    point_m: Array
-    place: Motion
+    rotation: SX  #: (3, 3) from the torso's axes
+    spin: SX  #: (3,) [rad/s]
+    spin_rate: SX  #: (3,) [rad/s^2]
+    point_m: Array  #: (3,) a point of the torso from its origin, in its axes [m]
+    place: Motion  #: (3,) position of that point from the origin of the foot's link [m]
 
 
 class LegMotion(NamedTuple):
-    """Angles of a leg.
+    """Angles of a leg."""
 
-    Attributes:
-        joints: (6,) [rad] with both derivatives.
-        reach: cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach.
-        miss: misfit of the torso's pose: the larger of distance and rotation times the leg's length [m].
-    """
-
-    joints: Motion
-    reach: SX
-    miss: SX
+    joints: Motion  #: (6,) [rad] with both derivatives
+    reach: SX  #: cosine of the knee's angle from straight, by the law of cosines; above 1 the foot is out of reach
+    miss: SX  #: misfit of the torso's pose: the larger of distance and rotation times the leg's length [m]
 
 
 class _Chain(NamedTuple):
-    """Forward kinematics of a leg from its foot.
+    """Forward kinematics of a leg from its foot."""
 
-    Attributes:
-        rotations: (3, 3) of the links before each joint, the torso first.
-        axes: (3,) of each joint in the world.
-        levers: (3,) from each joint to the hip centre.
-        segments: (3,) from each joint to the one before it, the hip centre before the first; in the link between.
-        hip: (3,) hip centre from the foot's origin.
-    """
-
-    rotations: list[SX]
-    axes: list[SX]
-    levers: list[SX]
+    rotations: list[SX]  #: (3, 3) of the links before each joint, the torso first
+    axes: list[SX]  #: (3,) of each joint in the world
+    levers: list[SX]  #: (3,) from each joint to the hip centre
+    #: (3,) from each joint to the one before it, the hip centre before the first; in the link between
     segments: list[SX]
-    hip: SX
+    hip: SX  #: (3,) hip centre from the foot's origin
 
 
 def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmooth, *, held: bool) -> LegMotion:

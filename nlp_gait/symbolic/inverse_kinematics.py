@@ -15,15 +15,11 @@ LEAST_LEG_LENGTH = 1e-4
 
 
 class LegAngles(NamedTuple):
-    """Angles of a leg whose pelvis is upright and whose sole is flat.
+    """Angles of a leg whose pelvis is upright and whose sole is flat."""
 
-    Attributes:
-        joints: (5,) hip roll, hip pitch, knee pitch, ankle pitch, ankle roll [rad] with velocities and accelerations.
-        reach: cosine of the knee angle by the law of cosines: above 1 the ankle is out of reach, 1 a stretched leg.
-    """
-
+    #: (5,) hip roll, hip pitch, knee pitch, ankle pitch, ankle roll [rad] with velocities and accelerations
     joints: Motion
-    reach: SX
+    reach: SX  #: cosine of the knee angle by the law of cosines: above 1 the ankle is out of reach, 1 a stretched leg
 
 
 def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:

@@ -12,17 +12,11 @@ from nlp_gait.robots.tree import Body
 
 
 class Pose(NamedTuple):
-    """Pose of a body in the world.
+    """Pose of a body in the world."""
 
-    Attributes:
-        rotation: (3, 3) from body axes to world axes.
-        position: (3,) reference point of the body [m].
-        com: (3,) centre of mass [m].
-    """
-
-    rotation: SX
-    position: SX
-    com: SX
+    rotation: SX  #: (3, 3) from body axes to world axes
+    position: SX  #: (3,) reference point of the body [m]
+    com: SX  #: (3,) centre of mass [m]
 
 
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:

@@ -9,17 +9,11 @@ from casadi import SX
 
 
 class EquationsOfMotion(NamedTuple):
-    """M(q) qdd + C(q, qd) qd + G(q) = generalised forces.
+    """M(q) qdd + C(q, qd) qd + G(q) = generalised forces."""
 
-    Attributes:
-        M: (n, n) inertia matrix, symmetric and positive definite.
-        C: (n, n) Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
-        G: (n,) gravity.
-    """
-
-    M: SX
-    C: SX
-    G: SX
+    M: SX  #: (n, n) inertia matrix, symmetric and positive definite
+    C: SX  #: (n, n) Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric
+    G: SX  #: (n,) gravity
 
 
 def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsOfMotion:

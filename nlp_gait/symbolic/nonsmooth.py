@@ -31,41 +31,26 @@ class Angle(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Root:
-    """An equation of one instant, residual(unknown, inputs) = 0, with a method that solves it, as functions of expressions.
+    """An equation of one instant, residual(unknown, inputs) = 0, with a method that solves it, as functions of expressions."""
 
-    Attributes:
-        residual: (n,) of unknown (n,) and inputs, dimensionless, zero at the solution.
-        newton: (n,) of the inputs: a guess and a fixed number of Newton steps, defined for all inputs.
-        lift: whether ``Lifted`` makes the unknown a variable; else it differentiates through ``newton``.
-    """
-
-    residual: Callable[[SX, SX], SX]
+    residual: Callable[[SX, SX], SX]  #: (n,) of unknown (n,) and inputs, dimensionless, zero at the solution
+    #: (n,) of the inputs: a guess and a fixed number of Newton steps, defined for all inputs
     newton: Callable[[SX], SX]
-    lift: bool
+    lift: bool  #: whether ``Lifted`` makes the unknown a variable; else it differentiates through ``newton``
 
 
 class OpenRoots(NamedTuple):
-    """Equations of one instant that rows must tie, one below the other.
+    """Equations of one instant that rows must tie, one below the other."""
 
-    Attributes:
-        unknowns: (n,) symbols.
-        residual: (n,) must be zero.
-        start: (n,) result of Newton's method.
-    """
-
-    unknowns: SX
-    residual: SX
-    start: SX
+    unknowns: SX  #: (n,) symbols
+    residual: SX  #: (n,) must be zero
+    start: SX  #: (n,) result of Newton's method
 
 
 class Nonsmooth(Protocol):
-    """Operations that a problem may use in addition to smooth functions.
+    """Operations that a problem may use in addition to smooth functions."""
 
-    Attributes:
-        exact: whether the values are the exact ones, which are judged.
-    """
-
-    exact: bool
+    exact: bool  #: whether the values are the exact ones, which are judged
 
     def root(self, root: Root, inputs: SX) -> SX:
         """Return the solution (n,) of an equation of one instant, for its inputs."""
@@ -154,21 +139,14 @@ class Exact:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lift:
-    """New NLP variables that replace a non-smooth expression.
+    """New NLP variables that replace a non-smooth expression."""
 
-    Attributes:
-        variable: (k, 1) symbols.
-        value: (k, 1) exact values (start values, in terms of x and earlier lifts).
-        rows: (r, 1) expressions that must be >= 0, or == 0 if the lift is tight.
-        from_above: True if the variable may only exceed the exact value (abs), False if it may only be less (min).
-        tight: whether the rows determine the variable: it equals the exact value at every feasible point.
-    """
-
-    variable: MX
-    value: MX
-    rows: MX
+    variable: MX  #: (k, 1) symbols
+    value: MX  #: (k, 1) exact values (start values, in terms of x and earlier lifts)
+    rows: MX  #: (r, 1) expressions that must be >= 0, or == 0 if the lift is tight
+    #: True if the variable may only exceed the exact value (abs), False if it may only be less (min)
     from_above: bool = True
-    tight: bool = False
+    tight: bool = False  #: whether the rows determine the variable: it equals the exact value at every feasible point
 
 
 class Lifted:

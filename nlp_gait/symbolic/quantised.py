@@ -17,17 +17,11 @@ BRAKE_POWER = 8
 
 
 class Controller(NamedTuple):
-    """PD controller with partial compensation of gravity.
+    """PD controller with partial compensation of gravity."""
 
-    Attributes:
-        proportional: (n,) K_p [N m/rad].
-        derivative: (n,) K_d [N m s/rad].
-        gravity_share: compensated share of gravity; 0 as printed.
-    """
-
-    proportional: SX
-    derivative: SX
-    gravity_share: SX
+    proportional: SX  #: (n,) K_p [N m/rad]
+    derivative: SX  #: (n,) K_d [N m s/rad]
+    gravity_share: SX  #: compensated share of gravity; 0 as printed
 
 
 class QuantisedState(NamedTuple):

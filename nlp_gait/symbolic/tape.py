@@ -10,21 +10,13 @@ import casadi as ca
 
 
 class Instruction(NamedTuple):
-    """An operation on the results of earlier instructions.
+    """An operation on the results of earlier instructions."""
 
-    Attributes:
-        operation: CasADi's number of the operation.
-        arguments: indices of earlier instructions.
-        place: index of an input or an output among the nonzeros of all inputs or all outputs.
-        constant: value of a constant.
-        register: place in CasADi's work vector at which the result is stored; -1 for outputs.
-    """
-
-    operation: int
-    arguments: tuple[int, ...] = ()
-    place: int = -1
-    constant: float = 0.0
-    register: int = -1
+    operation: int  #: CasADi's number of the operation
+    arguments: tuple[int, ...] = ()  #: indices of earlier instructions
+    place: int = -1  #: index of an input or an output among the nonzeros of all inputs or all outputs
+    constant: float = 0.0  #: value of a constant
+    register: int = -1  #: place in CasADi's work vector at which the result is stored; -1 for outputs
 
 
 def read_tape(function: ca.Function) -> Iterator[Instruction]:

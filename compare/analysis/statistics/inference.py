@@ -92,19 +92,12 @@ def a12(a: Sequence[float], b: Sequence[float]) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankSum:
-    """Test of a first sample against a second one by the normal approximation, as papers print it.
+    """Test of a first sample against a second one by the normal approximation, as papers print it."""
 
-    Attributes:
-        rank_sum: of the first sample within both, W.
-        z: standardised rank sum, with continuity correction.
-        p_two_sided: against the alternative that either sample tends to be smaller.
-        p_less: against the alternative that the first sample tends to be smaller.
-    """
-
-    rank_sum: float
-    z: float
-    p_two_sided: float
-    p_less: float
+    rank_sum: float  #: of the first sample within both, W
+    z: float  #: standardised rank sum, with continuity correction
+    p_two_sided: float  #: against the alternative that either sample tends to be smaller
+    p_less: float  #: against the alternative that the first sample tends to be smaller
 
 
 def rank_sum_normal(a: Sequence[float], b: Sequence[float]) -> RankSum:

@@ -23,20 +23,13 @@ class Weighting:
 
     The defaults count derivatives like forward differences, objective and constraints separately: n + 1 for a first
     derivative, (n + 1)(n + 2) / 2 for the second. This never favours gradient methods.
-
-    Attributes:
-        f: of the objective (in searches with all constraints).
-        g: of the constraints alone.
-        gradient: of the objective's gradient; None for n + 1.
-        jacobian: of the constraints' Jacobian; None for n + 1.
-        hessian: of the Lagrangian's Hessian; None for (n + 1)(n + 2) / 2.
     """
 
-    f: float = 1.0
-    g: float = 1.0
-    gradient: float | None = None
-    jacobian: float | None = None
-    hessian: float | None = None
+    f: float = 1.0  #: of the objective (in searches with all constraints)
+    g: float = 1.0  #: of the constraints alone
+    gradient: float | None = None  #: of the objective's gradient; None for n + 1
+    jacobian: float | None = None  #: of the constraints' Jacobian; None for n + 1
+    hessian: float | None = None  #: of the Lagrangian's Hessian; None for (n + 1)(n + 2) / 2
 
     def of_kind(self, n: int) -> dict[str, float]:
         """Return the weight of each kind of call for n variables."""
@@ -57,16 +50,11 @@ class Curve:
     """Best so far of one run against what it cost.
 
     A gradient method has one entry, its end, as it may be infeasible earlier.
-
-    Attributes:
-        evaluations: (G,) equivalent evaluations.
-        seconds: (G,) wall time of the solve.
-        gap: (G,) relative distance from the reference, infinite while nothing was feasible; negative if better.
     """
 
-    evaluations: Array
-    seconds: Array
-    gap: Array
+    evaluations: Array  #: (G,) equivalent evaluations
+    seconds: Array  #: (G,) wall time of the solve
+    gap: Array  #: (G,) relative distance from the reference, infinite while nothing was feasible; negative if better
 
     def cost_to_reach(self, target: float, axis: str = "evaluations") -> float:
         """Return the cost at which the gap is first at most the target; infinite if never."""

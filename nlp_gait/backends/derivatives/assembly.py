@@ -21,31 +21,21 @@ from nlp_gait.backends.derivatives.structure import Structure
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NlpPlan:
-    """A plan and the places of its inputs and results.
+    """A plan and the places of its inputs and results."""
 
-    Attributes:
-        plan: with steps of three phases.
-        parameters: k, their number.
-        w: place of the variables (n,); likewise ``p`` (k,), ``rows`` (1 + m,) of cost and g, ``weights`` (1 + m,) of these in
-            the Lagrangian.
-        gradient: place of the dense gradient (n,).
-        jacobian: sparsity (m, n).
-        jacobian_places: of its nonzeros, in CasADi's order.
-        hessian: sparsity (n, n), upper triangle.
-        hessian_place: of its nonzeros, in CasADi's order.
-    """
-
-    plan: Plan
-    parameters: int
+    plan: Plan  #: with steps of three phases
+    parameters: int  #: k, their number
+    #: Place of the variables (n,); likewise ``p`` (k,), ``rows`` (1 + m,) of cost and g, ``weights`` (1 + m,) of these in the
+    #: Lagrangian
     w: int
     p: int
     rows: int
     weights: int
-    gradient: int
-    jacobian: ca.Sparsity
-    jacobian_places: Integers
-    hessian: ca.Sparsity
-    hessian_place: int
+    gradient: int  #: place of the dense gradient (n,)
+    jacobian: ca.Sparsity  #: sparsity (m, n)
+    jacobian_places: Integers  #: of its nonzeros, in CasADi's order
+    hessian: ca.Sparsity  #: sparsity (n, n), upper triangle
+    hessian_place: int  #: of its nonzeros, in CasADi's order
 
 
 def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:

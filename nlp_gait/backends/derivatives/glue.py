@@ -15,16 +15,11 @@ from nlp_gait.symbolic.tape import read_tape
 
 
 class Glue(NamedTuple):
-    """Rows of glue and their derivatives.
+    """Rows of glue and their derivatives."""
 
-    Attributes:
-        rows: (r,) expressions.
-        places: (r,) places of their values.
-        entries: for each row the numbers of the entries of y that it depends on, and places of the derivatives.
-    """
-
-    rows: SX
-    places: Integers
+    rows: SX  #: (r,) expressions
+    places: Integers  #: (r,) places of their values
+    #: For each row the numbers of the entries of y that it depends on, and places of the derivatives
     entries: list[list[tuple[int, int]]]
 
 

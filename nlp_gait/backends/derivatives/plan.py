@@ -41,44 +41,30 @@ class Block(NamedTuple):
 
 
 class Call(NamedTuple):
-    """Call of a function of one sample for all samples and directions.
-
-    Attributes:
-        function: number of the function.
-        samples: number of samples.
-        directions: (samples,) number of directions of each, or None if the function takes none.
-        inputs: in their order; likewise ``outputs``.
-    """
+    """Call of a function of one sample for all samples and directions."""
 
     function: int
     samples: int
-    directions: Integers | None
-    inputs: tuple[Block, ...]
+    directions: Integers | None  #: (samples,) number of directions of each, or None if the function takes none
+    inputs: tuple[Block, ...]  #: in their order; likewise ``outputs``
     outputs: tuple[Block, ...]
 
 
 @dataclass(kw_only=True, eq=False)
 class Plan:
-    """The memory and the steps; ``Assembler`` fills it.
+    """The memory and the steps; ``Assembler`` fills it."""
 
-    Attributes:
-        size: of the memory, in doubles.
-        initial: initial values by place; all others are zero.
-        functions: functions of one sample, to be emitted.
-        calls: of these functions.
-        tape: (operation, target, argument, argument).
-        runs: (target, source, factor, length): adds factor times a run of numbers to another run.
-        products: (target, source, factor, factor, length): the same with two factors.
-        steps: (kind, first, last) of three phases: values, first derivatives, second derivatives.
-    """
-
-    size: int = 1
+    size: int = 1  #: of the memory, in doubles
+    #: Initial values by place; all others are zero
     initial: dict[int, float] = field(default_factory=lambda: {ONE: 1.0})
-    functions: list[ca.Function] = field(default_factory=list)
+    functions: list[ca.Function] = field(default_factory=list)  #: functions of one sample, to be emitted
     calls: list[Call] = field(default_factory=list)
-    tape: list[tuple[int, int, int, int]] = field(default_factory=list)
+    tape: list[tuple[int, int, int, int]] = field(default_factory=list)  #: (operation, target, argument, argument)
+    #: (target, source, factor, length): adds factor times a run of numbers to another run
     runs: list[tuple[int, int, int, int]] = field(default_factory=list)
+    #: (target, source, factor, factor, length): the same with two factors
     products: list[tuple[int, int, int, int, int]] = field(default_factory=list)
+    #: (kind, first, last) of three phases: values, first derivatives, second derivatives
     steps: tuple[list[tuple[int, int, int]], ...] = field(default_factory=lambda: ([], [], []))
     _constants: dict[float, int] = field(default_factory=lambda: {1.0: ONE})
 

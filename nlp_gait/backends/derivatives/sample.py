@@ -17,23 +17,15 @@ MOST_GROWTH = 2.0
 
 
 class SampleDerivatives(NamedTuple):
-    """Functions of one sample. Some of its inputs u are active: they depend on the NLP's variables.
+    """Functions of one sample. Some of its inputs u are active: they depend on the NLP's variables."""
 
-    Attributes:
-        value: u (m,) to v (nv,).
-        jacobian: sparsity (nv, ma) of dv / du.
-        hessian: sparsity (ma, ma) of the second derivatives of any sum of outputs, symmetric.
-        directional: whether ``first`` and ``second`` take a direction.
-        first: (u, du) to dv; or u to the nonzeros of the Jacobian.
-        second: (u, weights of the outputs, du) to their gradient and its change; or (u, weights) to the gradient and the
-            nonzeros of the Hessian.
-    """
-
-    value: ca.Function
-    jacobian: ca.Sparsity
-    hessian: ca.Sparsity
-    directional: bool
-    first: ca.Function
+    value: ca.Function  #: u (m,) to v (nv,)
+    jacobian: ca.Sparsity  #: sparsity (nv, ma) of dv / du
+    hessian: ca.Sparsity  #: sparsity (ma, ma) of the second derivatives of any sum of outputs, symmetric
+    directional: bool  #: whether ``first`` and ``second`` take a direction
+    first: ca.Function  #: (u, du) to dv; or u to the nonzeros of the Jacobian
+    #: (u, weights of the outputs, du) to their gradient and its change; or (u, weights) to the gradient and the nonzeros of
+    #: the Hessian
     second: ca.Function
 
 

@@ -23,36 +23,22 @@ class NotMapped(CompilerError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
-    """A function of one sample that is called at all samples.
+    """A function of one sample that is called at all samples."""
 
-    Attributes:
-        function: of one sample, from all inputs (m,) to all outputs (nv,).
-        count: number of samples.
-        inputs: (count * m,) glue, sample by sample.
-        outputs: (count * nv,) symbols in place of the outputs, sample by sample.
-    """
-
-    function: ca.Function
+    function: ca.Function  #: of one sample, from all inputs (m,) to all outputs (nv,)
     count: int
-    inputs: SX
-    outputs: SX
+    inputs: SX  #: (count * m,) glue, sample by sample
+    outputs: SX  #: (count * nv,) symbols in place of the outputs, sample by sample
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Structure:
-    """Stages of an NLP in the order in which they are evaluated, and the glue after the last one.
+    """Stages of an NLP in the order in which they are evaluated, and the glue after the last one."""
 
-    Attributes:
-        w: (n,) symbols of the NLP's variables.
-        p: (k,) symbols of its parameters.
-        stages: each depends on earlier ones only.
-        rows: (1 + m,) cost and rows.
-    """
-
-    w: SX
-    p: SX
-    stages: tuple[Stage, ...]
-    rows: SX
+    w: SX  #: (n,) symbols of the NLP's variables
+    p: SX  #: (k,) symbols of its parameters
+    stages: tuple[Stage, ...]  #: each depends on earlier ones only
+    rows: SX  #: (1 + m,) cost and rows
 
 
 def split_nlp(nlp: Mapping[str, MX]) -> Structure:

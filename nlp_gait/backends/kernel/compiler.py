@@ -42,15 +42,10 @@ WATCHED = (
 
 @dataclass(frozen=True, kw_only=True)
 class Compiler:
-    """A C++ compiler.
+    """A C++ compiler."""
 
-    Attributes:
-        command: program and leading arguments.
-        version: output of ``--version``, for cache keys.
-    """
-
-    command: tuple[str, ...]
-    version: str
+    command: tuple[str, ...]  #: program and leading arguments
+    version: str  #: output of ``--version``, for cache keys
 
     @property
     def summary(self) -> str:

@@ -18,18 +18,11 @@ SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kernel:
-    """The part of the exact model that is evaluated for each candidate, and the part that depends on parameters only.
+    """The part of the exact model that is evaluated for each candidate, and the part that depends on parameters only."""
 
-    Attributes:
-        function: (x, p) to cost and g (m,).
-        bounds: p to lower and upper (m,).
-        weights: (m,) 1 / scale of each row.
-        model: the exact model.
-    """
-
-    function: ca.Function
-    bounds: ca.Function
-    weights: Array
+    function: ca.Function  #: (x, p) to cost and g (m,)
+    bounds: ca.Function  #: p to lower and upper (m,)
+    weights: Array  #: (m,) 1 / scale of each row
     model: ExactModel
 
     @lock_casadi

@@ -25,17 +25,11 @@ FLAT = 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KktFunctions:
-    """Functions of w = (z, lifted variables), p = (parameters, sigmoid width) and multipliers lam of all rows.
-
-    Attributes:
-        model: the NLP.
-        values: (w, p) to cost, row values (m,), lower (m,), upper (m,).
-        gradient: (w, p, lam) to the gradient of L in w.
-    """
+    """Functions of w = (z, lifted variables), p = (parameters, sigmoid width) and multipliers lam of all rows."""
 
     model: NlpModel
-    values: ca.Function
-    gradient: ca.Function
+    values: ca.Function  #: (w, p) to cost, row values (m,), lower (m,), upper (m,)
+    gradient: ca.Function  #: (w, p, lam) to the gradient of L in w
 
     @cached_property
     def matrices(self) -> ca.Function:
@@ -93,25 +87,15 @@ def column(value: DM) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KktStep:
-    """Solution of H dw + A' dlam = r, A dw = c for one or several right-hand sides.
+    """Solution of H dw + A' dlam = r, A dw = c for one or several right-hand sides."""
 
-    Attributes:
-        w: dw.
-        multipliers: dlam, of least norm where they are not unique.
-        inconsistent: largest part of c that dependent rows contradict, for each right-hand side.
-        flat: (n,) True for the unknowns that neither rows nor curvature determine; they do not move.
-        freedom: dimension of the null space of A.
-        dependent: rows of A that follow from the others.
-        reason: why the decision variables' part of dw is not determined, or None.
-    """
-
-    w: Array
-    multipliers: Array
-    inconsistent: Array
-    flat: Array
-    freedom: int
-    dependent: int
-    reason: str | None
+    w: Array  #: dw
+    multipliers: Array  #: dlam, of least norm where they are not unique
+    inconsistent: Array  #: largest part of c that dependent rows contradict, for each right-hand side
+    flat: Array  #: (n,) True for the unknowns that neither rows nor curvature determine; they do not move
+    freedom: int  #: dimension of the null space of A
+    dependent: int  #: rows of A that follow from the others
+    reason: str | None  #: why the decision variables' part of dw is not determined, or None
 
 
 def solve_kkt(hessian: Array, rows: Array, r: Array, c: Array, variables: int) -> KktStep:

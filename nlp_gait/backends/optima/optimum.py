@@ -33,33 +33,19 @@ LARGEST = 2_500
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """Point that satisfies the first-order conditions.
-
-    Attributes:
-        problem: the problem.
-        functions: its first-order conditions.
-        w: scaled variables and lifted variables.
-        width: of the sigmoid.
-        multipliers: (m,) of all rows and bounds; positive at an upper bound.
-        side: (m,) 1 where a row is at its upper bound, -1 at its lower one, else 0.
-        weak: names of the bounds that are active without a price, or nearly active.
-        residual: largest violation of the conditions.
-        freedom: dimension of the space in which x* and the lifted variables could move along the active bounds.
-        dependent: number of active rows that follow from the others: their multipliers are not unique.
-        reason: why there is no derivative, or None.
-    """
+    """Point that satisfies the first-order conditions."""
 
     problem: GaitProblem
     functions: KktFunctions
-    w: Array
-    width: float
-    multipliers: Array
-    side: Array
-    weak: tuple[str, ...]
-    residual: float
-    freedom: int
-    dependent: int
-    reason: str | None
+    w: Array  #: scaled variables and lifted variables
+    width: float  #: of the sigmoid
+    multipliers: Array  #: (m,) of all rows and bounds; positive at an upper bound
+    side: Array  #: (m,) 1 where a row is at its upper bound, -1 at its lower one, else 0
+    weak: tuple[str, ...]  #: names of the bounds that are active without a price, or nearly active
+    residual: float  #: largest violation of the conditions
+    freedom: int  #: dimension of the space in which x* and the lifted variables could move along the active bounds
+    dependent: int  #: number of active rows that follow from the others: their multipliers are not unique
+    reason: str | None  #: why there is no derivative, or None
 
     @property
     def x(self) -> Array:

@@ -29,19 +29,13 @@ STILL = 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives at an optimum, one column for each quantity.
+    """Derivatives at an optimum, one column for each quantity."""
 
-    Attributes:
-        objective: (k,) of the optimal objective, in the problem's sense.
-        x: (n, k) of x*.
-        defined: (k,) False where dependent active bounds contradict each other: no derivative exists.
-        reach: (2, k) change of the quantity downwards (<= 0) and upwards at which, to first order, the next bound becomes
-            active or an active one is released: there x* changes direction.
-    """
-
-    objective: Array
-    x: Array
-    defined: Array
+    objective: Array  #: (k,) of the optimal objective, in the problem's sense
+    x: Array  #: (n, k) of x*
+    defined: Array  #: (k,) False where dependent active bounds contradict each other: no derivative exists
+    #: (2, k) change of the quantity downwards (<= 0) and upwards at which, to first order, the next bound becomes active or
+    #: an active one is released: there x* changes direction
     reach: Array
 
 
