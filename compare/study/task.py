@@ -45,7 +45,7 @@ def list_solvers() -> tuple[str, ...]:
 class ProblemSpec:
     """A problem as plain data."""
 
-    #: As in ``nlp-gait list``, or user code (see ``nlp_gait.formulation.registry.problem_maker``), or a ``GaitProblem``
+    #: As in ``nlp-gait list``, or user code (see ``nlp_gait.formulation.registry.find_maker``), or a ``GaitProblem``
     name: str | GaitProblem
     #: That differ from the defaults; none for a ``GaitProblem``
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
