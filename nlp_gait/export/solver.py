@@ -94,7 +94,6 @@ def _constant(kind: str, name: str, values: Iterable[object]) -> str:
 
 
 def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:
-    """Return the text for each placeholder of the templates."""
     m, n = found.jacobian.shape
     return {
         "WHAT": f"{problem.address}: {problem.title}",

@@ -77,7 +77,6 @@ def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
 
 
 def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping[str, str]:
-    """Return the text for each placeholder of the templates."""
     problem, definition = instance.gait_problem, instance.definition
     unit = problem.objective.unit
     return {
@@ -106,7 +105,6 @@ def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping
 
 
 def _numbers(values: Array) -> str:
-    """Return a C initialiser, with libm's name of infinity."""
     return "{" + ", ".join(repr(v).replace("inf", "INFINITY") for v in values.tolist()) + "}"
 
 

@@ -41,7 +41,6 @@ def _make(id: str) -> GaitProblem:
 
 
 def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:
-    """Convert the problem, or a finer one, to the suite's form."""
     base = base.with_values(**definition.values)
     banded = hold_constant(base, definition.held).derive(
         name="gaitbench", title=f"GaitBench: {definition.what}", change=_widen_equations
@@ -104,7 +103,6 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
 
 
 def _widen_equations(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
-    """Return the assembly with a band in place of each equation."""
     return replace(assembly, constraints=tuple(map(_widen, assembly.constraints)))
 
 

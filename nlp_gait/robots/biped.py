@@ -129,7 +129,6 @@ def make_biped_model(robot: Robot) -> Biped:
 
 
 def _held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
-    """Return the stated angle, or else zero or the nearest limit."""
     low, high = joint.limits_rad
     angle = posture.get(joint.name)
     if angle is None:

@@ -215,13 +215,11 @@ def _chain_to_root(link: str, joint_to: Mapping[str, JointPlace]) -> Chain:
 
 
 def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
-    """Return two chains without the joints that both have."""
     shared = {joint.child for joint in first} & {joint.child for joint in second}
     return [j for j in first if j.child not in shared], [j for j in second if j.child not in shared]
 
 
 def _are_mirror_chains(one: Chain, other: Chain) -> bool:
-    """Return whether two chains are mirror images in x or in y."""
     return any(
         all(are_mirror_images(a.place, a.axis, b.place, b.axis, across) for a, b in zip(one, other, strict=True))
         and abs(one[0].place[across] - other[0].place[across]) > LEAST_WIDTH_M
@@ -230,7 +228,6 @@ def _are_mirror_chains(one: Chain, other: Chain) -> bool:
 
 
 def _find_sole(robot: str, link: str, cloud: PointCloud) -> Sole:
-    """Return the lowest part of a foot's collision shapes."""
     points, missing = cloud(link)
     write = (
         'write its sole into the JSON file next to the model: "ankle_height_m", "front_m", "back_m", "left_m", "right_m" '

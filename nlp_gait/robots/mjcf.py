@@ -166,7 +166,6 @@ def _joint_place(model: Any, frames: dict[int, Array], body: int) -> Array:
 
 
 def _read_mass(model: Any, body: int, frame: Array) -> Mass:
-    """Return the mass of a body in the root's frame."""
     pose = frame @ _pose(model.body_ipos[body], model.body_iquat[body])
     own = Mass(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body]))
     return own.turn(pose[:3, :3]).move(pose[:3, 3])

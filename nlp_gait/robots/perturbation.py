@@ -104,7 +104,6 @@ def _scale_mass(link: Link, factor: float) -> Link:
 
 
 def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
-    """Return the robot with both legs longer above a joint."""
     joints = dict(robot.joints)
     for side, foot in robot.feet.items():
         path = robot.path_to_root(foot.link)

@@ -204,7 +204,6 @@ def _find_carrier(link: str, joints: dict[str, Any]) -> str:
 
 
 def _read_mass(link: Any, frame: Array, about_joint: bool) -> Mass:
-    """Return the mass of a link in the root's frame."""
     inertial = link.inertial
     if inertial is None:
         return Mass(0.0, frame[:3, 3], np.zeros((3, 3)))
@@ -243,7 +242,6 @@ def _joint_record(joint: Any, frames: dict[str, Array], carriers: dict[str, str]
 
 
 def _pose(origin: Any, owner: str) -> Array:
-    """Return the pose (4, 4) of an ``<origin>``."""
     if origin is None:
         return np.eye(4)
     if not are_plausible([*(origin.rpy or ()), *(origin.xyz or ())]):

@@ -151,7 +151,6 @@ def make_sole_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
 
 
 def _solve_cheapest(plan: Plan, support: Support, instants: Instants, sharing: Sharing) -> Array:
-    """Return the wrenches (n, 6) on the right sole."""
     samples = slice(support.first, support.last + 1)
     t, rate = plan.signals.arrays["t"][samples], plan.signals.arrays["qd"][samples]
     n, knots = len(t), max(2, math.ceil((t[-1] - t[0]) / sharing.period_s) + 1)

@@ -251,7 +251,6 @@ def _rms(values: Array) -> float:
 
 
 def _if_any(statistic: Any, values: Array) -> float | None:
-    """Return a statistic of the finite values; None without any."""
     numbers = values[np.isfinite(values)]
     return float(statistic(numbers)) if numbers.size else None
 

@@ -182,7 +182,6 @@ def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
 
 
 def _numbers(*values: float) -> str:
-    """Format numbers for MJCF, to the last digit."""
     return " ".join(repr(float(value)) for value in values)
 
 

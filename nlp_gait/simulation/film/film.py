@@ -166,7 +166,6 @@ class Captions:
             self._figure.draw_artist(artist)
 
     def _label(self, view: View) -> None:
-        """Add the labels that fit into the lower left corner of a view."""
         labels = list(LABELS.get(view.name, {view.name: FAINT}).items())
         corner = (self._left + view.left + self._line / 2, self._height - view.top - view.height + self._line / 4)
         packer = VPacker if view.name == "above" else HPacker

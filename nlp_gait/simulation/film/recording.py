@@ -113,5 +113,4 @@ def _steps(window_s: float) -> int:
 
 
 def _smooth(values: Array, window_s: float) -> Array:
-    """Moving mean along time."""
     return np.asarray(uniform_filter1d(values, _steps(window_s), axis=0, mode="nearest"))
