@@ -40,8 +40,8 @@ def median_gap(runs: Sequence[Curve], budget: float) -> float:
 
 def price(runs: Sequence[Curve], target: float) -> tuple[float, int]:
     """Expected evaluations until a target is reached, and how many runs reached it."""
-    reached = [run.reached(target) for run in runs]
-    return expected_running_time(reached, [run.total() for run in runs]), sum(map(math.isfinite, reached))
+    reached = [run.cost_to_reach(target) for run in runs]
+    return expected_running_time(reached, [run.total_cost() for run in runs]), sum(map(math.isfinite, reached))
 
 
 def leaders(curves: Curves, budget: int) -> list[tuple[str, float]]:
@@ -107,7 +107,7 @@ def figure(stem: Path, found: Mapping[str, Curves]) -> tuple[Path, Path]:
         for axes, (problem, curves) in zip(panels, found.items(), strict=True):
             for label in labels:
                 if label in curves:
-                    end = float(np.median([run.total() for run in curves[label]]))
+                    end = float(np.median([run.total_cost() for run in curves[label]]))
                     at = np.append(grid[grid < end], end)
                     gaps = np.array([median_gap(curves[label], budget) for budget in at])
                     shown = np.where(np.isfinite(gaps), np.maximum(gaps, LEAST_GAP), np.nan)

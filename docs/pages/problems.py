@@ -48,7 +48,7 @@ def write(folder: Path) -> None:
     folder, measured = folder / "problems", difficulties()
     folder.mkdir(parents=True, exist_ok=True)
     problems = {name: load(name) for name in names()}
-    pages = {f"{name}.md": _page(problem, measured.get(name), folder) for name, problem in problems.items()}
+    pages = {f"{name}.md": problem_page(problem, measured.get(name), folder) for name, problem in problems.items()}
     header = ("problem", "what", "variables", "best known", "feasible points", "IPOPT near", "searches near")
     rows = [_overview(problem, measured.get(name)) for name, problem in problems.items()]
     pages["index.md"] = page(INTRODUCTION, table(header, rows), toctree(problems))
@@ -82,13 +82,14 @@ def _feasible(found: Difficulty) -> str:
     return f"{100.0 * found.feasible_points / found.points:.3g} %"
 
 
-def _page(problem: GaitProblem, found: Difficulty | None, folder: Path) -> str:
+def problem_page(problem: GaitProblem, found: Difficulty | None, folder: Path) -> str:
+    """Return the page of a problem, and write its picture into the folder."""
     best = None if found is None else found.best
     return page(
         f"# {problem.name}",
         f"**{literal(problem.title)}.** {literal(_words(problem))}",
         _picture(problem, best, folder),
-        _best(problem, found),
+        best_section(problem, found),
         _variables(problem, best),
         _binding(problem, best),
         _rows(problem),
@@ -115,7 +116,12 @@ def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
     return f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
 
 
-def _best(problem: GaitProblem, found: Difficulty | None) -> str:
+def best_section(problem: GaitProblem, found: Difficulty | None) -> str:
+    """Return the section on the best known objective.
+
+    Raises:
+        ValueError: the problem has changed since it was measured.
+    """
     objective = problem.objective
     title = f"## Best known {objective.name}"
     if found is None or found.best is None:

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 import typer
 
-from benchmarks.difficulty import Difficulty, difficulties
 from compare.cli import NAMES, PANELS, app
 from compare.study.task import list_solvers
 from docs.check import faults_of
@@ -84,13 +83,13 @@ def test_every_algorithm_and_solver_is_described(tmp_path: Path) -> None:
 
 def test_every_problem_has_a_page() -> None:
     assert set(problems.names()) == {name for name in problem_names() if name != "gaitbench"}
-    assert set(difficulties()) <= set(problems.names())
+    assert set(problems.difficulties()) <= set(problems.names())
 
 
 @pytest.mark.slow
 def test_the_page_of_a_problem_is_made_from_the_problem(tmp_path: Path) -> None:
-    problem, found = load("nao-dsp"), difficulties()["nao-dsp"]
-    page = problems._page(problem, found, tmp_path)
+    problem, found = load("nao-dsp"), problems.difficulties()["nao-dsp"]
+    page = problems.problem_page(problem, found, tmp_path)
     assert (tmp_path / "nao-dsp.png").stat().st_size > 10_000
     assert all(f"| `{v.name}` | {v.lower:g} | {v.upper:g} |" in page for v in problem.variables)
     assert all(f"`{q.name}`" in page for q in problem.own_parameters)
@@ -100,12 +99,12 @@ def test_the_page_of_a_problem_is_made_from_the_problem(tmp_path: Path) -> None:
 
 
 def test_what_was_measured_of_another_version_is_refused(tmp_path: Path) -> None:
-    found = difficulties()["walk12"]
+    found = problems.difficulties()["walk12"]
     assert found.best is not None
-    wrong = Difficulty(**{**vars(found), "best": type(found.best)(**{**vars(found.best), "objective": 1.5})})
+    wrong = problems.Difficulty(**{**vars(found), "best": type(found.best)(**{**vars(found.best), "objective": 1.5})})
     with pytest.raises(ValueError, match="the problem has changed"):
-        problems._best(load("walk12"), wrong)
-    assert "Not measured yet" in problems._best(load("walk12"), None)
+        problems.best_section(load("walk12"), wrong)
+    assert "Not measured yet" in problems.best_section(load("walk12"), None)
 
 
 def test_cells_hold_text_not_markup() -> None:
