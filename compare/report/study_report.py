@@ -13,12 +13,12 @@ from compare.drawing.distributions import list_expected_costs, plot_performance_
 from compare.report.document import Document, Figure, Section
 from compare.report.method_section import method_section
 from compare.report.problem_section import HOW, problem_section
-from compare.report.writing import write_csv_files, write_document
+from compare.report.writing import write_document
 from compare.study.manifest import Manifest, read_manifest
-from compare.study.record import RunRecord
+from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
 from compare.study.record_files import read_records
 from compare.study.simulations import SimulatedGait, load_simulations
-from nlp_gait.files import make_file_name
+from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 
 
 def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
@@ -77,3 +77,43 @@ def _over_problems(comparisons: Sequence[Comparison]) -> Section:
         drawing=plot_performance_profile(comparisons),
     )
     return Section(title="Over all problems", parts=(figure,))
+
+
+def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str, str]) -> list[Path]:
+    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; unknown values are empty cells.
+
+    Args:
+        folder: to write to.
+        records: of all problems.
+        stems: of the files, by problem.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    files = [folder / "runs.csv"]
+    write_text(files[0], format_csv([HEADER, *(_cells(make_row(r)) for r in records)]))
+    for problem, stem in stems.items():
+        own = [record for record in records if record.problem == problem]
+        names = list(dict.fromkeys(name for record in own for name in record.x))
+        taken = {*names, *JUDGED}
+        indexes = list(dict.fromkeys(name for record in own for name in record.verdict.indexes if name not in taken))
+        rows = [
+            _cells(
+                [
+                    r.solver,
+                    r.run,
+                    *(r.x.get(n) for n in names),
+                    *make_judged_cells(r),
+                    *(r.verdict.indexes.get(n) for n in indexes),
+                ]
+            )
+            for r in own
+            if r.x
+        ]
+        files.append(folder / f"{stem}-points.csv")
+        write_text(files[-1], format_csv([("solver", "run", *names, *JUDGED, *indexes), *rows]))
+    return files
+
+
+def _cells(row: list[object]) -> list[object]:
+    return ["" if value is None else value for value in replace_nan(row)]

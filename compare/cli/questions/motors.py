@@ -23,6 +23,6 @@ def motors(
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
     """
-    from compare.questions.motors import Motors
+    from compare.questions.real_motors import Motors
 
     output.answer(Motors(problem=problem.load(), starts=starts, seed=seed))

@@ -11,7 +11,7 @@ import numpy as np
 
 from compare.papers.nao_pareto.nao_pareto_runs import Case, ParetoEffort, Run
 from compare.questions.pareto.competing import CompetingObjective
-from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_nondominated
+from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
 from compare.questions.pareto.pareto_front import SEARCH_NAMES
 from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
 from metaheuristics.array import Array
@@ -126,4 +126,4 @@ def collect_points(front: Sequence[FrontPoint], runs: Iterable[Run]) -> list[Fro
         values, powers = scale.undo(run[-1].F)
         for value, power, x in zip(values.tolist(), powers.tolist(), run[-1].X.tolist(), strict=True):
             found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
-    return select_nondominated(found)
+    return select_front(found)

@@ -121,7 +121,7 @@ def solve_front(
         progress(f"{criterion.name} {at:.5g} {criterion.unit}")
     follow(sorted(found), seed)
     follow(sorted(found, reverse=True), seed + 1)
-    return select_nondominated(
+    return select_front(
         [p for at in sorted(found) if (p := _make_point(problem, criterion, at, found[at])) is not None]
     )
 
@@ -137,7 +137,7 @@ def solve_point(
     )
 
 
-def select_nondominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:
+def select_front(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     """Return the points, by rising criterion, that no other point equals or betters in both; the first of equal ones stays."""
     kept: list[FrontPoint] = []
     for point in sorted(points, key=lambda p: (-p.value, p.power_W)):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compare.questions.pareto.competing import CompetingObjective
-from compare.questions.pareto.front import FrontPoint, select_nondominated, solve_point
+from compare.questions.pareto.front import FrontPoint, select_front, solve_point
 from compare.questions.question import Work
 from metaheuristics.array import Array
 from metaheuristics.multi_objective.interface import FrontAlgorithm
@@ -141,7 +141,7 @@ def select_best(fronts: Sequence[SearchFront]) -> list[FrontPoint]:
         for front in fronts
         for v, w, x in zip(front.values.tolist(), front.powers.tolist(), front.X.tolist(), strict=True)
     ]
-    return select_nondominated(points)
+    return select_front(points)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,7 +274,7 @@ def challenge_front(
         least_gap=min(gaps, default=np.inf),
         median_gap=float(np.median(gaps)) if gaps else np.inf,
         moved=moved,
-        front=tuple(select_nondominated([*front, *solved])),
+        front=tuple(select_front([*front, *solved])),
     )
 
 

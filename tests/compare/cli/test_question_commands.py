@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.questions import motors
+from compare.questions import real_motors as motors
 from compare.questions.pareto import front as pareto_front
 from compare.questions.prices import prices
 from compare.questions.robust import robust_gait as robust

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.questions import motors
+from compare.questions import real_motors as motors
 
 RUN = CliRunner()
 

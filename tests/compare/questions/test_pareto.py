@@ -11,7 +11,7 @@ import pytest
 import nlp_gait
 from compare.judge import evaluate
 from compare.questions.pareto.competing import make_competing_objective, parse_objectives
-from compare.questions.pareto.front import FrontPoint, find_bends, select_nondominated, solve_front
+from compare.questions.pareto.front import FrontPoint, find_bends, select_front, solve_front
 from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
 from compare.questions.pareto.pareto_surface import ParetoSurface
 from compare.questions.pareto.searches import SearchFront, compute_qualities
@@ -59,7 +59,7 @@ def test_an_arc_has_no_knee() -> None:
 
 
 def test_dominated_points_go() -> None:
-    kept = select_nondominated(points([(0.0, 1.0), (0.5, 3.0), (1.0, 2.0), (1.0, 2.5), (2.0, 4.0)]))
+    kept = select_front(points([(0.0, 1.0), (0.5, 3.0), (1.0, 2.0), (1.0, 2.5), (2.0, 4.0)]))
     assert [(p.value, p.power_W) for p in kept] == [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]
 
 
