@@ -93,6 +93,6 @@ def test_walk_takes_those_that_a_cycle_has() -> None:
 @pytest.mark.parametrize(
     ("problem", "intervals"), [("nao-ssp", 10), ("walk12", 20), ("stairs-plan", 40), ("stairs-ideal", 70)]
 )
-def test_help_says_where_the_number_of_intervals_stands_and_it_stands_there(problem: str, intervals: int) -> None:
+def test_help_names_the_page_with_the_number_of_intervals(problem: str, intervals: int) -> None:
     assert "see nlp-gait list PROBLEM" in RUN.invoke(app, ["solve", "--help"], env={"COLUMNS": "200"}).stdout
     assert f"intervals={intervals}" in RUN.invoke(app, ["list", problem]).stdout

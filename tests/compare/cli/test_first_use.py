@@ -1,4 +1,4 @@
-"""What somebody meets who uses the package for the first time."""
+"""First steps with the package."""
 
 import os
 import re

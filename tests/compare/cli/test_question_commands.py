@@ -123,7 +123,7 @@ def pressed_in_call(number: int, function: Callable[..., object]) -> Callable[..
     return counted
 
 
-def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
+def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_stored_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[str] = []
@@ -148,7 +148,7 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_finished_steps(
     (steps / "earlier.json").write_text("{}")
     error = one_sentence(*PARETO, "--search", "none", "--out", tmp_path, status=130)
     kept = [path.name.partition("-")[0] for path in steps.iterdir()]
-    assert kept.count("solve") == 4 and len(kept) == 6  # both ends of the front, and how it was asked
+    assert kept.count("solve") == 4 and len(kept) == 6  # both ends of the front, and the inputs
     assert (
         error == f"nlp-gait: interrupted; 6 finished results are stored in {tmp_path}; rerun the command to continue\n"
     )
@@ -164,7 +164,7 @@ def test_ctrl_c_in_motors_writes_the_finished_variants(tmp_path: Path, monkeypat
     assert len((tmp_path / "nao-ssp-motors.csv").read_text().splitlines()) == 2
 
 
-def test_ctrl_c_before_the_first_result_says_that_nothing_is_kept(
+def test_ctrl_c_before_the_first_result_counts_the_stored_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module in (motors, robust):

@@ -58,7 +58,7 @@ def test_bad_input_is_one_sentence(gait, arguments, words):
         assert word in error
 
 
-def test_a_film_that_nobody_waits_for_is_refused_before_the_gait_is_played(gait, tmp_path):
+def test_a_film_that_takes_too_long_is_rejected_before_the_simulation(gait, tmp_path):
     pytest.importorskip("mujoco")
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 2.2}}))
     film = tmp_path / "film.gif"
@@ -67,7 +67,7 @@ def test_a_film_that_nobody_waits_for_is_refused_before_the_gait_is_played(gait,
     assert not film.exists()
 
 
-def test_export_goes_beside_the_result_by_default(gait):
+def test_export_writes_next_to_the_result_by_default(gait):
     assert "gait.motion" in nlp_gait("export", gait, "--format", "webots").stdout
     assert gait.with_name("gait.motion").read_text().startswith("#WEBOTS_MOTION,V1.0,LHipYawPitch,")
 

@@ -78,7 +78,7 @@ def test_wrong_use_is_one_sentence(arguments: list[str], words: list[str], folde
     assert not list(tmp_path.rglob("*.json"))
 
 
-def test_search_stops_for_the_reason_asked_for_and_polishes() -> None:
+def test_search_stops_for_the_requested_reason_and_polishes() -> None:
     found = as_json("search", "nao-ssp", "--runs", "1", "--target", "1.0", "--polish", "--handling", "epsilon")
     (run,), (polished,) = found["runs"], found["polished"]
     assert run["status"] == "target reached" and run["claimed_objective"] <= 1.0 and run["evaluations"] < 10_000

@@ -1,4 +1,4 @@
-"""Fronts: knees of made-up ones by hand, the criteria against the judge, a small front of NAO, searches beside it."""
+"""Fronts: knees of made-up fronts by hand, the criteria against the judge, a small front of NAO, and searches."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
     judged = evaluate(problem, x)
     objective = nlp_gait.compile_objective(problem)
     for margin in ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min"):
-        beside = make_competing_objective(margin, problem)
-        assert beside.evaluate(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
-        assert beside.evaluate_many(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+        criterion = make_competing_objective(margin, problem)
+        assert criterion.evaluate(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
+        assert criterion.evaluate_many(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
     speed = make_competing_objective("speed", problem)
     way = 0.06 if name == "nao-ssp" else 0.04  # of the hip, Tables 3 and 5
     assert speed.evaluate(problem, x) == pytest.approx(way / x[-1])
@@ -82,13 +82,13 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
 def test_prices_are_the_fronts_slopes() -> None:
     problem = nlp_gait.load("nao-ssp", intervals=4)
     for name, at, step in (("dbm_y_mean", 0.02, 1e-4), ("speed", 0.03, 1e-4)):
-        beside = make_competing_objective(name, problem)
-        free = beside.drop_demand(problem)
-        limited = [beside.demand(free, at + k * step) for k in (-1, 0, 1)]
+        criterion = make_competing_objective(name, problem)
+        free = criterion.drop_demand(problem)
+        limited = [criterion.demand(free, at + k * step) for k in (-1, 0, 1)]
         below, here, above = (nlp_gait.solve(p, starts=1, x0=np.clip(X, p.lower, p.upper)) for p in limited)
         assert below.objective < here.objective < above.objective
         slope = (above.objective - below.objective) / (2 * step)
-        assert beside.compute_price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
+        assert criterion.compute_price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
 
 
 def test_objectives_are_parsed() -> None:

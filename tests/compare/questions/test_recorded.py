@@ -1,4 +1,4 @@
-"""A gait from elsewhere beside the optimum at its step and time, and in the engine."""
+"""A gait from elsewhere next to the optimum of its step and duration, and in the engine."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_command_judges_plays_and_sets_it_beside_the_optimum(gait: Path, tmp_path: Path) -> None:
+def test_the_command_judges_simulates_and_compares_with_the_optimum(gait: Path, tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     found = as_json("evaluate", "--motion", gait, "--robot", "nao-v5", "--signals", tmp_path / "s.npz")
     own, best = found["recorded"]["indexes"], found["optimum"]["indexes"]

@@ -1,4 +1,4 @@
-"""Questions killed after a few steps go on with the same call: nothing finished is done again, and the answer is the same."""
+"""Questions that are killed continue when they are rerun: no finished step is repeated, and the answer is the same."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from compare.questions import local_optima, motors
+from compare.questions import local_optima, real_motors
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
@@ -35,7 +35,7 @@ WHOLE = {
     "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
     "prices": ("prices", "walk12", "--starts", "2"),
 }  # fmt: skip
-# These take long to their end: how they begin is enough, since all go past finished solves in the same way.
+# Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
 BEGUN = {
     "pareto": (*PARETO, "--search", "none"),
     "pareto of three": (*PARETO, "--objectives", "power,dbm_y_mean,speed"),
@@ -45,33 +45,33 @@ BEGUN = {
 
 
 class Killed(BaseException):
-    """Nobody catches it: what comes after it does not happen, as after a kill."""
+    """Is not caught anywhere, so that nothing happens after it, as after a kill."""
 
 
 @pytest.fixture(autouse=True)
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_optima, "BATCH", 2)
-    monkeypatch.setattr(motors, "VARIANTS", dict(list(motors.VARIANTS.items())[:2]))
+    monkeypatch.setattr(real_motors, "VARIANTS", dict(list(real_motors.VARIANTS.items())[:2]))
 
 
 def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:
-    """Names of the results that are stored; the call ends after so many."""
-    kept: list[str] = []
+    """Collect the names of stored results; raise Killed after so many."""
+    stored: list[str] = []
     save = Store.save
 
     def counted(self: Store, name: str, inputs: Any, *rest: Any) -> Any:
         result = save(self, name, inputs, *rest)
-        kept.append(f"{name} {hash_json(inputs)}")
-        if len(kept) == steps:
+        stored.append(f"{name} {hash_json(inputs)}")
+        if len(stored) == steps:
             raise Killed
         return result
 
     monkeypatch.setattr(Store, "save", counted)
-    return kept
+    return stored
 
 
 def answer(out: Path, *arguments: object) -> tuple[Any, str]:
-    """The answer without its times, and what was said beside it."""
+    """Return the answer without its times, and the messages."""
     done = RUN.invoke(app, [*map(str, arguments), "--out", str(out), "--json"])
     assert done.exit_code == 0, done.output
     return without_times(json.loads(done.stdout)), done.stderr
@@ -84,7 +84,7 @@ def without_times(data: Any) -> Any:
 
 
 @pytest.mark.parametrize("case", WHOLE)
-def test_the_same_call_goes_on(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rerun_continues(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         all_steps = kill_after(patch, 0)
         undisturbed, _ = answer(tmp_path / "undisturbed", *WHOLE[case])
@@ -95,10 +95,12 @@ def test_the_same_call_goes_on(case: str, tmp_path: Path, monkeypatch: pytest.Mo
             RUN.invoke(app, [*WHOLE[case], "--out", str(killed)])
     with monkeypatch.context() as patch:
         after = kill_after(patch, 0)
-        resumed, said = answer(killed, *WHOLE[case])
+        resumed, messages = answer(killed, *WHOLE[case])
     assert resumed == undisturbed
-    assert not set(before) & set(after) and sorted([*before, *after]) == sorted(all_steps)  # none is lost, none double
-    assert "recomputed" not in said
+    assert not set(before) & set(after) and sorted([*before, *after]) == sorted(
+        all_steps
+    )  # no step is lost or repeated
+    assert "recomputed" not in messages
 
 
 @pytest.mark.parametrize("case", BEGUN)
@@ -106,7 +108,7 @@ def test_a_second_call_repeats_no_solve(case: str, tmp_path: Path, monkeypatch: 
     calls = []
     for _ in range(2):
         with monkeypatch.context() as patch:
-            calls.append(kill_after(patch, 2))  # the first step says how the question is asked
+            calls.append(kill_after(patch, 2))  # the first step stores the inputs of the question
             with pytest.raises(Killed):
                 RUN.invoke(app, [*BEGUN[case], "--out", str(tmp_path)])
     first, second = calls
@@ -114,7 +116,7 @@ def test_a_second_call_repeats_no_solve(case: str, tmp_path: Path, monkeypatch: 
     assert not set(first) & set(second)
 
 
-def test_what_changed_is_said_and_made_again(tmp_path: Path) -> None:
+def test_changes_are_reported_and_recomputed(tmp_path: Path) -> None:
     robot = tmp_path / "my.json"
     text = (files("nlp_gait.robots") / "data" / "nao-v5.json").read_text(encoding="utf-8")
     sweep = ["sweep", *NAO, "--robot", str(robot), "--over", "swing_height_m=0.02"]
@@ -123,13 +125,13 @@ def test_what_changed_is_said_and_made_again(tmp_path: Path) -> None:
         robot.write_text(content, encoding="utf-8")
         found.append(answer(tmp_path / "out", *sweep))
     assert text != content
-    (light, _), (heavy, said) = found
+    (light, _), (heavy, messages) = found
     assert heavy["points"][0]["objective"] > light["points"][0]["objective"]
-    assert said == "sweep-nao-ssp: recomputed: the problem's mathematics or limits\n"
-    again, said = answer(tmp_path / "out", *sweep)
-    assert again == heavy and said == "2 of 2 results were stored by an earlier run\n"
-    _, said = answer(tmp_path / "out", *sweep[:-1], "swing_height_m=0.021", "--seed", "1")
-    assert said == "sweep-nao-ssp: recomputed: swing_height_m [0.02] -> [0.021], seed 0 -> 1\n"
+    assert messages == "sweep-nao-ssp: recomputed: the problem's mathematics or limits\n"
+    again, messages = answer(tmp_path / "out", *sweep)
+    assert again == heavy and messages == "2 of 2 results were stored by an earlier run\n"
+    _, messages = answer(tmp_path / "out", *sweep[:-1], "swing_height_m=0.021", "--seed", "1")
+    assert messages == "sweep-nao-ssp: recomputed: swing_height_m [0.02] -> [0.021], seed 0 -> 1\n"
 
 
 def test_steps_of_forked_starts_are_counted(tmp_path: Path) -> None:
@@ -144,7 +146,7 @@ def test_steps_of_forked_starts_are_counted(tmp_path: Path) -> None:
     assert second.summary == "3 of 5 results were stored by an earlier run"
 
 
-def test_a_kept_outcome_has_every_bit() -> None:
+def test_a_stored_outcome_has_every_bit() -> None:
     problem = nlp_gait.load("walk12")
     (outcome,) = nlp_gait.solve(problem).starts
     strange = replace(outcome, objective=math.nan, violation=math.inf, cost=-0.0, history=(Best(3, None, 0.5),))
@@ -173,6 +175,6 @@ def test_a_solve_that_was_stopped_is_not_finished(tmp_path: Path) -> None:
     assert whole.converged and len(list((tmp_path / "store").iterdir())) == 1
     warm = solver.run_from(problem, whole)
     later = store_runs(Store(tmp_path))
-    kept = later.run(problem, x0)
-    kept_warm = later.run_from(problem, kept)
-    assert warm is not None and kept_warm is not None and repr(kept_warm) == repr(warm)
+    stored = later.run(problem, x0)
+    stored_warm = later.run_from(problem, stored)
+    assert warm is not None and stored_warm is not None and repr(stored_warm) == repr(warm)
