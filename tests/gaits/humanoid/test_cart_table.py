@@ -98,7 +98,7 @@ def test_the_whole_bodys_zmp_is_the_planned_one(walk: Result, signals: Signals) 
 
 
 @pytest.mark.slow
-def test_a_planned_cycle_that_comes_back_is_judged_as_it_was(path: str, cycles: RecordedCycles) -> None:
+def test_a_planned_cycle_that_is_read_back_gets_the_same_verdict(path: str, cycles: RecordedCycles) -> None:
     """Its torso leans; a spline through samples 10 ms apart is this near to a cubic hip."""
     problem = load("humanoid-cycle", robot=path, intervals=4)
     x = 0.5 * (problem.lower + problem.upper)

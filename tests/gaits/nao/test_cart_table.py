@@ -77,13 +77,13 @@ def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: di
     planned = walker().planned_zmp
     errors = {}
     for passes, gait in walks.items():
-        played = histories(gait)
-        errors[passes] = np.sqrt(np.mean((played["zmp"].T - planned(played["t"])) ** 2, axis=1))
+        arrays = histories(gait)
+        errors[passes] = np.sqrt(np.mean((arrays["zmp"].T - planned(arrays["t"])) ** 2, axis=1))
     assert (errors[1] < 0.01).all() and (errors[2] < 0.3 * errors[1]).all()
 
 
 @pytest.mark.slow
-def test_the_cycle_is_one_step_and_goes_on_mirrored(walks: dict[int, Result]) -> None:
+def test_the_cycle_is_one_step_and_continues_mirrored(walks: dict[int, Result]) -> None:
     gait = walks[2]
     hip = histories(gait)["hip"]
     assert gait.problem.name == "recorded-cycle" and gait.x == pytest.approx((0.6, 0.4, 0.05), abs=1e-12)

@@ -1,4 +1,4 @@
-"""Formulas of real motors at made-up samples, against NumPy: what they draw, what limits them, which joints share one."""
+"""Formulas of real motors at artificial samples, against NumPy: their power, their limits, joints that share one."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_ankles() -> None:
 
 
 def test_the_ankles_table_is_round_in_degrees() -> None:
-    """Pitch, least and greatest roll, once more in the unit in which somebody chose them."""
+    """Pitch, least and greatest roll in degrees, in which the table was apparently written."""
     table = [
         *((-68.15, -2.86, 4.30), (-48.13, -10.31, 9.74), (-40.11, -22.80, 12.61), (-25.78, -22.80, 44.06)),
         *((5.73, -22.80, 44.06), (20.05, -22.80, 31.54), (52.87, 0.0, 2.86)),

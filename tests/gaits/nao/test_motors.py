@@ -123,7 +123,7 @@ def test_nonsense_is_refused(features: str, error: type[Exception], said: str) -
         load("nao-ssp", motors=features)
 
 
-def test_both_are_played_with_the_rotors_that_the_gait_was_planned_with() -> None:
+def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:
     for name in ("nao-ssp", "nao-dsp", "nao-cycle"):
         plain, heavy = load(name).display.simulation_model, load(name, motors="rotor").display.simulation_model
         assert plain is not None and not plain.robot.armatures_kgm2
