@@ -50,15 +50,7 @@ class Evaluation:
 
 
 def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, float]) -> Evaluation:
-    """Return the exact values at a point.
-
-    Args:
-        problem: with its current parameter values.
-        x: (n,) decision variables, in the problem's order or by name.
-
-    Raises:
-        InputError: x has the wrong length or is not finite.
-    """
+    """Return the exact values at x (n,), in the problem's order or by name; raises InputError for a wrong length or NaN."""
     point = problem.check_x(x)
     exact = build_exact_model(problem)
     values = exact.at(point, problem.p)

@@ -95,11 +95,7 @@ class _Log:
 
 
 def _write_logs(comparisons: Sequence[Comparison], folder: Path, write: Callable[[_Log], Sequence[Path]]) -> list[Path]:
-    """Write the log of each solver on each problem, problem k as function k, from 1; return all files.
-
-    Raises:
-        OutputError: the folder is not writable.
-    """
+    """Write the log of each solver on each problem, problem k as function k, from 1; return all files. Raises OutputError."""
     return [
         path
         for number, comparison in enumerate(comparisons, start=1)

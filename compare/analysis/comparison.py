@@ -108,15 +108,9 @@ def compare_problems(
     weighting: Weighting = DEFAULT_WEIGHTING,
     references: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Comparison]:
-    """Return one comparison per problem among records, in their order.
+    """Return one comparison per problem among records, in their order; InputError if runs disagree on a problem's objective.
 
-    Args:
-        records: of all runs.
-        weighting: of calls.
-        references: objective from which gaps are measured, by problem; by default the best of its records.
-
-    Raises:
-        InputError: runs of one problem disagree on its objective.
+    ``references`` are the objectives from which gaps are measured, by problem; by default the best of its records.
     """
     problems = dict.fromkeys(record.problem for record in records)
     return [
@@ -149,11 +143,7 @@ def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting
 
 
 def read_objective(record: RunRecord) -> Objective:
-    """Return the objective of a record.
-
-    Raises:
-        InputError: the record has none, or an invalid one.
-    """
+    """Return the objective of a record; raises InputError if the record has none, or an invalid one."""
     with convert_errors(f"record of {record.solver}, run {record.run}", InputError):
         return decode(Objective, record.definition.get("objective"), "objective")
 

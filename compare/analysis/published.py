@@ -24,7 +24,7 @@ def load_published() -> Mapping[str, Any]:
 
 
 def make_published_rows(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]], str] | None:
-    """Return header, rows and note: the paper's values, then the best run of each solver; None without published values.
+    """Return header, rows and note: the paper's values, then each solver's best run; None without published values.
 
     Only problems with default parameters are compared.
     """

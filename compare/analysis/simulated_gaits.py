@@ -76,7 +76,6 @@ def round_as_printed(value: float) -> float:
 
 
 def _spearman(a: Sequence[float], b: Sequence[float]) -> float:
-    """Spearman's rank correlation, ties sharing their mean rank."""
     from scipy.stats import spearmanr
 
     return float(spearmanr(a, b).statistic)

@@ -83,11 +83,7 @@ def list_instances(folder: Path = FOLDER) -> tuple[str, ...]:
 
 @cache
 def load_baseline(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, ...]:
-    """Return the records of all solvers of the baseline on an instance.
-
-    Raises:
-        InputError: none are shipped.
-    """
+    """Return the records of all solvers of the baseline on an instance; raises InputError if none are shipped."""
     path = folder / f"{instance}.json.gz"
     if not path.is_file():
         raise InputError(

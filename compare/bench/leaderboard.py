@@ -91,15 +91,7 @@ class Leaderboard:
 
 
 def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = ()) -> Leaderboard:
-    """Rank the solvers of the baseline and of further records.
-
-    Args:
-        instances: ids.
-        records: of other solvers on the same instances, under other names than the baseline's.
-
-    Raises:
-        InputError: no baseline records of an instance are shipped.
-    """
+    """Rank the solvers of the baseline and of further records; raises InputError for an instance without baseline."""
     everything = [record for id in instances for record in (*load_baseline(id), *records) if record.problem == id]
     comparisons = tuple(compare_problems(everything, references=load_references(instances)))
     return Leaderboard(comparisons=comparisons, standings=tuple(_standings(comparisons)))

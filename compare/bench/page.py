@@ -17,13 +17,7 @@ PER_INSTANCE_TARGET = 1e-3
 
 
 def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Document:
-    """Return the page of a leaderboard.
-
-    Args:
-        board: to show.
-        solver: whose page it is; None for the baseline alone.
-        suite: name of the subset, or what else the instances are.
-    """
+    """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
     count_of = len(board.comparisons)
     title = f"GaitBench 1, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(

@@ -85,11 +85,7 @@ def run_app(app: Callable[[], object]) -> None:
 
 
 def _report_os_error(error: OSError) -> None:
-    """Report a failed write; nothing if the output's reader has ended, as with ``| head``.
-
-    Raises:
-        OSError: another error.
-    """
+    """Report a failed write; nothing if the output's reader has ended, as with ``| head``. Raise other errors."""
     if error.errno not in (*NO_SPACE, errno.EPIPE):
         raise error
     closed = error.errno == errno.EPIPE and _is_output_closed()

@@ -46,10 +46,7 @@ class PlainConsole(Console):
 
 
 def escape_controls(text: str) -> str:
-    """Replace control characters and invalid characters by escapes.
-
-    Spaces of other widths, as between thousands, remain, although Python does not consider them printable.
-    """
+    """Replace control and invalid characters by escapes; spaces of other widths, as between thousands, remain."""
     allowed = {sign for sign in text if sign in "\n\t" or sign.isprintable() or unicodedata.category(sign) == "Zs"}
     return "".join(sign if sign in allowed else repr(sign)[1:-1] for sign in text)
 

@@ -16,7 +16,7 @@ R = TypeVar("R")
 def until_interrupted(
     work: Callable[[], R], nothing: str = "nothing was written", folder: Path | None = None
 ) -> tuple[R, str]:
-    """What some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
+    """Return what some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
 
     Args:
         work: raises ``Interrupted`` with the part that was found.

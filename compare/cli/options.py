@@ -83,12 +83,7 @@ class CycleOptions:
     ] = None
 
     def make_spec(self, name: str) -> ProblemSpec:
-        """Return the problem of that name with these options and values.
-
-        Raises:
-            UnknownNameError: an unknown problem, option, parameter or variable.
-            InputError: a value is not allowed.
-        """
+        """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
         options: dict[str, Any] = {k: value for k, value in vars(self).items() if k in FLAGS and value is not None}
         known = inspect.signature(find_maker(name)).parameters
         for key, text in _parse_pairs(self.option, "--option"):
@@ -157,11 +152,7 @@ class NaoPhase(NamedProblem):
 
 
 def name_all(code: Sequence[str] | None) -> None:
-    """Allow files of data to use this code of the user.
-
-    Raises:
-        InputError: a text is not a reference.
-    """
+    """Allow files of data to use this code of the user; raises InputError for a text that is not a reference."""
     for text in code or ():
         if not is_reference(text):
             raise InputError(f"--code takes FILE.py:NAME or MODULE:NAME, got {text!r}")

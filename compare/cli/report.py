@@ -74,11 +74,7 @@ def report(
 
 
 def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
-    """Simulate every solver's best gait, unless stored.
-
-    Raises:
-        InputError: none of the problems can be simulated.
-    """
+    """Simulate every solver's best gait, unless stored; raises InputError if none of the problems can be simulated."""
     from compare.analysis.simulated_gaits import select_best_gaits
     from compare.study.simulations import simulate_records
 

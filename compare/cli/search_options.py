@@ -41,12 +41,7 @@ class SearchOptions:
     def make_study(
         self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20
     ) -> StudySettings:
-        """Return the study of these problems by these solvers.
-
-        Args:
-            problems: at least one.
-            solvers: at least one.
-            starts: of each gradient method.
+        """Return the study of problems by solvers, with a number of starts of gradient methods.
 
         Raises:
             InputError: a penalty without weight, or a weight without penalty.

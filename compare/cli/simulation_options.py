@@ -45,12 +45,7 @@ class DriveOptions:
     feedback_seed: Annotated[int, typer.Option(min=0, help="Of this noise: same seed, same walk.")] = 0
 
     def make(self) -> Drive:
-        """Return the drive.
-
-        Raises:
-            UnknownNameError: an unknown drive or feedback.
-            InputError: a setting is not allowed.
-        """
+        """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
         from nlp_gait.simulation.drive import DRIVES
         from nlp_gait.simulation.feedback import FEEDBACKS
 
@@ -83,11 +78,7 @@ class ConditionOptions:
     ] = "0,0"
 
     def make(self) -> Conditions:
-        """Return the conditions.
-
-        Raises:
-            InputError: a value is not allowed.
-        """
+        """Return the conditions; raises InputError for a value that is not allowed."""
         from nlp_gait.simulation.simulate import Conditions, Push
 
         slope, impulse = (

@@ -53,11 +53,7 @@ def draw_frames(skeleton: Skeleton) -> Iterator[Frame]:
 
 
 def write_contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
-    """Write some instants as one PNG, one row per view.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
+    """Write some instants as one PNG, one row per view; raises OutputError."""
     times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
     with style(), replace_file(path) as file, delay_interrupts():
         figure = plot_poses(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))

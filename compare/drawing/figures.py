@@ -88,7 +88,7 @@ def add_legend_below(figure: Figure, axes: Axes | None = None) -> None:
 
 
 def use_log_axes(axes: Axes, both: bool = False) -> None:
-    """Make the x axis use_log_axes, or both, once something positive is drawn.
+    """Make the x axis, or both, logarithmic once something positive is drawn.
 
     Powers of ten are plain text: parsing mathematics takes most of a figure's time.
     """
@@ -113,11 +113,7 @@ def format_power_of_ten(value: float) -> str:
 
 
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths.
-
-    Raises:
-        OutputError: they cannot be written.
-    """
+    """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
     write_text(paths[1], render_svg(figure))
     figure.set_layout_engine("none")  # the layout is final; computing it again takes as long as drawing
@@ -137,10 +133,7 @@ def render_svg(figure: Figure) -> str:
 def inline_svg(svg: str, prefix: str, title: str) -> str:
     """Return an SVG file as an element of an HTML page: without background, with ink in the page's colour.
 
-    Args:
-        svg: of ``render_svg``.
-        prefix: letters and digits, unique in the page, for ids.
-        title: alternative text, plain letters.
+    Ids begin with the prefix, letters and digits that are unique in the page; the title is the alternative text.
     """
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)

@@ -31,11 +31,7 @@ CURVES = {"power": "mechanical power [W]", "margin": "balance margin [mm]"}
 
 @lock_casadi
 def make_skeleton(result: Result, frames_per_s: float) -> Skeleton:
-    """Skeleton of a gait at about the given number of samples a second.
-
-    Raises:
-        InputError: the problem has no motion to draw.
-    """
+    """Return the skeleton of a gait with about this many samples a second; raises InputError for a problem without one."""
     problem = result.problem
     if problem.display.skeleton is None:
         raise InputError(f"problem {problem.name!r} has no skeleton to draw")
@@ -55,11 +51,7 @@ class GaitCurves:
 
 @lock_casadi
 def prepare_gait(result: Result) -> GaitCurves:
-    """Compute the time histories of a result for a figure.
-
-    Raises:
-        InputError: the problem has no time histories, or time does not run forward in them.
-    """
+    """Compute the time histories of a result for a figure; InputError if there are none or time does not run forward."""
     problem = result.problem
     signals = sample_signals(result, PERIOD_S)
     arrays = signals.arrays
@@ -80,11 +72,7 @@ def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -
 
 
 def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
-    """Plot stick figures of each gait and below them the curves of all; gaits by solver or any other name.
-
-    Raises:
-        InputError: there is nothing to draw.
-    """
+    """Plot stick figures of gaits by name and below them the curves of all; raises InputError if there is nothing to draw."""
     figures = {name: gait.skeleton for name, gait in gaits.items() if gait.skeleton is not None}
     curves = [c for c in CURVES if any(getattr(gait, c) is not None for gait in gaits.values())]
     if not figures and not curves:
@@ -115,7 +103,6 @@ def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
 
 
 def _in_rows(figures: Mapping[str, Skeleton]) -> list[list[str]]:
-    """Names of the gaits in rows of equal length, but for the last one."""
     names = list(figures)
     length = -(-len(names) // max(1, -(-len(names) // MOST_BESIDE)))
     return [names[i : i + length] for i in range(0, len(names), length)] if names else []

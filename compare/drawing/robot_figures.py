@@ -20,11 +20,7 @@ ENGINE, MODEL = "#56B4E9", "#000000"
 
 
 def plot_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
-    """Write ``<stem>.png`` and ``<stem>.svg``; returns both paths.
-
-    Raises:
-        OutputError: they cannot be written.
-    """
+    """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
     robot = biped.full
     with style():
         canvas = new_figure(9.0, 4.4)

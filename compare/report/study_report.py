@@ -39,10 +39,7 @@ def write_report(
     *,
     as_csv: bool = False,
 ) -> list[Path]:
-    """Write ``report.html``, ``report.md``, the figures as PNG and SVG, and optionally CSV files; return all paths.
-
-    Simulations stored in the folder are included.
-    """
+    """Write the report with stored simulations, the figures as PNG and SVG, and optionally CSV files; return all paths."""
     plays = load_simulations(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, plays))
     if as_csv:

@@ -18,11 +18,7 @@ MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
 
 
 def write_document(folder: Path, document: Document, page: str = "report") -> list[Path]:
-    """Write ``<page>.html``, ``<page>.md`` and what ``write_parts`` writes; returns the paths of all files.
-
-    Raises:
-        OutputError: the files cannot be written.
-    """
+    """Write ``<page>.html``, ``<page>.md`` and what ``write_parts`` writes; return the paths. Raises OutputError."""
     files = write_parts(folder, document.parts)
     drawings = [path.read_text(encoding="utf-8") for path in files if path.suffix == ".svg"]
     pages = [folder / f"{page}.html", folder / f"{page}.md"]
@@ -44,12 +40,7 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
 
 
 def html(document: Document, drawings: Sequence[str]) -> str:
-    """One page without any other file; all text in it is escaped.
-
-    Args:
-        document: what to show.
-        drawings: its figures as SVG files, in their order.
-    """
+    """Return one page without any other file, with the figures' drawings as SVG in their order; all text in it is escaped."""
     figures = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
     svg = {
         figure.name: Markup(inline_svg(drawing, f"f{i}", f"figure {i}"))

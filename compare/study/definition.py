@@ -30,10 +30,7 @@ INPUT_WORDS = {
 
 
 def hash_solver_source(solver: object) -> str | None:
-    """Return the hash of the source file of a user-defined solver.
-
-    None for those of this package, and without a file, as in a notebook.
-    """
+    """Return the hash of a user-defined solver's source file; None without a file, as in a notebook, or if it is ours."""
     kind = solver if inspect.isroutine(solver) else type(solver)
     if kind.__module__.partition(".")[0] == "metaheuristics":
         return None

@@ -25,12 +25,7 @@ HISTORY = ("run", "evaluations", "objective")
 
 
 def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) -> tuple[Table, Array]:
-    """Read the points (m, n) in a CSV file: columns by the variables' names in any order, or without a header in the order of x.
-
-    Args:
-        path: of the file.
-        problem: of the points.
-        others: names of further columns that are allowed.
+    """Read points (m, n) from CSV: columns by the variables' names and some others, or without a header as in x.
 
     Raises:
         InputError: the file cannot be read, or a row is not a point.
@@ -58,19 +53,14 @@ def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) ->
 def import_runs(
     spec: ProblemSpec, finals: Path, label: str, histories: Path | None = None, evaluations: int | None = None
 ) -> list[RunRecord]:
-    """Return a record for each row of a file of final points.
+    """Return a record for each row of a file of final points; raises InputError for unreadable files and impossible values.
 
     Args:
         spec: the problem.
-        finals: one row for each run: the variables and, where known, ``run``, ``seed``, ``objective`` and ``violation`` as
-            claimed, ``evaluations``, ``time_s``.
+        finals: one row for each run: the variables and, where known, ``FINALS``, of which objective and violation are claims.
         label: of the solver in the study.
-        histories: best so far: ``run``, ``evaluations``, ``objective`` (empty before the first feasible point) and optionally
-            ``time_s``.
+        histories: best so far: ``HISTORY``, objective empty before the first feasible point, and optionally ``time_s``.
         evaluations: of every run, if neither file has them.
-
-    Raises:
-        InputError: a file cannot be read, or contains impossible values.
     """
     if not LABEL.fullmatch(label):
         raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")

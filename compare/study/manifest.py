@@ -64,30 +64,20 @@ class Manifest:
 
 @dataclass(frozen=True, kw_only=True)
 class _File:
-    """Content of ``study.json``."""
-
     schema: Literal[1]
     study: Mapping[str, Any]
     sessions: tuple[Session, ...]
 
 
 def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
-    """Write the settings and one more session to the manifest of a folder.
-
-    Raises:
-        InputError: the earlier manifest is damaged.
-    """
+    """Add a session to the manifest of a folder, with the latest settings; raises InputError if the manifest is damaged."""
     sessions: Sequence[Session] = read_manifest(folder).sessions
     data = {"schema": SCHEMA, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
     write_json(folder / FILE, data)
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return the manifest of a folder; an empty one if there is none.
-
-    Raises:
-        InputError: it is damaged or has another schema.
-    """
+    """Return the manifest of a folder, empty if there is none; raises InputError if it is damaged or of another schema."""
     path = folder / FILE
     if not os.path.lexists(path):
         return Manifest(settings=None, sessions=())

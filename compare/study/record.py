@@ -197,11 +197,7 @@ class _Definition:
 
 
 def read_record(path: Path) -> RunRecord:
-    """Return the record in a file.
-
-    Raises:
-        InputError: the file is damaged or has another schema.
-    """
+    """Return the record in a file; raises InputError if it is damaged or has another schema."""
     raw = read_json(path, "record", remedy=REMEDY)
     schema = raw.get("schema") if isinstance(raw, dict) else type(raw).__name__
     if type(schema) is not int or schema != SCHEMA:
@@ -213,11 +209,7 @@ def read_record(path: Path) -> RunRecord:
 
 
 def parse_record(raw: Any) -> RunRecord:
-    """Return the record of which ``RunRecord.to_json`` made plain data.
-
-    Raises:
-        ValueError: a field is missing or wrong, or fields contradict each other.
-    """
+    """Return a record from ``RunRecord.to_json``; raises ValueError for missing, wrong or contradictory fields."""
     record = decode(RunRecord, raw, unread=("schema",))
     objective = decode(_Definition, record.definition, "definition").objective
     for text in (objective.name, objective.unit):
@@ -246,8 +238,7 @@ def load_gait(record: RunRecord) -> Result:
     """Return the problem and the point of a record.
 
     Raises:
-        GaitError: the problem cannot be loaded, for example user code that this command does not name; or its variables have
-            changed.
+        GaitError: the problem cannot be loaded, such as user code that this command does not name, or has other variables now.
     """
     stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
     name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
@@ -274,11 +265,7 @@ def make_judged_cells(record: RunRecord) -> list[object]:
 
 
 def make_frame(records: Sequence[RunRecord]) -> Any:
-    """Return records as a pandas data frame: one row for each run, ``HEADER``, and a column ``x.<name>`` for each variable.
-
-    Raises:
-        MissingExtraError: pandas is not installed.
-    """
+    """Return records as a pandas frame: ``HEADER`` and a column ``x.<name>`` per variable; raises MissingExtraError."""
     names = list(dict.fromkeys(name for record in records for name in record.x))
     rows = [[*make_row(record), *(record.x.get(name) for name in names)] for record in records]
     return import_pandas().DataFrame(rows, columns=[*HEADER, *(f"x.{name}" for name in names)])

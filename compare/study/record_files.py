@@ -33,11 +33,7 @@ def locate_record(folder: Path, task: Task) -> Path:
 
 
 def write_record(record: RunRecord, folder: Path) -> Path:
-    """Write a record to the folder of a study, and return its file; a record of another definition there is renamed.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
+    """Write a record to a study's folder and return its file; one of another definition is renamed. Raises OutputError."""
     path = locate_run(folder / RECORDS, record.problem, record.solver, record.run)
     if not path.parent.is_dir():
         make_writable_folder(path.parent)
@@ -52,11 +48,7 @@ def write_record(record: RunRecord, folder: Path) -> Path:
 
 
 def read_records(folder: Path) -> list[RunRecord]:
-    """Return all records in the folder of a study, by file name; those of other definitions come last.
-
-    Raises:
-        InputError: there are none, or one is damaged.
-    """
+    """Return all records in a folder by file name, those of other definitions last; InputError for none or a damaged one."""
     with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
         paths = sorted((folder / RECORDS).glob("*/*.json"))
     if not paths:
@@ -67,11 +59,7 @@ def read_records(folder: Path) -> list[RunRecord]:
 
 
 def find_record(folder: Path, task: Task) -> tuple[RunRecord | None, RunRecord | None]:
-    """Return the record of a task, or None and, if there is one, the record of another definition in its place.
-
-    Raises:
-        InputError: a record is damaged.
-    """
+    """Return a task's record, or None and the record of another definition in its place; raises InputError for damaged ones."""
     path = locate_record(folder, task)
     if not path.exists():
         return None, None

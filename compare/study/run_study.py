@@ -61,12 +61,7 @@ class Study:
         return format_html_table(repr(self)[1:-1], ("problem", "solver", "runs"), rows)
 
     def to_frame(self) -> Any:
-        """Return the finished runs as a pandas data frame; see ``compare.study.record.make_frame``.
-
-        Raises:
-            InputError: the study has no folder.
-            MissingExtraError: pandas is not installed.
-        """
+        """Return the finished runs as a pandas frame, see ``make_frame``; raises InputError for a study without a folder."""
         if self.folder is None:
             raise InputError(
                 "this study has no folder; set one, or call make_frame(records) on the result of run_study"
@@ -83,8 +78,8 @@ def run_study(
 ) -> list[RunRecord]:
     """Run all tasks without a record and return the records of all tasks, in task order.
 
-    Each record is written as soon as its run has ended, so an interruption loses only the runs in progress. A record belongs to a
-    task if their definitions are equal. Other records stay in the folder under their own key.
+    Each record is written as soon as its run has ended, so an interruption loses only the runs in progress. A record belongs to
+    a task if their definitions are equal. Other records stay in the folder under their own key.
 
     Args:
         study: what to run.
@@ -93,8 +88,7 @@ def run_study(
         on_outdated: called with a message for each solver whose records are outdated and will be recomputed.
 
     Raises:
-        UnknownNameError: a problem, option, parameter, solver or setting does not exist.
-        InputError: a record is damaged.
+        UnknownNameError, InputError: see ``check_task``; InputError also for a damaged record.
         OutputError: the folder is not writable (checked before the first run).
         Interrupted: Ctrl-C; contains the records of the finished runs.
     """

@@ -97,11 +97,7 @@ class StudySettings:
 
 
 def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:
-    """Return settings from a folder with user code as this command names it.
-
-    Raises:
-        UserCodeError: this command does not name it.
-    """
+    """Return settings from a folder with user code as this command names it; raises UserCodeError if it does not."""
     return replace(
         settings,
         problems=tuple(replace(p, name=resolve_code(p.address, "problem", owner)) for p in settings.problems),
@@ -113,11 +109,7 @@ def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:
 
 
 def read_settings(path: Path) -> StudySettings:
-    """Return the settings in a TOML file.
-
-    Raises:
-        InputError: the file cannot be read, or contains something that is not allowed.
-    """
+    """Return the settings in a TOML file; raises as ``parse_settings``, and InputError if the file cannot be read."""
     text = read_text(path, "study file", at_most=LARGEST_FILE)
     with convert_errors(f"study file {str(path)!r} is not valid TOML", InputError):
         raw = tomllib.loads(text)

@@ -48,15 +48,9 @@ class SimulatedGait:
 def simulate_records(
     folder: Path, records: Sequence[RunRecord], drive: Drive, progress: Callable[[str], None] | None = None
 ) -> list[SimulatedGait]:
-    """Simulate the gaits of records whose problem can be simulated, a cycle for ten steps; load what is stored.
+    """Simulate the gaits of records whose problem can be simulated, a cycle for ten steps; progress receives each gait.
 
     A stored gait is simulated again only if its gait, drive, robot or engine have changed.
-
-    Args:
-        folder: of the study.
-        records: of the gaits.
-        drive: actuator model.
-        progress: receives each gait.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -79,11 +73,7 @@ def simulate_records(
 
 
 def load_simulations(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
-    """Return the stored simulations of these records' gaits; none of a gait that has changed since. Needs no MuJoCo.
-
-    Raises:
-        InputError: a file is damaged.
-    """
+    """Return the stored simulations of records whose gaits have not changed, without MuJoCo; InputError for a damaged file."""
     if not (folder / STORE).is_dir():
         return []
     store, found = Store(folder), []

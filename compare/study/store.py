@@ -55,10 +55,7 @@ class Store:
 
     A name may contain ``/`` for subfolders, and ``{key}`` for the hash of the inputs: results of different inputs then lie next
     to each other; otherwise a new result replaces the old one. Damaged files are recomputed. Files are written in one step and
-    flushed to the disk.
-
-    Attributes:
-        folder: of the files; None if nothing is stored.
+    flushed to the disk. ``folder`` is None if nothing is stored.
 
     Args:
         out: folder of the work; None stores nothing.
@@ -99,16 +96,13 @@ class Store:
         code: Sequence[ModuleType] = (),
         progress: Progress = ignore_progress,
     ) -> dict[str, Any]:
-        """Return several results by name; compute those that are not stored, and store each as soon as it is finished.
+        """Return several results by name, as JSON gives them back; compute those that are not stored, and store each at once.
 
         Args:
             computations: with different names.
             jobs: worker processes; None for one on each processor, 1 for this process.
             code: modules that compute the results; these are recomputed when the text of one has changed.
             progress: receives the name of each result when it is loaded, or before it is computed (in worker processes: after).
-
-        Returns:
-            Plain data as JSON gives it back.
 
         Raises:
             OutputError: a result cannot be stored, and the store has no ``report``.
@@ -140,12 +134,7 @@ class Store:
         return values
 
     def load(self, name: str, inputs: Mapping[str, Any] | None = None) -> Result | None:
-        """Return the stored result; None if there is none, it is damaged, or it was computed from other inputs.
-
-        Args:
-            name: of the result.
-            inputs: of the result; None accepts any.
-        """
+        """Return the stored result; None if it is missing, damaged or of other inputs (inputs None accepts any)."""
         path = self._path(name, inputs, ".json")
         if path is None or not path.exists():
             return None
@@ -160,11 +149,7 @@ class Store:
         return Result(content["result"], content["inputs"]) if intact and fits else None
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
-        """Store a result, and return it as ``load`` does.
-
-        Raises:
-            OutputError, ValueError: see ``compute_all``.
-        """
+        """Store a result, and return it as ``load`` does; raises as ``compute_all``."""
         value, inputs = as_json(value), as_json(inputs)
         hashes = {"sha256": hash_json(inputs), "result_sha256": hash_json([value, inputs])}
         with self._writing(name, inputs, ".json") as path:
@@ -186,11 +171,7 @@ class Store:
         return arrays if identity == _identify_arrays(inputs, arrays) else None
 
     def save_arrays(self, name: str, inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Store arrays by name as an npz file.
-
-        Raises:
-            OutputError: see ``compute_all``.
-        """
+        """Store arrays by name as an npz file; raises OutputError as ``compute_all``."""
         with self._writing(name, inputs, ".npz") as path:
             if path is not None:
                 with replace_file(path) as temporary, open(temporary, "wb") as file:

@@ -22,7 +22,7 @@ FLOATS = tuple(field.name for field in fields(Outcome) if field.type == "float")
 
 
 def store_runs(store: Store, solver: Solver | None = None) -> Solver:
-    """Return a solver that stores its finished runs and loads them when they are repeated; None for IPOPT with its defaults.
+    """Return a solver that stores its finished runs and loads repeated ones: IPOPT with its defaults if None.
 
     A run is identified by the problem's mathematics and values, the solver's settings and the start point.
     """
@@ -31,8 +31,6 @@ def store_runs(store: Store, solver: Solver | None = None) -> Solver:
 
 
 class _Interrupted(Exception):
-    """An interrupted run, which is not stored."""
-
     def __init__(self, outcome: Outcome | None) -> None:
         self.outcome = outcome
 

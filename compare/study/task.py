@@ -140,7 +140,7 @@ class Task:
 
     @property
     def is_user_code(self) -> bool:
-        """Whether the algorithm is code of one's own by name, which runs in a process of its own."""
+        """Whether the solver is user code by name, which runs in its own process."""
         name = self.solver
         if not isinstance(name, str) or name in list_solvers() or name.startswith(PYMOO):
             return False
@@ -201,11 +201,7 @@ class Task:
         return algorithm(self.solver, **self.settings)
 
     def make_solver(self) -> Solver:
-        """Return the NLP solver with its settings and the limits that it respects.
-
-        Raises:
-            InputError: it has no time limit, or a setting is not allowed.
-        """
+        """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
         name = str(self.solver)
         known = list_settings(name)
         if self.stop.time_limit_s is not None and "time_limit_s" not in known:

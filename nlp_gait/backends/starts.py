@@ -43,18 +43,10 @@ def run_starts(
     stop: Callable[[], bool] = never,
     workers: int | None = None,
 ) -> Iterator[Outcome]:
-    """Yield the outcome of the run from each point, in their order; fewer after ``stop`` returns True.
+    """Yield the outcome of the run from each point (n,), in their order; fewer after ``stop`` returns True.
 
-    Args:
-        solver: made ready for the problem.
-        problem: with its current parameter values.
-        points: (n,) each.
-        stop: called between iterations; returns whether to end at once.
-        workers: largest number of forked processes; 1 makes all runs in this process. None makes the first run here and
-            divides the others among ``available_workers`` if they take long enough.
-
-    Raises:
-        WorkerError: a process died, perhaps out of memory.
+    Without ``workers``, the first run is made in this process, and the others are divided among ``available_workers`` if they
+    take long enough. Raises WorkerError if a process died, perhaps out of memory.
     """
     if workers is None and points:  # the first run says whether a fork pays for the others
         started = time.perf_counter()

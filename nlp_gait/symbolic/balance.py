@@ -20,13 +20,7 @@ SOLE_FRICTION = 0.5
 def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:
     """Return the point on flat ground about which the moment of the ground on the robot has no horizontal component.
 
-    Args:
-        wrench: of the ground on the robot, about a point ``height`` above the ground.
-        height: [m].
-        weight: of the robot [N].
-
-    Returns:
-        (2,) horizontal offset from that point [m].
+    It is the horizontal offset (2,) [m] from the point of the wrench, which is at a height [m] above the ground; weight [N].
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (19), (20), with the sign of g made physical and the rotational term as the rate
@@ -89,14 +83,7 @@ def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, flo
 
 
 def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
-    """Return the ZMP of several feet on the same flat ground.
-
-    Args:
-        zmps: (2,) of each foot in the world [m].
-        ground_loads: vertical force on each foot [N].
-
-    Returns:
-        (2,) ZMP in the world [m].
+    """Return the ZMP (2,) of feet on the same flat ground, from their ZMPs (2,) in the world [m] and vertical forces [N].
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (30), (31).
@@ -106,7 +93,7 @@ def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
 
 
 def zmp_of_point_masses(masses: DM, p: SX, a: SX, gravity: float, *, static_load: bool = False) -> SX:
-    """Return the zero-moment point of point masses on flat ground at height zero.
+    """Return the zero-moment point (2,) [m] of point masses (N,) [kg] on flat ground at height zero.
 
     Args:
         masses: (N,) [kg].
@@ -115,9 +102,6 @@ def zmp_of_point_masses(masses: DM, p: SX, a: SX, gravity: float, *, static_load
         gravity: g [m/s^2].
         static_load: use the weight as the load of the ground, as eq. (14) does. The moment of gravity and inertia about that
             point vanishes only if the centre of mass has no vertical acceleration.
-
-    Returns:
-        (2,) ZMP [m].
 
     Source:
         Goswami, Vadakkepat, Phung (2008), eqs. (12)-(14).

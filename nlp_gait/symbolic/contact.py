@@ -43,17 +43,11 @@ class Equations(NamedTuple):
 def implicit_equations(
     motion: Equations, velocity: SX, contacts: Sequence[Contact], ground: Ground, quantum: SX | float
 ) -> Equations:
-    """Return the equations of the acceleration over one quantum of time dt, with the contact forces at its end.
+    """Return the equations of the acceleration over one quantum of time dt [s], with the contact forces at its end.
 
-    Spring, damper and friction act at the position and velocity at the end of the quantum, so none of them can overshoot. A first
-    pass without friction finds which contacts press, a second one adds friction and releases those that would pull.
-
-    Args:
-        motion: without contacts; its mass includes the terms of other implicit forces.
-        velocity: (n,) now.
-        contacts: points that may touch the ground.
-        ground: below them.
-        quantum: dt [s].
+    Spring, damper and friction act at the position and velocity (n,) at the end of the quantum, so none of them can overshoot. A
+    first pass without friction finds which contacts press, a second one adds friction and releases those that would pull. The
+    given motion has no contacts; its mass includes the terms of other implicit forces.
 
     Source:
         Bhardwaj et al., eqs. (33)-(35), (44)-(46), taken at the end of the quantum; the printed explicit scheme is stable
@@ -101,9 +95,7 @@ def _add_normal_forces(
 def solve_definite(A: SX, B: SX) -> SX:
     """Solve A X = B (n, m) by elimination without pivoting, hence without branches.
 
-    Args:
-        A: (n, n) with a positive definite symmetric part; it need not be symmetric.
-        B: (n, m) right-hand sides.
+    The symmetric part of A (n, n) must be positive definite; A need not be symmetric.
     """
     n = A.shape[0]
     rows = [ca.horzcat(A[i, :], B[i, :]) for i in range(n)]

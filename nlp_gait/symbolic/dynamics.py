@@ -89,11 +89,7 @@ def regroup_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[I
 
     Matter on the axis of a joint moves in the same way whether it belongs to the body before or after the joint, and exerts no
     torque about the axis. So mass, the first moment along the axis and the second moment along it are moved to the body before:
-    only the first body has mass.
-
-    Args:
-        tree: bodies, parents first.
-        kept: links that are not changed.
+    only the first body has mass. Links in ``kept`` are not changed.
     """
     inertias = [_inertia(body) for body in tree]
     for i in range(len(tree) - 1, 0, -1):

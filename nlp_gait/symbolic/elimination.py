@@ -44,9 +44,7 @@ class Factors:
 def choose_pivots(matrices: Array, pattern: Array) -> tuple[tuple[int, int], ...]:
     """Choose an order of elimination, (row, column) of each pivot, that suits all of some matrices and needs little work.
 
-    Args:
-        matrices: (N, n, n) examples of the matrix.
-        pattern: (n, n) whether an entry is ever nonzero.
+    ``matrices`` (N, n, n) are examples, ``pattern`` (n, n) says whether an entry is ever nonzero.
     """
     orders = {_choose_pivots_of(matrix, pattern) for matrix in matrices[:: max(1, len(matrices) // CANDIDATES)]}
     least = {order: _find_least_pivot(matrices, order) for order in orders}
@@ -103,12 +101,9 @@ def _count_multiplications(pattern: Array, order: Sequence[tuple[int, int]]) -> 
 
 
 def factorise(matrix: SX, order: Sequence[tuple[int, int]], least_pivot: float) -> Factors:
-    """Factorise a matrix (n, n) in a given order; the factors are finite for every matrix.
+    """Factorise a matrix (n, n) in the order of ``choose_pivots``; structural zeros cost nothing.
 
-    Args:
-        matrix: expressions; structural zeros cost nothing.
-        order: see ``choose_pivots``.
-        least_pivot: smaller pivots are replaced by this one, with their sign.
+    Smaller pivots are replaced by the least one, with their sign: the factors are finite for every matrix.
     """
     n = len(order)
     entries = [[matrix[i, j] for j in range(n)] for i in range(n)]

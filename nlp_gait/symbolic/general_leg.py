@@ -142,12 +142,7 @@ def make_leg_root(leg: Leg, steps: int, ops: Nonsmooth, margin: SX) -> Root:
 def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[SX, SX]:
     """Return cosines and sines (6,) of the nearest leg with a spherical hip and a universal ankle.
 
-    Args:
-        leg: data of the leg.
-        hip: (3,) hip centre from the foot's origin, in the foot's axes [m].
-        rotation: (3, 3) of the torso relative to the foot.
-        margin: on the reach of the knee.
-        ops: interpretation of acos.
+    ``hip`` (3,) is the hip centre from the foot's origin in the foot's axes [m], ``rotation`` (3, 3) that of the torso.
     """
     a = [SX(DM(axis)) for axis in leg.axes]
     # Knee: the generalised law of cosines.
@@ -199,13 +194,7 @@ def _solve_ankle(fifth: Array, sixth: Array, m: SX, seen: SX, at_zero: Array) ->
 
 
 def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[SX, SX], tuple[SX, SX]]:
-    """Return the rotations of the hip's joints from the images of the first and the third axis.
-
-    Args:
-        axes: (3, 3).
-        third: (3,) third axis after all three rotations.
-        first: (3,) first axis before them.
-    """
+    """Return the rotations of the hip's joints (axes (3, 3)) from the third axis after them and the first one before them."""
     a, b, c = axes
     constant = float((a @ b) * (b @ c))
     along, across = float(a @ c) - constant, float(a @ np.cross(b, c))

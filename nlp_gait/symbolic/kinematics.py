@@ -38,13 +38,7 @@ def relative_rotation(body: Body, q: Mapping[str, SX]) -> SX:
 
 
 def forward_kinematics(tree: Sequence[Body], q: Mapping[str, SX], base: SX) -> list[Pose]:
-    """Return the poses of all bodies; the first is at ``base`` (3,) [m] with world axes.
-
-    Args:
-        tree: bodies, parents first.
-        q: joint angles by name [rad].
-        base: (3,) position of the fixed link's frame [m].
-    """
+    """Return the poses of all bodies; the first is at ``base`` (3,) [m] with world axes, and q has joint angles [rad]."""
     poses: list[Pose] = []
     for body in tree:
         if body.parent < 0:

@@ -17,13 +17,7 @@ class EquationsOfMotion(NamedTuple):
 
 
 def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsOfMotion:
-    """Derive Lagrange's equations of L = K - P, with K quadratic in the velocities.
-
-    Args:
-        kinetic: K(q, qd), scalar [J].
-        potential: P(q), scalar [J].
-        q: (n,) generalised coordinates.
-        qd: (n,) their rates.
+    """Derive Lagrange's equations of L = K(q, qd) - P(q) [J] in coordinates q (n,), with K quadratic in the rates.
 
     Source:
         Bhardwaj et al., eqs. (40)-(42); with C as a matrix, so that the product C qd is the vector of eq. (42).

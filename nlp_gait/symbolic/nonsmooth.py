@@ -152,8 +152,7 @@ class Lift:
 class Lifted:
     """Absolute values and minima as variables with inequalities; a jump as a sigmoid.
 
-    Args:
-        width: width of the sigmoid in units of the switch (an NLP parameter).
+    ``width`` is that of the sigmoid, in units of the switch (an NLP parameter).
     """
 
     exact = False

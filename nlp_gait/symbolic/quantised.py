@@ -58,16 +58,7 @@ def implicit_quantum(
     They are finite at every gain. The Coriolis matrix multiplies the rates at the end, too: as dM/dt - 2 C is skew, a free motion
     then loses kinetic energy to first order in the quantum, while links turn by less than a radian in a quantum. In a robot that
     collapses without damping, toes turn ten times faster, which a step of this length cannot resolve: such links are braked.
-
-    Args:
-        motion: equations of motion at the state.
-        state: now.
-        control: gains.
-        desired: at the end of the quantum.
-        contacts: points that may touch the ground.
-        ground: below the contacts.
-        disturbance: (n,) generalised force.
-        quantum: dt [s].
+    ``desired`` is at the end of the quantum dt [s], ``disturbance`` (n,) a generalised force.
 
     Source:
         Bhardwaj et al., eqs. (46)-(52), taken at the end of the quantum.

@@ -30,11 +30,7 @@ def simplify(outputs: Sequence[SX]) -> list[SX]:
 
 
 def tabulate_last_input(function: ca.Function, values: DM) -> tuple[ca.Function, DM]:
-    """Take out of a function what depends on its last input alone, for a map over known values of that input.
-
-    Args:
-        function: of SX expressions; its last input is a scalar.
-        values: (1, n) values of that input.
+    """Take out of a function what depends on its last input alone, a scalar of known values (1, n).
 
     Returns:
         The function with a vector (k,) in place of its last input, and that vector's values (k, n).

@@ -29,12 +29,9 @@ def count_coefficients(spans: int) -> int:
 
 
 def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
-    """Evaluate k splines with zero value and zero velocity at both ends of a phase.
+    """Evaluate k splines with zero value and zero velocity at both ends of a phase [0, 1] of a duration [s].
 
-    Args:
-        coefficients: (m, k) of k curves [u]; m = spans + 1, or 0 for zero curves.
-        duration: of the phase [s].
-        phase: time / duration, in [0, 1].
+    The coefficients are (m, k), with m = spans + 1, or 0 for zero curves.
 
     Source:
         Basis functions of Cox and de Boor on uniform knots with clamped ends; derivatives by de Boor's formula.
@@ -47,13 +44,7 @@ def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
 
 
 def basis(spans: int, phase: SX, order: int) -> SX:
-    """Return (m,) derivatives of the basis functions with respect to the phase.
-
-    Args:
-        spans: equal parts of the phase, at least 1.
-        phase: in [0, 1].
-        order: of the derivative, 0 to 5.
-    """
+    """Return (m,) derivatives of order 0 to 5 of the basis functions with respect to the phase, in [0, 1]."""
     knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, spans + 1), np.ones(DEGREE)])
     values = _start_basis(spans, phase)
     for degree in range(1, DEGREE + 1):
@@ -63,12 +54,7 @@ def basis(spans: int, phase: SX, order: int) -> SX:
 
 
 def refine_spline(coefficients: Array, spans: int) -> Array:
-    """Return the coefficients of the same curve with more spans.
-
-    Args:
-        coefficients: (m,) of a curve, or (m, k) of k curves.
-        spans: a multiple of the curve's number of spans.
-    """
+    """Return the coefficients (m,) of a curve, or (m, k) of k curves, with more spans, a multiple of theirs."""
     m = coefficients.shape[0]
     if m == 0:
         return np.zeros((count_coefficients(spans), *coefficients.shape[1:]))

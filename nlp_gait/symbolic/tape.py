@@ -20,11 +20,7 @@ class Instruction(NamedTuple):
 
 
 def read_tape(function: ca.Function) -> Iterator[Instruction]:
-    """Yield the instructions of a function; a function of MX expressions is expanded.
-
-    Raises:
-        RuntimeError: the function cannot be expanded to scalar operations.
-    """
+    """Yield the instructions of a function, expanded to scalar operations; raises RuntimeError where that is impossible."""
     scalar = function if function.is_a("SXFunction") else function.expand()
     first_input = list(accumulate((scalar.nnz_in(i) for i in range(scalar.n_in())), initial=0))
     first_output = list(accumulate((scalar.nnz_out(i) for i in range(scalar.n_out())), initial=0))

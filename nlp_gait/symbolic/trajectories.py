@@ -18,15 +18,9 @@ class Motion(NamedTuple):
 
 
 def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX, phase: SX) -> Motion:
-    """Return the cubic polynomial in time with given end positions and end velocities.
+    """Return the cubic polynomial in time with given end positions [u] and end velocities [u/s].
 
-    Args:
-        start: position at phase 0 [u].
-        end: position at phase 1 [u].
-        start_velocity: velocity at phase 0 [u/s].
-        end_velocity: velocity at phase 1 [u/s].
-        duration: time from phase 0 to phase 1 [s]; must not be zero.
-        phase: time / duration.
+    ``phase`` is time / duration; the duration [s] must not be zero.
 
     Source:
         Gupta, Pratihar, Deb (2023), Tables 3 and 5 (four boundary conditions each), in Hermite form.
@@ -42,13 +36,13 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
 
 
 def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_difference: SX, phase: SX) -> Motion:
-    """Return the cubic polynomial over unit time with given ends: ``cubic`` with other coefficients.
+    """Return the cubic polynomial over unit time with given ends [u]: ``cubic`` with other coefficients [u].
 
     Args:
-        start: position at phase 0 [u].
-        end: position at phase 1 [u].
-        half_sum: half of the sum of the velocities at both ends in unit time (velocities times the duration) [u].
-        half_difference: half of that at phase 0 less that at phase 1 [u].
+        start: position at phase 0.
+        end: position at phase 1.
+        half_sum: half of the sum of the velocities at both ends in unit time (velocities times the duration).
+        half_difference: half of that at phase 0 less that at phase 1.
         phase: time / duration.
     """
     rise, bow = end - start, phase * (1 - phase)
@@ -60,13 +54,7 @@ def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_differe
 
 
 def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX) -> Motion:
-    """Return the height of a swing foot as a parabola over its path: zero at both ends, ``height`` in the middle.
-
-    Args:
-        along: horizontal motion of the foot [m].
-        start: position at lift-off [m].
-        end: position at touch-down [m].
-        height: greatest height [m].
+    """Return the height of a swing foot [m] as a parabola over its path: zero at start and end, ``height`` in the middle.
 
     Source:
         Gupta, Pratihar, Deb (2023), Table 3, row 2, with Z_A(x_f) = 0 in place of the misprinted Z_A(x_i + S_L) = 0:
@@ -79,12 +67,7 @@ def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX)
 
 
 def map_motion(function: Callable[[SX], SX], argument: Motion) -> Motion:
-    """Return the motion of a smooth function of a moving quantity, by the chain rule with automatic differentiation.
-
-    Args:
-        function: from (n,) to (m,) or to a (k, m) matrix, twice differentiable.
-        argument: (n,) motion.
-    """
+    """Return the motion of a smooth function of a moving quantity (n,), by the chain rule with automatic differentiation."""
     q = SX.sym("q", argument.position.shape[0])
     value = function(q)
     slope = ca.jtimes(value, q, argument.velocity)

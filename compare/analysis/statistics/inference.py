@@ -24,8 +24,7 @@ def rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
     all values are equal.
 
     Source:
-        Mann, Whitney (1947), On a test of whether one of two random variables is stochastically larger than the other, as
-        in ``scipy.stats.mannwhitneyu``.
+        Mann, Whitney (1947), On a test of whether one of two random variables is stochastically larger than the other.
     """
     from scipy.stats import mannwhitneyu
 
@@ -36,14 +35,10 @@ def rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def signed_rank(a: Sequence[float], b: Sequence[float]) -> float:
-    """Two-sided p-value of Wilcoxon's signed-rank test on pairs: differences are symmetric about zero.
+    """Two-sided p-value of Wilcoxon's signed-rank test on pairs (R,) of runs with the same seed and starting points.
 
     A run without a feasible point differs from one with by more than any two runs with one; pairs that are equal, or both
     without, are dropped. 1 if no pair is left.
-
-    Args:
-        a: (R,) costs of one solver.
-        b: (R,) costs of the other; equal runs share their seed and starting points.
 
     Source:
         Wilcoxon (1945), Individual comparisons by ranking methods, as in ``scipy.stats.wilcoxon``.
@@ -59,13 +54,7 @@ def signed_rank(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def holm(p: Sequence[float]) -> Array:
-    """P-values of a family of tests, adjusted so that rejecting below alpha keeps the family-wise error at alpha.
-
-    Args:
-        p: (T,) p-values.
-
-    Returns:
-        (T,) adjusted p-values, in the same order.
+    """P-values (T,) of a family of tests, adjusted so that rejecting below alpha keeps the family-wise error at alpha.
 
     Source:
         Holm (1979), A simple sequentially rejective multiple test procedure.
@@ -101,12 +90,9 @@ class RankSum:
 
 
 def rank_sum_normal(a: Sequence[float], b: Sequence[float]) -> RankSum:
-    """Return Wilcoxon's rank-sum test by the normal approximation; ties share their mean rank.
+    """Return Wilcoxon's (1945) rank-sum test by the normal approximation; ties share their mean rank.
 
     Equal to MATLAB's ``ranksum(a, b, 'method', 'approximate')``.
-
-    Source:
-        Wilcoxon (1945), as in ``scipy.stats.mannwhitneyu(method="asymptotic")``.
     """
     from scipy.stats import mannwhitneyu, norm
 
@@ -122,15 +108,7 @@ def rank_sum_normal(a: Sequence[float], b: Sequence[float]) -> RankSum:
 def bootstrap_interval(
     columns: Sequence[Sequence[float]], statistic: Callable[..., float], level: float = 0.95
 ) -> tuple[float, float]:
-    """Percentile bootstrap interval of a statistic over runs.
-
-    Args:
-        columns: of equal length (R,); runs are drawn with replacement, with all their columns.
-        statistic: of the columns; it may be infinite.
-        level: of confidence.
-
-    Returns:
-        Lower and upper end; an end is infinite where resamples are.
+    """Percentile bootstrap interval of a statistic of columns (R,) over runs, drawn with all their columns.
 
     Source:
         Efron, Tibshirani (1993), An introduction to the bootstrap, chapter 13.
@@ -142,5 +120,4 @@ def bootstrap_interval(
 
 
 def _quantile(ascending: Array, share: float) -> float:
-    """A value of the sample: interpolation would meet infinities."""
     return float(ascending[min(int(np.floor(share * len(ascending))), len(ascending) - 1)])

@@ -68,14 +68,7 @@ class Curve:
 
 
 def make_curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
-    """Return the best so far of a run.
-
-    Args:
-        record: the run.
-        objective: its sense.
-        reference: objective that gaps are measured from.
-        weighting: of calls.
-    """
+    """Return the best so far of a run, with gaps from a reference objective."""
     evaluations = np.array(record.history.evaluations, dtype=float)
     if evaluations.size:  # derivatives are counted at the end
         evaluations[-1] = max(evaluations[-1], weighting.equivalent(record.evaluations, len(record.x)))
@@ -87,10 +80,7 @@ def make_curve(record: RunRecord, objective: Objective, reference: float, weight
 
 
 def relative_gap(value: float, reference: float, objective: Objective) -> float:
-    """Return the distance of an objective from the reference, positive if worse, relative unless the reference is 0.
-
-    Infinite for NaN, where nothing feasible was found.
-    """
+    """Return (value - reference) / |reference|, or the difference if it is 0; positive if worse, infinite for NaN."""
     if math.isnan(value) or math.isnan(reference):
         return math.inf
     return objective.sign * (value - reference) / (abs(reference) or 1.0)
@@ -109,9 +99,6 @@ def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> 
         reached: (R,) cost at which each run reached the target; infinite if never.
         totals: (R,) cost of each whole run.
 
-    Returns:
-        Expected cost of reaching the target with restarts; infinite if no run reached it.
-
     Source:
         Hansen, Auger, Ros, Mersmann, Tusar, Brockhoff (2021), COCO: a platform for comparing continuous optimizers in a
         black-box setting, section 4 (ERT, there also aRT).
@@ -124,13 +111,9 @@ def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> 
 
 
 def ecdf(costs: Array) -> tuple[Array, Array]:
-    """Return the share of all pairs of run and target that are solved within a cost.
+    """Return (K,) costs, ascending, at which the share of solved pairs of run and target rises, and (K,) the shares.
 
-    Args:
-        costs: (pairs,) cost at which each was solved; infinite if never.
-
-    Returns:
-        (K,) costs at which the share rises, ascending, and (K,) the share from there on.
+    ``costs`` (pairs,) are those at which each pair was solved, infinite if never.
 
     Source:
         Hansen et al. (2021), COCO, section 4 (runtime distributions).
@@ -141,14 +124,10 @@ def ecdf(costs: Array) -> tuple[Array, Array]:
 
 
 def performance_profile(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:
-    """Return the share of instances that a solver solves within a factor of the cheapest solver.
+    """Return ``ecdf`` of each solver's costs as factors of the cheapest solver's.
 
-    Args:
-        costs: by solver, (I,) cost of each instance, in the same order; infinite if not solved. Instances that no solver
-            solves count as unsolved for all.
-
-    Returns:
-        By solver, the (K,) factors at which its share rises, ascending, and (K,) the share from there on.
+    ``costs`` by solver are those of each instance (I,), in the same order; infinite if not solved. Instances that no solver
+    solves count as unsolved for all.
 
     Source:
         Dolan, More (2002), Benchmarking optimization software with performance profiles.
@@ -162,15 +141,9 @@ def performance_profile(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple
 
 
 def compute_band(costs: Sequence[Array], gaps: Sequence[Array], grid: Array) -> tuple[Array, Array, Array]:
-    """Return the least, median and greatest gap of all runs at each cost.
+    """Return the least, median and greatest gap of all runs at each cost of a grid, three arrays (K,).
 
-    Args:
-        costs: of each run, (G,) ascending.
-        gaps: of each run, (G,) best gap so far, infinite while nothing was feasible.
-        grid: (K,) costs.
-
-    Returns:
-        Three arrays (K,); infinite where a run has nothing feasible. A run that has ended keeps its last gap.
+    A run has ascending costs (G,) and its best gaps so far (G,), infinite while nothing was feasible; the last one stays.
     """
     rows = np.full((len(costs), len(grid)), np.inf)
     for row, cost, gap in zip(rows, costs, gaps, strict=True):

@@ -39,11 +39,7 @@ class NlpPlan:
 
 
 def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
-    """Return the plan of an NLP, with second derivatives or without.
-
-    Raises:
-        NotMapped: it uses an operation that has no C++ here.
-    """
+    """Return the plan of an NLP, with second derivatives or without; raises NotMapped for an operation without C++."""
     assembler = Assembler(structure)
     plan, n = assembler.plan, assembler.n
     stages = []

@@ -35,19 +35,12 @@ OTHER_STEP, MOST_POINTS = 1e-5, 50
 class CompiledNlp:
     """Functions of an NLP in a library that is built once and stored in the cache folder.
 
-    Attributes:
-        functions: by the names that ``nlpsol`` gives them.
-        nlp: CasADi's dictionary of x, p, f, g.
-        options: with which ``nlpsol`` uses these derivatives; sensitivities to p are not available then.
+    ``nlp`` is CasADi's dictionary of x, p, f, g, and ``options`` those with which ``nlpsol`` uses these derivatives;
+    sensitivities to p are not available then. ``functions`` have the names that ``nlpsol`` gives them.
     """
 
     def __init__(self, nlp: Mapping[str, MX], p: Array, *, second: bool = True) -> None:
-        """Build the library, or load it from the cache.
-
-        Args:
-            nlp: CasADi's dictionary of x, p, f, g.
-            p: (k,) parameter values at which the library is checked against the virtual machine.
-            second: with second derivatives.
+        """Build the library, or load it from the cache, and check it against the virtual machine at parameter values p (k,).
 
         Raises:
             CompilerError: there is no compiler, it fails, or the NLP cannot be split.
@@ -71,11 +64,7 @@ class CompiledNlp:
         self.options: dict[str, Any] = {**NO_OTHERS, **derivatives}
 
     def _check(self, nlp: Mapping[str, MX], p: Array, library: str) -> None:
-        """Compare values with the virtual machine's, and derivatives with differences; at most points they must agree.
-
-        Raises:
-            CompilerError: they differ: the compiler is broken, or is not for this machine.
-        """
+        """Compare values with the virtual machine's, and derivatives with differences; at most points they must agree."""
         machine = ca.Function("machine", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]])
         rng = np.random.default_rng(0)
         n, m = nlp["x"].shape[0], nlp["g"].shape[0]

@@ -33,11 +33,7 @@ PIECE = 500
 
 
 def read_operations(function: ca.Function) -> Iterator[Instruction]:
-    """Yield the instructions of a function of scalar operations.
-
-    Raises:
-        NotMapped: an operation has no C++ here.
-    """
+    """Yield the instructions of a function of scalar operations; raises NotMapped for one that has no C++ here."""
     for instruction in read_tape(function):
         if instruction.operation not in (*EXPRESSIONS, ca.OP_INPUT, ca.OP_CONST, ca.OP_OUTPUT):
             raise NotMapped(f"operation {instruction.operation} of function {function.name()}")

@@ -100,15 +100,7 @@ class Plan:
     def add_expressions(
         self, phase: int, inputs: Sequence[SX], places: Sequence[Integers], outputs: SX, targets: Integers
     ) -> None:
-        """Add scalar expressions to the tape.
-
-        Args:
-            phase: that evaluates them.
-            inputs: vectors of symbols.
-            places: of the symbols' values, -1 for those that are not used.
-            outputs: (k,) expressions.
-            targets: (k,) places of the outputs.
-        """
+        """Add scalar expressions (k,) to the tape, with places of their inputs' values (-1 if unused) and of their own."""
         if not outputs.shape[0]:
             return
         function = ca.Function("glue", list(inputs), [ca.cse(outputs)])

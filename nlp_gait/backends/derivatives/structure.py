@@ -42,11 +42,7 @@ class Structure:
 
 
 def split_nlp(nlp: Mapping[str, MX]) -> Structure:
-    """Split an NLP, CasADi's dictionary of x, p, f, g.
-
-    Raises:
-        NotMapped: it calls a function that is neither mapped nor made of scalar operations.
-    """
+    """Split an NLP, CasADi's dictionary of x, p, f, g; raises NotMapped for calls neither mapped nor of scalar operations."""
     x, p = nlp["x"], nlp["p"]
     whole = ca.Function("nlp", [x, p], [nlp["f"], nlp["g"]])
     numbers = [k for k in range(whole.n_instructions()) if whole.instruction_id(k) == ca.OP_CALL]

@@ -76,15 +76,10 @@ class CompiledObjective:
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def __call__(self, X: Array | Mapping[str, float]) -> tuple[Array, Array]:
-        """Evaluate candidates.
+        """Return (P,) costs and (P,) violations of candidates X (P, n), or of one candidate by name, as in ``solution.x``.
 
-        Args:
-            X: (P, n) candidates, one per row; or one candidate by name, as in ``solution.x``, which counts as one row.
-
-        Returns:
-            (P,) cost, which is to be minimised: the objective, negated if the problem maximises it; and (P,) violation
-            summed over all constraint rows and bounds, each in units of its scale, zero if feasible. Both are infinite
-            where a row of X is not finite.
+        The cost is minimised: the objective, negated if the problem maximises it. The violation is summed over all
+        constraint rows and bounds, each in units of its scale, zero if feasible. Both are infinite where X is not finite.
 
         Raises:
             InputError: X has another shape, or does not consist of numbers.
@@ -208,9 +203,6 @@ def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> Nativ
     """Build the native kernel, and check that it agrees with the virtual machine at most of some random points.
 
     Not at all of them: where rounding decides a jump, both may be right.
-
-    Raises:
-        CompilerError: they differ: the compiler is broken, or is not for this machine.
     """
     kernel = build_kernel(problem)
     native = NativeKernel(kernel, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)

@@ -53,11 +53,7 @@ class Compiler:
         return f"{' '.join(self.command)} ({self.version.splitlines()[0] if self.version else 'version unknown'})"
 
     def build(self, source: Path, library: Path, flags: Sequence[str]) -> None:
-        """Compile one C++ file into a shared library.
-
-        Raises:
-            CompilerError: the compiler fails, exceeds its time limit, or writes no library.
-        """
+        """Compile a C++ file to a shared library; CompilerError if that fails, takes too long, or writes none."""
         command = [*self.command, *flags, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
         _run(command, TIME_LIMIT_S)
         if not library.is_file():

@@ -21,25 +21,12 @@ BLOCK = 64
 
 
 class NativeKernel:
-    """Evaluates a kernel in a compiled library; safe to call from several threads at once.
-
-    Attributes:
-        lanes: candidates that one instruction works on.
-        description: compiler and lane count, in words.
-        library: file of the library.
-    """
+    """Evaluates a kernel in a compiled library; safe to call from several threads at once."""
 
     def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
-        """Build the library, or load it from the cache.
+        """Build the library for 1, 2, 4 or 8 lanes, or load it from the cache; raises CompilerError.
 
-        Args:
-            kernel: is compiled.
-            compiler: builds the library.
-            lanes: 1, 2, 4 or 8.
-            scalar_functions: sines and the like one lane after the other, so that no bit depends on the lane count.
-
-        Raises:
-            CompilerError: the compiler fails.
+        With ``scalar_functions``, sines and the like take one lane after the other, so that no bit depends on the lane count.
         """
         flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *SCALAR_FUNCTIONS[: int(scalar_functions)])
         loaded, self.library = load_library(write_kernel_source(kernel.function), compiler, flags, SYMBOLS)
@@ -80,11 +67,7 @@ def _address(array: Array) -> int:
 
 
 class InterpretedKernel:
-    """Evaluates a kernel in CasADi's virtual machine, one thread at a time: many times slower, the same numbers.
-
-    Attributes:
-        description: in words.
-    """
+    """Evaluates a kernel in CasADi's virtual machine, one thread at a time: many times slower, the same numbers."""
 
     def __init__(self, kernel: Kernel) -> None:
         n, k, m = kernel.function.size1_in(0), kernel.function.size1_in(1), kernel.function.size1_out(1)

@@ -36,7 +36,7 @@ def load_library(
     symbols: Sequence[str],
     write_source: Callable[[], str] | None = None,
 ) -> tuple[ctypes.CDLL, Path]:
-    """Load the library of a C++ source from the cache, or build it.
+    """Return the library of a C++ source and its file, from the cache or built.
 
     Args:
         source: C++; or everything that it depends on, if ``write_source`` is given.
@@ -44,9 +44,6 @@ def load_library(
         flags: of the compiler.
         symbols: functions that the library must have.
         write_source: returns the source; called only if the library is not in the cache.
-
-    Returns:
-        The loaded library and its file.
 
     Raises:
         CompilerError: the compiler fails, or the library cannot be loaded.

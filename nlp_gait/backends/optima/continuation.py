@@ -45,10 +45,8 @@ class Continuation:
     ) -> list[Outcome]:
         """Return runs of the next problem; the best of these and the earlier runs is the neighbour of the next problem.
 
-        Args:
-            problem: a copy of the first one with other parameter values.
-            earlier: runs of the same problem on another path; random starts without success are not repeated.
-            stop: called after each iteration; returns whether to end at once.
+        ``earlier`` are runs of the same problem on another path; random starts without success are not repeated. ``stop`` is
+        called after each iteration, and returns whether to end at once.
         """
         solver, near = self._solver.prepare(problem, self._solves), self._neighbour
         outcomes: list[Outcome] = []
@@ -82,14 +80,7 @@ def solve_both_ways(
     """Solve a path of neighbouring problems forwards and backwards, and return the better solution of each.
 
     Where a local optimum ceases to be the best one, a path in one direction stays on it for a while; in the other direction it
-    arrives on the other optimum.
-
-    Args:
-        problems: copies of one problem with other parameter values, neighbours next to each other.
-        starts: number of random starts at both ends of the path, and where no neighbour helps.
-        seed: of the random starts.
-        solver: with its settings; None for IPOPT with its defaults.
-        progress: called after each problem, twice as often as there are problems.
+    arrives on the other optimum. The arguments are those of ``Continuation``, and progress is called twice for each problem.
 
     Raises:
         Interrupted: Ctrl-C; carries the solutions so far, None for problems without a run.

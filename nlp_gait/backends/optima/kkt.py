@@ -101,12 +101,8 @@ class KktStep:
 def solve_kkt(hessian: Array, rows: Array, r: Array, c: Array, variables: int) -> KktStep:
     """Solve the linearised first-order conditions in the row space and the null space of the active rows.
 
-    Args:
-        hessian: (n, n).
-        rows: (m, n) Jacobian of the active rows.
-        r: (n,) or (n, k).
-        c: (m,) or (m, k).
-        variables: number of decision variables, the first unknowns; the others are lifted.
+    Takes the Hessian (n, n), the Jacobian (m, n) of the active rows, r (n,) or (n, k) and c (m,) or (m, k); the first unknowns
+    are the decision variables, the others are lifted.
     """
     length = np.linalg.norm(rows, axis=1)
     length[length == 0.0] = 1.0

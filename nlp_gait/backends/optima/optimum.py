@@ -85,11 +85,7 @@ class Optimum:
 
 @lock_casadi
 def find_optimum(problem: GaitProblem, near: Outcome) -> Optimum:
-    """Find the optimum near which a solver ended.
-
-    Raises:
-        InputError: the solver returns no multipliers, or the problem has too many variables for dense linear algebra.
-    """
+    """Find the optimum near which a solver ended; raises InputError without multipliers, or for too many variables."""
     if near.guess is None:
         raise InputError(
             f"{problem.name}: prices and sensitivities need multipliers, which {near.solver} does not return; solve with ipopt"

@@ -51,11 +51,7 @@ class _Change(NamedTuple):
 
 @lock_casadi
 def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
-    """Return derivatives with respect to all parameters of the problem, in their order and units.
-
-    Raises:
-        InputError: the optimum has no derivatives; the message says why.
-    """
+    """Return derivatives with respect to all parameters, in their order and units; InputError if there are none."""
     _require_derivatives(optimum)
     parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
     cost, *others = (np.array(part)[:, :-1] for part in parts)  # the last one is the sigmoid's width
@@ -67,11 +63,8 @@ def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, Gai
     """Return derivatives with respect to the data of the model, for example a robot's masses.
 
     They are central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
-    problems are evaluated, not solved, and not at their own parameter values.
-
-    Args:
-        optimum: of the unchanged problem.
-        pairs: for each quantity the problem with more of it, the problem with less of it, and the difference.
+    problems are evaluated, not solved, and not at their own parameter values. A pair consists of the problem with more of a
+    quantity, the problem with less of it, and the difference.
 
     Raises:
         InputError: the optimum has no sensitivities, or another model has other constraints.
@@ -120,11 +113,7 @@ def _differentiate(optimum: Optimum, change: _Change) -> Sensitivities:
 def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Array) -> Array:
     """Return how far each quantity may change, down and up, before the set of active bounds changes.
 
-    Args:
-        optimum: at which the change begins.
-        change: of rows and bounds at fixed w.
-        moved: (m, k) change of the rows by the change of w.
-        multipliers: (a, k) change of the multipliers of the active rows.
+    ``moved`` (m, k) is the change of the rows by the change of w, ``multipliers`` (a, k) that of the active rows' multipliers.
     """
     values, lower, upper = optimum.rows
     inactive, active = optimum.side == 0, optimum.active

@@ -109,14 +109,9 @@ class IpoptSettings(Solver):
         return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled)
 
     def prepare(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
-        """Return IPOPT for a problem, built once for all its copies.
+        """Return IPOPT for a problem, built once for all its copies; CompilerError if compiled functions are required and fail.
 
-        Args:
-            problem: any copy.
-            solves: planned number of solves, which decides whether compilation pays if the settings do not.
-
-        Raises:
-            CompilerError: compiled functions are required, and there is no compiler or it fails.
+        ``solves``, the planned number of solves, decides whether compilation pays if the settings do not.
         """
         chosen = self.choose_settings(problem, solves)
         try:
@@ -281,10 +276,7 @@ class Ipopt(Solver):
 
 @cache
 def find_linear_solver(wanted: str | None = None) -> str:
-    """Return the linear solver that IPOPT uses in this installation, read from its log.
-
-    Args:
-        wanted: one of ``LINEAR_SOLVERS``; None for IPOPT's default.
+    """Return the linear solver that IPOPT uses here, read from its log: the wanted one, or its default.
 
     Raises:
         InputError: the wanted one does not run here.

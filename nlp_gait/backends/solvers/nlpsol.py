@@ -67,12 +67,7 @@ def probe(name: str) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class CasadiSolver(Solver):
-    """A solver of the wheel with its default settings, in IPOPT's stages of sigmoid width, each started from x alone.
-
-    Attributes:
-        quiet: options that keep it from printing.
-        watched: whether it can be ended between iterations, at a time limit or on Ctrl-C.
-    """
+    """A solver of the wheel with its default settings, in IPOPT's stages of sigmoid width, each started from x alone."""
 
     quiet: ClassVar[Mapping[str, Any]]
     watched: ClassVar[bool] = False
@@ -88,11 +83,6 @@ class CasadiSolver(Solver):
 
     @lock_casadi
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """See ``Solver``.
-
-        Raises:
-            InputError: the solver does not run here.
-        """
         model = build_nlp(problem)
         solver, watch, create_s = problem.build_once(_build_solver, self)
         widths, bounds = model.widths, model.bounds(problem)

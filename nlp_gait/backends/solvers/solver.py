@@ -34,12 +34,9 @@ class Solver(Protocol):
 
     @abstractmethod
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        """Run the solver once.
+        """Run the solver once from x0 (n,) within the bounds.
 
-        Args:
-            problem: with its current parameter values.
-            x0: (n,) start point within the bounds.
-            stop: called between iterations; returns whether to end at once. Without it Ctrl-C raises KeyboardInterrupt.
+        ``stop`` is called between iterations, and returns whether to end at once. Without it Ctrl-C raises KeyboardInterrupt.
         """
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
@@ -98,12 +95,7 @@ class IterationWatch(ca.Callback):
     """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
     def __init__(self, nlp: Mapping[str, MX], shared: IterationWatch | None = None) -> None:
-        """Make a watch for an NLP.
-
-        Args:
-            nlp: CasADi's dictionary of x, p, f, g.
-            shared: another watch, whose ``begin`` applies to this one too.
-        """
+        """Make a watch for an NLP, to which ``begin`` of another watch applies if it is shared."""
         ca.Callback.__init__(self)
         n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))
         self._sizes = {"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": k}
@@ -111,12 +103,7 @@ class IterationWatch(ca.Callback):
         self.construct("watch", {})
 
     def begin(self, stop: Callable[[], bool], deadline: float) -> None:
-        """Watch the next run of this thread.
-
-        Args:
-            stop: returns whether the run should end.
-            deadline: of ``time.perf_counter`` [s].
-        """
+        """Watch the next run of this thread, until ``stop`` returns True or a deadline of ``time.perf_counter`` [s]."""
         self._of_thread.stop, self._of_thread.deadline, self._of_thread.reason = stop, deadline, ""
 
     @property
