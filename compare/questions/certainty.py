@@ -138,7 +138,7 @@ class Certainty(Question[Evidence]):
             algorithm("cma")
 
     def find(self, work: Work) -> Iterator[Evidence]:
-        """See ``Question``.
+        """Yield the evidence.
 
         Raises:
             InputError: no start converged.
@@ -180,7 +180,6 @@ class Certainty(Question[Evidence]):
         )
 
     def report(self, findings: Evidence) -> Answer:
-        """See ``Question``."""
         problem, unit = findings.problem, findings.problem.objective.unit
         stem = f"{problem.name}-certainty"
         proof, estimate = findings.certificate, findings.unseen

@@ -104,11 +104,9 @@ class Motors(Question[tuple[Variant, ...]]):
 
     @property
     def total(self) -> int:
-        """See ``Question``."""
         return len(VARIANTS)
 
     def find(self, work: Work) -> Iterator[tuple[Variant, ...]]:
-        """See ``Question``."""
         published, solver = self.problem, work.solver()
         limited = {rotor: rebuild(published, motors=f"limits{rotor}") for rotor in ("", ",rotor")}
         variants: tuple[Variant, ...] = ()
@@ -138,7 +136,6 @@ class Motors(Question[tuple[Variant, ...]]):
             yield variants
 
     def report(self, findings: tuple[Variant, ...]) -> Answer:
-        """See ``Question``."""
         name, stem, kinds = self.problem.name, f"{self.problem.name}-motors", tuple(findings[0].uses)
         uses = [
             (v.name, *(f"{v.uses[kind].share:.1%} {v.uses[kind].row.partition('[')[2][:-1]}" for kind in kinds))
@@ -172,7 +169,6 @@ class Motors(Question[tuple[Variant, ...]]):
         )
 
     def failures(self, findings: tuple[Variant, ...]) -> list[str]:
-        """See ``Question``."""
         return [f"{variant.name}: {variant.status}" for variant in findings if not variant.feasible]
 
 

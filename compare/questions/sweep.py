@@ -136,16 +136,15 @@ class Sweep(Question[list[SweepPoint]]):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """See ``Question``."""
         return {**super().inputs, "axes": {axis.name: list(axis.values) for axis in self.axes}}
 
     @property
     def total(self) -> int:
-        """See ``Question``: an NLP solver solves twice at each point of the grid."""
+        # An NLP solver solves twice at each point of the grid.
         return math.prod(len(axis.values) for axis in self.axes) * (2 if self.algorithm in GRADIENT_SOLVERS else 1)
 
     def find(self, work: Work) -> Iterator[list[SweepPoint]]:
-        """See ``Question``; the points are in row-major order of the axes."""
+        """Yield the points, in row-major order of the axes."""
         path, tasks = self._path, self._tasks
         ends: Sequence[Solution | RunRecord | None]
         interrupt = None
@@ -192,7 +191,6 @@ class Sweep(Question[list[SweepPoint]]):
         return [Task(problem=problem, solver=self.algorithm, stop=stop, seed=self.seed) for problem in problems]
 
     def report(self, findings: list[SweepPoint]) -> Answer:
-        """See ``Question``."""
         problem, objective, axes = self.problem, self.problem.objective, tuple(findings[0].at)
         solver = Task(problem=ProblemSpec(name=problem), solver=self.algorithm).title
         stem = f"{problem.name}-sweep-{'-'.join(axes)}-{solver}"

@@ -63,11 +63,9 @@ class Motions(Question[tuple[Motion, ...]]):
 
     @property
     def total(self) -> int:
-        """See ``Question``."""
         return len(self.tasks)
 
     def find(self, work: Work) -> Iterator[tuple[Motion, ...]]:
-        """See ``Question``."""
         motions: tuple[Motion, ...] = ()
         for task in self.tasks:
             motions = (*motions, solve_motion(task, motions, self.seed, work))
@@ -75,7 +73,6 @@ class Motions(Question[tuple[Motion, ...]]):
             yield motions
 
     def report(self, findings: tuple[Motion, ...]) -> Answer:
-        """See ``Question``."""
         name, stem, base = self.problem.name, f"{self.problem.name}-motions", findings[0].power_W
         over = "Least power over the coefficients beyond the paper's cubics, with the limit of the richest motions."
         return Answer(
@@ -110,7 +107,6 @@ class Motions(Question[tuple[Motion, ...]]):
         )
 
     def failures(self, findings: tuple[Motion, ...]) -> list[str]:
-        """See ``Question``."""
         return [f"{motion.task.label}: {motion.status}" for motion in findings if not motion.feasible]
 
 

@@ -104,7 +104,6 @@ class ParetoFront(Question[FoundFront]):
         return make_competing_objective(self.objective, self.problem)
 
     def find(self, work: Work) -> Iterator[FoundFront]:
-        """See ``Question``."""
         criterion, problem = self.criterion, self.criterion.drop_demand(self.problem)
         effort = {"points": self.points, "starts": self.starts, "seed": self.seed}
         inputs = {**fingerprint(problem), "criterion": criterion.name, **effort}
@@ -130,7 +129,6 @@ class ParetoFront(Question[FoundFront]):
             yield FoundFront(front, find_bends(front))
 
     def report(self, findings: FoundFront) -> Answer:
-        """See ``Question``."""
         problem, criterion, challenge = self.problem, self.criterion, findings.challenge
         stem = f"{problem.name}-front-{criterion.name}"
         shown = "The front as a line, its knees, and what the searches found; its cheap part on the right."

@@ -87,7 +87,6 @@ class ParetoSurface(Question[FoundSurface]):
         return second.drop_demand(first.drop_demand(self.problem))
 
     def find(self, work: Work) -> Iterator[FoundSurface]:
-        """See ``Question``."""
         first, second = self.criteria
         problem, solver = self.drop_demands(), work.solver()
         side = math.ceil(math.sqrt(self.points))
@@ -127,7 +126,6 @@ class ParetoSurface(Question[FoundSurface]):
         yield FoundSurface(tuple(points), tuple(infeasible))
 
     def report(self, findings: FoundSurface) -> Answer:
-        """See ``Question``."""
         problem, names = self.drop_demands(), "-".join(self.objectives)
         points, infeasible = findings
         shown = "Least power over the first demand; the colour shows the second one."

@@ -88,7 +88,6 @@ class Prices(Question[FoundPrices]):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """See ``Question``."""
         return {**self._solving, "checks": self.checks}
 
     @property
@@ -97,7 +96,7 @@ class Prices(Question[FoundPrices]):
         return {"starts": self.starts, "seed": self.seed, "solver": solver.name, "settings": solver.to_dict()}
 
     def find(self, work: Work) -> Iterator[FoundPrices]:
-        """See ``Question``; InputError if there is no optimum, the solver has no multipliers, or the problem is too large."""
+        """Yield the prices; InputError if there is no optimum, the solver has no multipliers, or the problem is too large."""
         problem = self.problem
         work.progress("solving")
         near = find_cheapest_feasible(
@@ -145,7 +144,6 @@ class Prices(Question[FoundPrices]):
         )
 
     def report(self, findings: FoundPrices) -> Answer:
-        """See ``Question``."""
         problem, stem = self.problem, f"{self.problem.name}-prices"
         objective, ranges = problem.objective, problem.by_name(problem.scale)
         steps = (heading(words, objective.unit) for words in ("by the slope", "- step", "+ step"))

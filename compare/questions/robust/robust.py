@@ -66,7 +66,6 @@ class Robust(Question[FoundRobust]):
         return make_boxes(self.problem, self.mass / 100.0, self.sole / 1000.0)
 
     def find(self, work: Work) -> Iterator[FoundRobust]:
-        """See ``Question``."""
         gaits: tuple[RobustGait, ...] = ()
         for name, box in self._make_boxes().items():
             gait = solve_robust(
@@ -78,7 +77,6 @@ class Robust(Question[FoundRobust]):
             yield FoundRobust(gaits, tuple(simulate_robots(self.problem, gaits[-1], work)))
 
     def report(self, findings: FoundRobust) -> Answer:
-        """See ``Question``."""
         gaits, simulations = findings
         name, stem, widest = self.problem.name, f"{self.problem.name}-robust", gaits[-1]
         shown = "Power with the nominal robot and in the worst corner" + (

@@ -89,16 +89,15 @@ class CheapestWalk(Question[FoundGaits]):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        """See ``Question``; simulations and planners do not change the gaits."""
+        # Simulations and planners do not change the gaits.
         return {"over": {self.axis.name: list(self.axis.values)}, "starts": self.starts, "seed": self.seed}
 
     @property
     def total(self) -> int:
-        """See ``Question``: two solves, a simulation and the planners at each point."""
+        # Two solves, a simulation and the planners at each point.
         return len(self.axis.values) * (2 + bool(self.steps) + len(set(self.planners)))
 
     def find(self, work: Work) -> Iterator[FoundGaits]:
-        """See ``Question``."""
         problem, gaits = self.problem, list[Gait]()
         for points in Sweep(problem=problem, axes=[self.axis], starts=self.starts, seed=self.seed).find(work):
             gaits = [make_gait(problem, point) for point in points]
@@ -116,7 +115,6 @@ class CheapestWalk(Question[FoundGaits]):
             yield FoundGaits(tuple(gaits), others)
 
     def report(self, findings: FoundGaits) -> Answer:
-        """See ``Question``."""
         gaits, others = findings
         problem, name = self.problem, self.axis.name
         feasible = [gait for gait in gaits if gait.point.feasible]
@@ -158,7 +156,6 @@ class CheapestWalk(Question[FoundGaits]):
         )
 
     def failures(self, findings: FoundGaits) -> list[str]:
-        """See ``Question``."""
         first = findings.gaits[0].point
         return [] if any(gait.point.feasible for gait in findings.gaits) else [first.status]
 
