@@ -32,10 +32,10 @@ def decode(
     unread: Collection[str] = (),
     ignore_unknown: bool = False,
 ) -> T:
-    """Return an instance of a dataclass.
+    """Return an instance of a dataclass with fields of texts, numbers, booleans, tuples, mappings from text, dataclasses, unions.
 
     Args:
-        cls: with fields of texts, numbers, booleans, tuples, mappings from text, dataclasses, literals and unions.
+        cls: the dataclass.
         raw: data from JSON.
         where: place in the file, for messages.
         given: fields that are not in the file.
@@ -63,17 +63,7 @@ def decode(
 
 
 def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[GaitError]) -> T:
-    """Return an instance of a dataclass from a JSON file.
-
-    Args:
-        cls: of the instance, see ``decode``.
-        path: of the file.
-        what: kind of file, for messages.
-        error: class to raise.
-
-    Raises:
-        GaitError: of that class: the file cannot be read or decoded.
-    """
+    """Return an instance of a dataclass from a JSON file, see ``decode``; raises ``error`` if it cannot be read or decoded."""
     raw = read_json(path, what, error=error)
     with convert_errors(f"{what} {str(path)!r}", error):
         return decode(cls, raw)

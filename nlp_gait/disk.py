@@ -16,11 +16,7 @@ NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno
 
 
 def rename(path: Path, target: Path) -> None:
-    """Rename a file within its folder, durably, replacing an existing file.
-
-    Raises:
-        OSError: no permission, no such file.
-    """
+    """Rename a file within its folder, durably, replacing an existing file; raises OSError."""
     path.replace(target)
     flush(target.parent)
 
@@ -53,11 +49,7 @@ def _fsync(descriptor: int) -> None:
 
 
 def make_folder(path: Path, mode: int = 0o777) -> None:
-    """Make a folder and its parents, durably; an existing folder is left alone.
-
-    Raises:
-        OSError: it cannot be made.
-    """
+    """Make a folder and its parents, durably; an existing folder is left alone; raises OSError."""
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     path.mkdir(mode=mode, parents=True, exist_ok=True)
     for folder in reversed(missing):

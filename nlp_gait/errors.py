@@ -58,13 +58,7 @@ class WorkerError(GaitError):
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """Return the error for an unknown name, with the nearest known ones.
-
-    Args:
-        kind: what was looked up, for example ``"problem"``.
-        name: what the user gave.
-        known: all allowed names.
-    """
+    """Return the error for an unknown name of a kind, for example ``"problem"``, with the nearest of all known names."""
     if not isinstance(name, str):
         return UnknownNameError(f"the name of {_with_article(kind)} must be a text, got {format_value(name)}")
     choices = sorted(known)
@@ -84,17 +78,7 @@ def check_name(kind: str, name: object) -> None:
 
 
 def check_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:
-    """Return a whole number within limits, also one of NumPy; True and False are refused.
-
-    Args:
-        name: of the argument, for the message.
-        value: of the argument.
-        at_least: smallest allowed value.
-        at_most: largest; None for no limit.
-
-    Raises:
-        InputError: it is not such a number.
-    """
+    """Return a whole number within limits, also one of NumPy; raises InputError, also for True and False."""
     whole = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if whole is None or whole < at_least or (at_most is not None and whole > at_most):
         limit = "" if at_most is None else f" and <= {at_most}"

@@ -42,17 +42,11 @@ def make_file_name(name: str) -> str:
 def read_bytes(
     path: Path, what: str, *, error: type[GaitError] = InputError, at_most: int = LARGEST_FILE, remedy: str = ""
 ) -> bytes:
-    """Return the content of a regular file.
-
-    Args:
-        path: of the file; a link to a regular file is followed.
-        what: kind of file, for messages.
-        error: class to raise.
-        at_most: bytes.
-        remedy: what to do about it, appended to the message.
+    """Return the content of a regular file of at most so many bytes, or of a link to one.
 
     Raises:
-        GaitError: of that class: it cannot be read, is not a regular file, or is too long.
+        GaitError: of class ``error``: it cannot be read, is not a regular file, or is too long. The message contains the kind of
+            file, ``what``, and ends with what to do, ``remedy``.
     """
     with convert_errors(f"{what} {str(path)!r} cannot be read", error, remedy):
         # Opening a pipe would wait for its writer.

@@ -13,17 +13,12 @@ from types import FrameType
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, with the partial result; it propagates as every KeyboardInterrupt does.
-
-    Attributes:
-        sentence: how far the work had come.
-        partial: the result so far; may be empty.
-    """
+    """Ctrl-C, with the partial result; it propagates as every KeyboardInterrupt does."""
 
     def __init__(self, sentence: str, partial: object) -> None:
         super().__init__(sentence, partial)  # both, else it cannot be pickled
-        self.sentence = sentence
-        self.partial = partial
+        self.sentence = sentence  # how far the work had come
+        self.partial = partial  # may be empty
 
     def __str__(self) -> str:
         return self.sentence

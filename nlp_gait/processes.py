@@ -138,17 +138,12 @@ def _raise_errors(result: Any) -> Any:
 
 
 def run_in_isolation(call: Callable[[], bytes], time_limit_s: float | None, most_bytes: int) -> bytes:
-    """Return what a call returns in a forked process with its own session, without input and output.
+    """Return what a call returns, at most so many bytes, in a forked process with its own session, without input and output.
 
-    The process and everything that it has started are killed at the end.
-
-    Args:
-        call: may hang, crash, exit or print.
-        time_limit_s: None waits forever [s].
-        most_bytes: longest result.
+    The call may hang, crash, exit or print. Its process and everything that it has started are killed at the end.
 
     Raises:
-        TimeoutError: the time limit has passed.
+        TimeoutError: the time limit, if there is one, has passed.
         WorkerError: the process ended without a result; the message says how.
     """
     process, results = _fork(lambda sender: _isolate(sender, call))
@@ -189,11 +184,7 @@ def _isolate(sender: Connection, call: Callable[[], bytes]) -> None:
 
 
 def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
-    """Call picklable functions in worker processes; yield the key and the result of each as it finishes.
-
-    Args:
-        calls: functions by key.
-        workers: number of processes; -1 takes all of joblib's backend.
+    """Call picklable functions in so many processes (-1: all of joblib's backend); yield key and result of each as it finishes.
 
     Raises:
         WorkerError: a worker process died, or none starts.

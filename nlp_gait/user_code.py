@@ -65,14 +65,10 @@ def is_user_code(text: str, kind: Kind) -> bool:
     return is_reference(text) or text in find_entry_points(kind)
 
 
-def find_entry_points(kind: Kind) -> dict[str, str]:
+@cache  # searching all packages is slow
+def find_entry_points(kind: Kind) -> Mapping[str, str]:
     """Return the references of installed packages' entry points by name."""
-    return dict(_entry_points(kind))
-
-
-@cache
-def _entry_points(kind: Kind) -> tuple[tuple[str, str], ...]:  # searching all packages is slow
-    return tuple((point.name, point.value) for point in entry_points(group=GROUPS[kind]))
+    return {point.name: point.value for point in entry_points(group=GROUPS[kind])}
 
 
 def shorten_name(text: str) -> str:
@@ -92,12 +88,9 @@ def allow_code(text: str, kind: Kind) -> None:
 
 
 def resolve_code(text: str, kind: Kind, owner: str) -> str:
-    """Return the reference of code in a data file as the user gave it in this process; entry points are always allowed.
+    """Return the reference of code in a data file (the owner) as the user gave it in this process.
 
-    Args:
-        text: reference in the file.
-        kind: of code.
-        owner: the file, for messages.
+    Entry points are always allowed.
 
     Raises:
         UserCodeError: the user did not name this code.

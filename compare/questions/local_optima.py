@@ -72,15 +72,9 @@ def run_starts(
     solver: Solver | None = None,
     progress: Progress = ignore_progress,
 ) -> Ends:
-    """Run a solver from random starts, in stored batches; the start points of batch k depend on the seed and k only.
+    """Run a solver (by default IPOPT) from random starts, in stored batches, with a note about each of them.
 
-    Args:
-        problem: with its current parameter values.
-        store: of finished batches.
-        starts: number of starts.
-        seed: of the start points.
-        solver: with its settings; None for IPOPT with its defaults.
-        progress: receives a note at the start and the end of each batch.
+    The start points of batch k depend on the seed and k only.
 
     Raises:
         InputError: fewer than one start.

@@ -368,10 +368,7 @@ class GaitProblem:
     def build_once(self, build: Callable[Concatenate[GaitProblem, P], T], *arguments: P.args, **named: P.kwargs) -> T:
         """Return ``build(self, ...)``, computed once for all copies that differ in parameter values only.
 
-        Args:
-            build: function of a module or class; it reads the mathematics, not the parameter values.
-            arguments: further ones, hashable.
-            named: likewise.
+        ``build`` is a function of a module or class; it reads the mathematics, not the parameter values. Arguments are hashable.
         """
         key = (build, arguments, tuple(sorted(named.items())))
         return self._cache.get(key, lambda: build(self, *arguments, **named))

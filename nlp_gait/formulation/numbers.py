@@ -22,11 +22,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def to_floats(what: str, values: object) -> Array:
-    """Return values of any shape as doubles, copied only if necessary; they need not be finite.
-
-    Args:
-        what: subject of messages.
-        values: array-like.
+    """Return array-like values of any shape as doubles, copied only if necessary; they need not be finite.
 
     Raises:
         InputError: complex or masked numbers, texts, dates, true or false, which NumPy would convert silently.

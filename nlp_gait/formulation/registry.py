@@ -72,9 +72,8 @@ def problem_names() -> tuple[str, ...]:
 def find_maker(name: str) -> Maker:
     """Return the function that makes a problem; its keyword arguments are the problem's options.
 
-    Args:
-        name: of a problem of this package or of an installed package's entry point, or ``file.py:name`` or ``module:name`` of
-            a maker or a ``GaitProblem``.
+    The name is that of a problem of this package or of an installed package's entry point, or ``file.py:name`` or ``module:name``
+    of a maker or a ``GaitProblem``.
 
     Raises:
         UnknownNameError: no such problem.
@@ -176,11 +175,7 @@ def _choices(make: Maker) -> dict[str, tuple[str, ...]]:
 
 
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
-    """Return a problem by name, built with the given options; the others keep their defaults.
-
-    Args:
-        name: see ``find_maker``.
-        options: of its maker.
+    """Return a problem by name, see ``find_maker``, built with the given options; the others keep their defaults.
 
     Raises:
         UnknownNameError: no such problem or option.

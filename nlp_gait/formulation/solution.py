@@ -183,8 +183,7 @@ class Solution:
     def signals(self, problem: GaitProblem | None = None) -> Signals:
         """Return time histories at x.
 
-        Args:
-            problem: that was solved; None to load it by name, which a user-defined problem may not have.
+        The problem that was solved is loaded by name if it is not given, which may be impossible for a user-defined one.
 
         Raises:
             UnknownNameError: no problem has that name.
@@ -195,12 +194,7 @@ class Solution:
     def plot(self, problem: GaitProblem | None = None) -> Any:
         """Plot the gait with Matplotlib: stick figures from the side, power and balance margin over time.
 
-        Args:
-            problem: as in ``signals``.
-
-        Raises:
-            UnknownNameError: no problem has that name.
-            InputError: the problem has no time histories.
+        The problem and the errors are as for ``signals``.
         """
         plot_gait: Any = import_object(FUNCTIONS["plot_gait"])
         return plot_gait(self._restore(problem), self.x, self.solver)

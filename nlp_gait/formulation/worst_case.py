@@ -17,9 +17,6 @@ def make_worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
 
     Limits, bounds and parameter values are those of the first scenario.
 
-    Args:
-        scenarios: problems with the same variables and parameters and an objective that is minimised.
-
     Raises:
         InputError: no scenarios, different variables or parameters, or an objective that is maximised.
     """

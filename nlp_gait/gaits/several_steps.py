@@ -27,16 +27,9 @@ MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
 def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
-    """Return time histories of several steps.
+    """Return time histories of several steps, each ``rise_m`` above the last; InputError for less than one.
 
-    Args:
-        cycle: one step that starts on the left foot and ends in the mirror image of its start.
-        robot: whose joints are mirrored.
-        steps: at least 1.
-        rise_m: height gained per step.
-
-    Raises:
-        InputError: no step.
+    The cycle is a step that starts on the left foot and ends in the mirror image of its start.
     """
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps must be a whole number >= 1, got {steps!r}")

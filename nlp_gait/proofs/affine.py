@@ -38,30 +38,17 @@ AFFINE_SOURCES = ("intervals.hpp", "affine.hpp")
 
 
 class AffineForms(NamedTuple):
-    """Affine forms of M outputs over P boxes, along n symbols in [-1, 1].
+    """Affine forms of M outputs over P boxes, along n symbols in [-1, 1]."""
 
-    Attributes:
-        middle: (P, M).
-        slopes: (P, M, n).
-        error: (P, M); infinite where there is no form.
-        lower: (P, M) of the range.
-        upper: (P, M).
-    """
-
-    middle: Array
-    slopes: Array
-    error: Array
-    lower: Array
-    upper: Array
+    middle: Array  # (P, M)
+    slopes: Array  # (P, M, n)
+    error: Array  # (P, M); infinite where there is no form
+    lower: Array  # (P, M) of the range
+    upper: Array  # (P, M)
 
 
 class AffineFunction:
-    """CasADi function over boxes; calls are thread-safe.
-
-    Attributes:
-        inputs: number of scalar inputs, over all arguments.
-        outputs: number of scalar outputs, over all results.
-    """
+    """CasADi function over boxes; calls are thread-safe."""
 
     def __init__(self, function: ca.Function, half_open: Collection[int] = ()) -> None:
         """Read the function's instructions.
@@ -77,7 +64,7 @@ class AffineFunction:
         """
         self._library = _library()
         scalar = function if function.is_a("SXFunction") else function.expand()
-        self.inputs, self.outputs = scalar.numel_in(), scalar.numel_out()
+        self.inputs, self.outputs = scalar.numel_in(), scalar.numel_out()  # scalar ones, over all arguments and results
         self._code, self._constants = _encode(scalar, half_open)
         self._slots = max(int(self._code[:, 1:].max(initial=0)), scalar.sz_w()) + 1
 
@@ -110,15 +97,9 @@ class AffineFunction:
 
 
 def load_native(sources: Sequence[str], functions: Mapping[str, tuple[Any, Sequence[Any]]], *flags: str) -> ctypes.CDLL:
-    """Compile files of ``native/`` to one library, or load it from the cache.
+    """Compile files of ``native/`` to one library, or load it from the cache; raises CompilerError.
 
-    Args:
-        sources: names of the files, in their order.
-        functions: types of the result and the arguments of each function, by name without prefix.
-        flags: more flags of the compiler.
-
-    Raises:
-        CompilerError: there is no compiler, or it fails.
+    Functions are given by their names without prefix, with the types of the result and of the arguments.
     """
     text = "\n".join((NATIVE / name).read_text(encoding="utf-8") for name in sources)
     names = [f"nlp_gait_{name}" for name in functions]

@@ -6,19 +6,21 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.power_form import AGREEMENT, WIDENING, PowerForm
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
-from nlp_gait.proofs.boxes import Flags, Numbers, Remaining, prune_in_threads
+from nlp_gait.proofs.boxes import Flags, Numbers, Remaining
 from nlp_gait.proofs.quadratic import QuadraticFunction
 
 # A box is enclosed again if an edge shrinks by this share, in so many rounds at most.
@@ -32,20 +34,27 @@ WIDTH_WEIGHT = 0.3
 POINTS, TRIES, SEED = 10, 10_000, 5
 
 
-class Bounds(Protocol):
-    """Bounds over boxes of z, which are the points x in some coordinates.
+class Bounds(ABC):
+    """Bounds over boxes of z, which are the points x in some coordinates."""
 
-    Attributes:
-        root: (1, n, 2) box that contains the z of all x within their bounds.
-    """
-
-    root: Array
+    root: Array  # (1, n, 2) box that contains the z of all x within their bounds
 
     def to_z(self, x: Array) -> Array:
         """Return the z (P, n) of points (P, n)."""
+        return x
 
     def prune(self, boxes: Array, target: float) -> Remaining:
         """Remove from boxes (P, n, 2), each independently of the others, all that has no feasible point below the target."""
+        parts = np.array_split(np.arange(len(boxes)), max(1, min(available_cores(), len(boxes) // 64)))
+        if len(parts) == 1:
+            return self._prune(boxes, target)
+        with ThreadPoolExecutor(len(parts)) as threads:
+            found = list(threads.map(lambda part: self._prune(boxes[part], target), parts))
+        whole = Remaining(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+        return whole._replace(origin=np.concatenate([part[f.origin] for part, f in zip(parts, found, strict=True)]))
+
+    @abstractmethod
+    def _prune(self, boxes: Array, target: float) -> Remaining: ...
 
 
 def make_bounds(problem: GaitProblem) -> Bounds:
@@ -68,13 +77,8 @@ def _power_bounds(problem: GaitProblem) -> PowerBounds:
     return PowerBounds(problem)
 
 
-class AffineBounds:
-    """Affine bounds of a problem's exact functions over boxes of its variables.
-
-    Attributes:
-        function: of x and p to cost and rows; the last n rows are the variables themselves.
-        root: (1, n, 2) box of all variables' bounds.
-    """
+class AffineBounds(Bounds):
+    """Affine bounds of a problem's exact functions over boxes of its variables."""
 
     def __init__(self, problem: GaitProblem) -> None:
         kernel = build_kernel(problem)
@@ -85,16 +89,9 @@ class AffineBounds:
         self._p = np.stack([problem.p] * 2, axis=-1)
         self._symbols = np.concatenate([np.arange(n), np.full(len(problem.p), -1)])
         self._scale = problem.scale
+        # Of x and p to cost and rows; the last n rows are the variables themselves.
         self.function = AffineFunction(kernel.function)
         self.root = np.stack([problem.lower, problem.upper], axis=-1)[None]
-
-    def to_z(self, x: Array) -> Array:
-        """Return the points themselves."""
-        return x
-
-    def prune(self, boxes: Array, target: float) -> Remaining:
-        """Remove all that has no feasible point below the target."""
-        return prune_in_threads(lambda part: self._prune(part, target), boxes)
 
     def _prune(self, boxes: Array, target: float) -> Remaining:
         origin, done = np.arange(len(boxes)), list[Remaining]()
@@ -161,12 +158,8 @@ class AffineBounds:
         return np.asarray(score.argmax(axis=-1))
 
 
-class PowerBounds:
-    """Bounds of the least power over boxes of z, from forms of degree two.
-
-    Attributes:
-        root: (1, n, 2) box that contains the z of all x within their bounds.
-    """
+class PowerBounds(Bounds):
+    """Bounds of the least power over boxes of z, from forms of degree two."""
 
     def __init__(self, problem: GaitProblem) -> None:
         if problem.power_form is None:
@@ -174,19 +167,16 @@ class PowerBounds:
         form = problem.power_form(problem)
         _compare(problem, form)
         self._function, self._poses = QuadraticFunction(form.function), QuadraticFunction(form.poses)
-        self._rows, self._pose_lower, self._pose_upper = (
-            form.rows,
-            *(bound[form.pose_rows] for bound in (form.rows.lower, form.rows.upper)),
-        )
-        self.root, self.to_z = form.box[None], form.to_z
+        self._form, self.root = form, form.box[None]
 
-    def prune(self, boxes: Array, target: float) -> Remaining:
-        """Remove all that has no feasible point below the target."""
-        return prune_in_threads(lambda part: self._prune(part, target + WIDENING * abs(target)), boxes)
+    def to_z(self, x: Array) -> Array:
+        """Return the z of the form."""
+        return self._form.to_z(x)
 
     def _prune(self, boxes: Array, target: float) -> Remaining:
-        contracted, left = self._poses.contract(boxes, self._pose_lower, self._pose_upper)
-        found = self._function.prune(contracted[left], target, self._rows)
+        rows, poses = self._form.rows, self._form.pose_rows
+        contracted, left = self._poses.contract(boxes, rows.lower[poses], rows.upper[poses])
+        found = self._function.prune(contracted[left], target + WIDENING * abs(target), rows)
         return found._replace(origin=np.flatnonzero(left)[found.origin])
 
 

@@ -37,30 +37,19 @@ CHECKPOINT_S = 30.0
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """Proven bound on the objective.
+    """Proven bound on the objective."""
 
-    Attributes:
-        objective: exact value of the incumbent, in the problem's sense.
-        bound: no x within the variables' bounds that the judge finds feasible has a better objective; not finite if the time
-            limit came before any bound.
-        tolerance: requested relative distance of bound and objective.
-        closed: whether that distance was reached.
-        boxes: number of boxes that were enclosed.
-        left: number of boxes neither dropped nor halved at the end.
-        time_s: wall time [s].
-        cpu_s: processor time [s].
-        x: the incumbent.
-    """
-
-    objective: float
+    objective: float  # exact value of the incumbent, in the problem's sense
+    # No x within the variables' bounds that the judge finds feasible has a better objective; not finite if the time limit came
+    # before any bound
     bound: float
-    tolerance: float
-    closed: bool
-    boxes: int
-    left: int
-    time_s: float
-    cpu_s: float
-    x: tuple[float, ...]
+    tolerance: float  # requested relative distance of bound and objective
+    closed: bool  # whether that distance was reached
+    boxes: int  # number of boxes that were enclosed
+    left: int  # number of boxes neither dropped nor halved at the end
+    time_s: float  # wall time [s]
+    cpu_s: float  # processor time [s]
+    x: tuple[float, ...]  # the incumbent
 
     @property
     def gap(self) -> float:
@@ -120,7 +109,10 @@ def certify(
     identity = hash_json(
         {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()}
     )
-    tree = _read_checkpoint(checkpoint, identity) or _plant(bounds, target)
+    tree = _read_checkpoint(checkpoint, identity)
+    if tree is None:
+        whole = bounds.prune(bounds.root, target)
+        tree = _Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
     saved, deadline = started, started + time_limit_s
     started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
 
@@ -155,11 +147,6 @@ def certify(
 def target_cost(cost: float, tolerance: float) -> float:
     """Return the cost to prove as a lower bound."""
     return cost - tolerance * abs(cost)
-
-
-def _plant(bounds: Bounds, target: float) -> _Tree:
-    boxes, lowest, cut, origin = bounds.prune(bounds.root, target)
-    return _Tree(boxes=boxes, lowest=lowest, cut=cut, depth=np.zeros(len(origin)))
 
 
 def _halve_best(tree: _Tree, bounds: Bounds, target: float) -> None:

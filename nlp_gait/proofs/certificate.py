@@ -67,11 +67,7 @@ def make_certificate_file(problem: GaitProblem, certificate: Certificate) -> Cer
 
 
 def read_certificate(path: Path) -> CertificateFile:
-    """Read a certificate.
-
-    Raises:
-        InputError: the file is not a certificate.
-    """
+    """Read a certificate; raises InputError if the file is not one."""
     raw = read_json(path, "certificate")
     with convert_errors(f"certificate {str(path)!r} is damaged", InputError):
         return decode(CertificateFile, raw)
@@ -90,21 +86,12 @@ def _load_bounds() -> Mapping[str, float]:
 
 
 def proven_bound(problem: Mapping[str, Any]) -> float | None:
-    """Return the objective that no feasible point betters, from the shipped certificates; None without one.
-
-    Args:
-        problem: as in a definition, with the hash of its mathematics and numbers.
-    """
+    """Return the objective that no feasible point of a problem betters; None without a shipped certificate."""
     return _load_bounds().get(str(problem.get(HASH, "")))
 
 
 def check_certificate(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
-    """Follow random paths of a proof again: both halves of a box are bounded, and the path continues in one that remains.
-
-    Args:
-        file: of a closed proof.
-        paths: number of paths.
-        seed: of the choice.
+    """Follow random paths of a closed proof: both halves of a box are bounded, and the path continues in one that remains.
 
     Raises:
         InputError: the proof is not closed, the problem has changed, the incumbent is infeasible or has another objective, or a

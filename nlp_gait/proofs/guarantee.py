@@ -119,8 +119,7 @@ def _search_phase(problem: GaitProblem, phase: TimeFunctions, x: Array) -> _Phas
         limits[[k - plain for k in phase.squares if shift is None]] **= 2
         search.sharpen_integrals(limits)
         result = result._replace(pieces=result.pieces + search.count)
-        for k in search.open_rows:
-            a, b = search.first[k]
+        for k, (a, b) in sorted(search.first.items()):
             piece = start + a * (end - start), start + b * (end - start)
             result.violations.append(_violation(rows, k, piece, float(search.least[k]), float(search.most[k])))
         for k, (low, high) in enumerate(zip(*search.integrals(), strict=True), start=plain):

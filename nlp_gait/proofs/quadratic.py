@@ -40,23 +40,14 @@ class _PowerRows(ctypes.Structure):
 
 
 class QuadraticForms(NamedTuple):
-    """Forms of M outputs over P boxes of n variables, symbols in [-1, 1].
+    """Forms of M outputs over P boxes of n variables, symbols in [-1, 1]."""
 
-    Attributes:
-        middle: (P, M).
-        slopes: (P, M, n).
-        bends: (P, M, n (n + 1) / 2) coefficients of e_i e_j with i <= j, at j (j + 1) / 2 + i.
-        error: (P, M); infinite where there is no form.
-        lower: (P, M) of the range.
-        upper: (P, M).
-    """
-
-    middle: Array
-    slopes: Array
-    bends: Array
-    error: Array
-    lower: Array
-    upper: Array
+    middle: Array  # (P, M)
+    slopes: Array  # (P, M, n)
+    bends: Array  # (P, M, n (n + 1) / 2) coefficients of e_i e_j with i <= j, at j (j + 1) / 2 + i
+    error: Array  # (P, M); infinite where there is no form
+    lower: Array  # (P, M) of the range
+    upper: Array  # (P, M)
 
 
 class QuadraticFunction:
@@ -64,10 +55,6 @@ class QuadraticFunction:
 
     The minimum of an expression and a number is taken as the expression: the result is valid for those points of a box at which
     the expression is at most the number.
-
-    Attributes:
-        inputs: number of inputs, at most ``MOST_SYMBOLS``.
-        outputs: number of outputs.
     """
 
     def __init__(self, function: ca.Function) -> None:

@@ -17,12 +17,7 @@ from nlp_gait.symbolic.nonsmooth import Exact
 
 
 class Enclosed:
-    """Enclosed function of several values, and of groups of them where that is far less work.
-
-    Attributes:
-        whole: function of all values.
-        groups: indices of the values of each group.
-    """
+    """Enclosed function of several values, and of groups of them where that is far less work."""
 
     def __init__(self, function: ca.Function, half_open: Collection[int], groups: Sequence[Sequence[int]]) -> None:
         """Read the instructions of a function of SX expressions with one result.
@@ -32,7 +27,7 @@ class Enclosed:
             CompilerError: there is no compiler, or it fails.
         """
         self.whole = AffineFunction(function, half_open)
-        self.groups = [np.array(group) for group in groups]
+        self.groups = [np.array(group) for group in groups]  # indices of the values of each
         self._function, self._half_open = function, half_open
         self._parts: dict[int, EnclosedPart] = {}
 

@@ -59,21 +59,15 @@ def bound_violation(lower: Array, upper: Array, low: Array, high: Array) -> tupl
 
 
 class TimeSearch:
-    """Halving of pieces until every row is proven to be satisfied, or its violation is known well enough.
-
-    Attributes:
-        count: number of pieces that were enclosed.
-        first: earliest piece in which a row is not proven to be satisfied, by the row's index.
-        least: (m,) lower bounds of the largest violations.
-        most: (m,) upper bounds of them.
-    """
+    """Halving of pieces until every row is proven to be satisfied, or its violation is known well enough."""
 
     def __init__(self, values: Enclosed, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
         self._values, self._given, self._shift = values, given, shift
         self._lower, self._upper = lower, upper
-        self.count = 0
-        self.least = np.full(len(lower), -np.inf)
+        self.count = 0  # of pieces that were enclosed
+        self.least = np.full(len(lower), -np.inf)  # bounds of the largest violation of each row
         self.most = np.full(len(lower), -np.inf)
+        # By the row's index: the earliest piece in which it is not proven to be satisfied.
         self.first: dict[int, tuple[float, float]] = {}
         self._settled: tuple[Array, Array]
 
@@ -105,11 +99,6 @@ class TimeSearch:
             low, high = forms.lower[:, part.columns], forms.upper[:, part.columns]
             work += part.work * len(pieces)
 
-    @property
-    def open_rows(self) -> list[int]:
-        """Indices of the rows that are not proven to be satisfied."""
-        return sorted(self.first)
-
     def integrals(self) -> tuple[Array, Array]:
         """Return bounds (k,) and (k,) of the integrals over the phase of the values that follow the rows."""
         low, high = self._settled[1].sum(axis=0).T
@@ -118,8 +107,7 @@ class TimeSearch:
     def sharpen_integrals(self, limits: Array) -> None:
         """Halve the pieces that add most to the width of the integrals' bounds, until these are narrow.
 
-        Args:
-            limits: (k, 2) of the integrals; bounds on both sides of a limit are never narrow.
+        They need not be narrow on both sides of the limits (k, 2) of the integrals.
         """
         pieces, parts = self._settled
         while parts.shape[1]:

@@ -94,12 +94,7 @@ def joint_angles(q: Array, *, rates: bool = False) -> Array:
 
 
 def joint_torques(model: Array, stance_toe: Array) -> Array:
-    """Return joint torques (T, 8) from those of the model (T, 7), in the order of its JOINTS [Nm].
-
-    Args:
-        model: as ``loads`` gives them.
-        stance_toe: (T,) of the standing toe, which the model joins with its sole [Nm].
-    """
+    """Return joint torques (T, 8) from ``loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
     columns = []
     for name in JOINTS:
         if name in MODEL_JOINT:

@@ -60,13 +60,7 @@ class ClosedLoop:
     inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
-        """Return states, torques and ZMP.
-
-        Args:
-            point: with the problem's parameters.
-            tuned: K_p (gains,), K_d (gains,) and the desired torso pitch; gains are not negative.
-            ops: interpretation of non-smooth operations.
-        """
+        """Return states, torques and ZMP for tuned K_p (gains,), K_d (gains,) >= 0 and desired torso pitch."""
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM

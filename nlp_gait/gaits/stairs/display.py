@@ -74,12 +74,7 @@ class StepMotion(NamedTuple):
 
 
 def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repeats: bool = False) -> SimulationModel:
-    """Return the model of a step for the engine.
-
-    Args:
-        step_motion: function of a gait to its step.
-        repeats: the step ends as it began, one step up and with the legs exchanged.
-    """
+    """Return the engine's model of a step; one that repeats ends as it began, one step up and with the legs exchanged."""
 
     def motion(at: NumericPoint, steps: int) -> Signals:
         _, rise = _stair(at)
@@ -97,16 +92,9 @@ def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repea
 def make_standing_step(
     t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array, double_support_s: float
 ) -> StepMotion:
-    """Return a step over the flat stance foot.
+    """Return a step over the flat stance foot, with load on the rear foot for some time.
 
-    Args:
-        t: (T,) [s].
-        q: (T, 7) absolute angles of the moving links [rad].
-        qd: (T, 7) [rad/s].
-        qdd: (T, 7) [rad/s^2].
-        toe: (T, 2) force of the ground on the rear toe [N].
-        sole: (T, 2) on the rear sole joint [N].
-        double_support_s: duration of load on the rear foot.
+    Angles q (T, 7) of the moving links are absolute [rad]; the ground's forces act on the rear toe and sole joint, (T, 2) [N].
     """
     torque, stance, pressure, toe_x, sole_x = (
         np.array(part).T for part in _loads().map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
@@ -133,17 +121,10 @@ def compute_ground_force(q: Array, qd: Array, qdd: Array) -> Array:
 
 
 def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, double_support_s: float) -> StepMotion:
-    """Return a step whose links were driven by torques against the world.
+    """Return a step whose links were driven by torques (T, 9) against the world [Nm].
 
     No motor acts on a link against the world. Joints that give seven links their torques, and the standing toe, leave a
-    moment on the stance foot, which the ground takes.
-
-    Args:
-        t: (T,) [s].
-        state: (T, 18) angles and rates of the links [rad], [rad/s].
-        torque: (T, 9) on the links [Nm].
-        pressure: (T,) ahead of the stance ankle [m].
-        double_support_s: duration of load on the rear foot.
+    moment on the stance foot, which the ground takes. The state (T, 18) has the links' angles and rates.
     """
     q, qd = np.split(state, 2, axis=1)
     between = torque[:, : len(MOVING)] @ np.linalg.inv(JOINT_RATES)

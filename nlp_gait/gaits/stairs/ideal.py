@@ -81,16 +81,10 @@ PARAMETERS = (
 
 @maker
 def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
-    """Trajectory optimisation of one step.
+    """Return the trajectory optimisation of one step in so many equal intervals; raises InputError for less than ten.
 
     States are angles and rates of the seven links that move while the stance foot stands flat; controls are their
     accelerations and the ground's forces on sole and toe of the rear foot.
-
-    Args:
-        intervals: equal parts of the step.
-
-    Raises:
-        InputError: an option that is not allowed.
 
     Source:
         Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
@@ -203,13 +197,7 @@ def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.
 
 
 def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
-    """Return link angles (7, intervals + 1) of a plausible step at equidistant times [rad].
-
-    Args:
-        tread: of one step [m].
-        rise: of one step [m].
-        intervals: equal parts of the step.
-    """
+    """Return link angles (7, intervals + 1) of a plausible step at equidistant times [rad]."""
     ends = np.array([0.0, *PAPER_TIMES])
     times = np.linspace(0.0, ends[-1], intervals + 1)
     fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)

@@ -20,7 +20,7 @@ LEAST_KNEE_SINE = 1e-3
 
 
 def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
-    """(2,) from hip to ankle, forward and up [m], of absolute angles (2,) of thigh and shank, clockwise from forward [rad].
+    """Return (2,) from hip to ankle, forward and up [m]; angles (2,) of thigh and shank are clockwise from forward [rad].
 
     Source:
         Bhardwaj et al., eqs. (27), (28).
@@ -32,7 +32,7 @@ def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
 
 
 def leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
-    """(2,) rates of thigh and shank [rad/s] at which the ankle has a velocity (2,) from the hip [m/s].
+    """Return (2,) rates of thigh and shank [rad/s] at which the ankle has a velocity (2,) from the hip [m/s].
 
     Damped where the knee is straight or folded within a thousandth of a radian, so that they are always finite.
 
@@ -48,16 +48,9 @@ def leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
 
 
 def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[SX, SX]:
-    """Angles of a leg by one hidden layer of sigmoids, and the squared distance of its ankle from the target [m^2].
+    """Return angles (2,) of thigh and shank [rad] by one hidden layer, and the ankle's squared distance from a target (2,).
 
-    Args:
-        weights: (4 h,) of h hidden nodes: those of the inputs (h, 2), then those of the outputs (2, h), by columns.
-        target: (2,) from hip to ankle [m].
-        thigh: length [m].
-        shank: length [m].
-
-    Returns:
-        (2,) absolute angles of thigh and shank [rad], and the error.
+    The weights (4 h,) of h hidden nodes are those of the inputs (h, 2), then those of the outputs (2, h), by columns.
 
     Source:
         Bhardwaj et al., section VI and eqs. (27)-(29).
@@ -72,18 +65,10 @@ def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[
 def make_training_path(
     nodes: int, thigh: float, shank: float, poses: int, rate: float, iterations: int, tolerance: float
 ) -> ca.Function:
-    """Function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
+    """Return the function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
 
-    Each pose starts from the weights of the last one and is trained by gradient steps until its error is small enough.
-
-    Args:
-        nodes: h, of the hidden layer.
-        thigh: length [m].
-        shank: length [m].
-        poses: m.
-        rate: of learning.
-        iterations: most steps for one pose.
-        tolerance: squared distance of the ankle at which the training of a pose ends [m^2].
+    Each pose starts from the weights of the last one and is trained by gradient steps, at most ``iterations``, until the squared
+    distance of the ankle is within the tolerance [m^2].
 
     Source:
         Bhardwaj et al., Algorithm 1 and eq. (30).
@@ -157,13 +142,7 @@ class NetworkPath(NamedTuple):
 def network_angles(
     hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings | None = None
 ) -> NetworkPath:
-    """Return leg angles along a path, each pose starting from the weights of the previous one.
-
-    Args:
-        hip_to_ankle: (m, 2) vectors, forward and up [m].
-        thigh: length [m].
-        shank: length [m].
-        settings: hyperparameters.
+    """Return leg angles along a path (m, 2) from hip to ankle [m]; each pose starts from the weights of the previous one.
 
     Source:
         Bhardwaj et al., Algorithm 1 and eqs. (27)-(30).

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache, partial
+from functools import partial
 from math import inf
 from typing import Literal
 
@@ -80,6 +80,7 @@ VARIABLES = (
 PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.4, 0.35, 0.2)
 SCATTER = 0.1
 DRAWS = 100
+PARTS_AT_START = 10  # of each phase, at which the legs of a start point reach
 # Between samples an edge may be nearer than at them; the difference falls with the square of their distance. This divided by
 # the square of the number of intervals in a phase is kept in reserve [m]: a millimetre on the usual grid.
 SAMPLING_RESERVE = 0.1
@@ -99,29 +100,19 @@ PARAMETERS = (
         ("clearance_m", "m", 0.002, "least height of the swing foot above the stair", -inf, inf),
         ("acceleration_limit_rad_s2", "rad/s^2", 80.0, "largest acceleration of a link", 0.0, inf),
         ("least_phase_s", "s", 0.1, "least duration of each phase", 0.0, inf),
-        (
-            "quantum_s",
-            "s",
-            0.01,
-            "time in which the acceleration may jump from phase to phase, for the jerk (eq. 43)",
-            1e-4,
-            inf,
-        ),
+        ("quantum_s", "s", 0.01, "time of a jump in acceleration between phases, for the jerk (eq. 43)", 1e-4, inf),
     ),
 )
 
 
 @maker
 def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitProblem:
-    """Planner of one step.
+    """Return the planner of one step.
 
     Args:
         minimise: energy, the integral of sum |torque x rate| over all joints, or the peak of the joints' jerk (the paper's
             knot shifting).
-        intervals: of the step, a quarter in each phase.
-
-    Raises:
-        InputError: an option that is not allowed.
+        intervals: of the step, a quarter in each phase; InputError for other numbers.
 
     Source:
         Bhardwaj et al., section V and Table III.
@@ -200,9 +191,15 @@ def _clearance(heights: MX, least: MX) -> Constraint:
 
 
 def _rows_at(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
-    """Return rows of posture and ground at every sample."""
+    """Return rows of reach, link angles, knees, accelerations and ground at every sample."""
+    m = samples.q.shape[1]
+    lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
+    most = point["acceleration_limit_rad_s2"]
     return (
-        *_posture_rows(point, samples),
+        rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
+        rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
+        knee_limits("knee_angle", samples.q),
+        rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
         stance_load(point, samples.stance_force),
         grip("friction", samples.stance_force, point["friction"]),
         stance_zmp(point, samples.stance_pressure),
@@ -215,12 +212,14 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     exact = Exact()
     pressure = samples.stance_pressure.T
     least_clearance = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
+    ends = ca.vertcat(*(point[name] if name else 0 for name in PHASE_ENDS))
+    durations, least = ends[1:] - ends[:-1], point["least_phase_s"]
     return Assembly(
         objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
             *_rows_at(point, samples),
             _clearance(step.clearances(point, ops), least_clearance),
-            _phase_durations(point),
+            Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
         ),
         indexes={
             "energy_J": step.energy(samples, exact),
@@ -229,32 +228,6 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
             "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
             "zmp_margin_min_m": ca.mmin(exact.min(pressure, toe_foot_biped().foot_m - pressure)),
         },
-    )
-
-
-def _posture_rows(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
-    """Return rows of reach, link angles, knees and accelerations at every sample."""
-    m = samples.q.shape[1]
-    lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
-    most = point["acceleration_limit_rad_s2"]
-    return (
-        rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
-        rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
-        knee_limits("knee_angle", samples.q),
-        rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
-    )
-
-
-def _phase_durations(point: Point) -> Constraint:
-    """Return rows for a least duration of every phase."""
-    ends = ca.vertcat(*(point[name] if name else 0 for name in PHASE_ENDS))
-    return Constraint(
-        name="phase_duration",
-        labels=PHASES,
-        unit="s",
-        scale=0.1,
-        value=ends[1:] - ends[:-1],
-        lower=point["least_phase_s"],
     )
 
 
@@ -271,17 +244,11 @@ def _start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         plan = np.concatenate([x[: len(GOVERNING_VARIABLES)], given])
         named = dict(zip(GOVERNING, plan, strict=True))
         durations = np.diff([0.0, *(named[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))])
-        out_of_reach = np.array(_reach()(plan, size, margin)) - (1 - margin)
-        violation = float(
-            np.maximum(parameters["least_phase_s"] - durations, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum()
-        )
+        out_of_reach = np.array(reach_function(PARTS_AT_START)(plan, size, margin)) - (1 - margin)
+        too_short = parameters["least_phase_s"] - durations
+        violation = float(np.maximum(too_short, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum())
         if not best.size or violation < least:
             best, least = x, violation
         if least == 0.0:
             break
     return best
-
-
-@cache
-def _reach() -> ca.Function:
-    return reach_function(per_phase=10)

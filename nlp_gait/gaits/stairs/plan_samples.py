@@ -47,22 +47,22 @@ class PlannedStep:
     per_phase: int  # equal parts of each phase
 
     @cached_property
-    def grid(self) -> tuple[Array, Array]:
+    def grid(self) -> tuple[DM, Array]:
         """Fractions of the phases and the current phase, (4, m) each, at the samples."""
         return phase_grid([np.linspace(0.0, 1.0, self.per_phase + 1)] * len(PHASES))
 
     @cached_property
-    def clearance_grid(self) -> tuple[Array, Array]:
+    def clearance_grid(self) -> tuple[DM, Array]:
         """The same for checks of the swing foot against the stair."""
         fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
         return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
 
-    def samples(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> PlanSamples:
+    def samples(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> PlanSamples:
         """Return the step at all samples, or at those of another grid."""
         s, passing = grid or self.grid
         return PlanSamples(*self._map_samples(sample_function(ops), point, s, passing, point["rear_share"]))
 
-    def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[Array | MX, Array] | None = None) -> MX:
+    def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
         return self._map_samples(clearance_function(ops), point, *(grid or self.clearance_grid))
 
@@ -91,33 +91,26 @@ class PlannedStep:
         """Number of the first sample of each phase."""
         return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
-    def _map_samples(self, function: ca.Function, point: Point, s: Array | MX, passing: Array, *more: MX) -> MX:
+    def _map_samples(self, function: ca.Function, point: Point, s: MX | DM, passing: Array, *more: MX) -> MX:
         stair = read_stair(point)
         constants = (collect_governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
         columns = s.shape[1]
         repeated = (ca.repmat(value, 1, columns) for value in constants)
-        return function.map(columns)(s if isinstance(s, MX) else DM(s), DM(passing), *repeated)
+        return function.map(columns)(s, DM(passing), *repeated)
 
 
-def grid_at(phase: int, fractions: MX) -> tuple[MX, Array]:
+def grid_at(phase: int, fractions: MX | DM) -> tuple[MX | DM, Array]:
     """Return the grid of ``phase_grid`` at fractions (1, k) of one phase."""
     k = int(fractions.shape[1])
-    parts = [MX(DM.ones(1, k) * float(j < phase)) for j in range(len(PHASES))]
+    parts: list[MX | DM] = [DM.ones(1, k) * float(j < phase) for j in range(len(PHASES))]
     parts[phase] = fractions
     return ca.vertcat(*parts), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
 
 
-def phase_grid(fractions: list[Array]) -> tuple[Array, Array]:
-    """Return fractions s (4, m) of all phases, and the current phase as columns with a single one (4, m).
-
-    Args:
-        fractions: for each phase the fractions of it at which to sample.
-    """
-    s = [np.repeat([[float(j < i)] for j in range(4)], len(part), axis=1) for i, part in enumerate(fractions)]
-    passing = [np.repeat([[float(j == i)] for j in range(4)], len(part), axis=1) for i, part in enumerate(fractions)]
-    for i, part in enumerate(fractions):
-        s[i][i] = part
-    return np.hstack(s), np.hstack(passing)
+def phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
+    """Return s (4, m) of all phases from the fractions to sample in each, and the current phase as columns (4, m) of 0 and 1."""
+    s, passing = zip(*(grid_at(i, DM(part).T) for i, part in enumerate(fractions)), strict=True)
+    return ca.horzcat(*s), np.hstack(passing)
 
 
 @cache
@@ -170,6 +163,7 @@ def clearance_function(ops: Nonsmooth) -> ca.Function:
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
+@cache
 def reach_function(per_phase: int) -> ca.Function:
     """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
     inputs, _, _, step = _make_symbols(Exact())
@@ -178,7 +172,7 @@ def reach_function(per_phase: int) -> ca.Function:
     given = [SX.sym("given", size.shape) for size in inputs[2:]]
     columns = s.shape[1]
     return ca.Function(
-        "reach", given, [one.map(columns)(DM(s), DM(passing), *(ca.repmat(value, 1, columns) for value in given))]
+        "reach", given, [one.map(columns)(s, DM(passing), *(ca.repmat(value, 1, columns) for value in given))]
     )
 
 

@@ -50,13 +50,7 @@ def direction(link: str, angle: SX) -> SX:
 
 
 def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, ankle: SX) -> dict[str, SX]:
-    """Positions of all joints and ends by name, (2,) each [m].
-
-    Args:
-        rods: by link.
-        q: nine angles in the order of LINKS [rad].
-        ankle: (2,) position of the stance ankle A' [m].
-    """
+    """Return positions of all joints and ends by name, (2,) each [m], from nine angles [rad] and the stance ankle A' (2,) [m]."""
     return _sum_along_links(ankle, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
 
 
@@ -84,14 +78,7 @@ def centres(found: Mapping[str, SX]) -> dict[str, SX]:
 
 
 def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angles: SX) -> EquationsOfMotion:
-    """Equations of motion about a fixed stance ankle.
-
-    Args:
-        rods: by link.
-        gravity: magnitude [m/s^2].
-        q: (n,) generalised coordinates.
-        qd: (n,) their rates.
-        angles: (9,) link angles as a function of q, in the order of LINKS [rad].
+    """Return the equations of motion about a fixed stance ankle, with link angles (9,) [rad] as a function of q (n,).
 
     Source:
         Bhardwaj et al., eqs. (36)-(42).
@@ -148,15 +135,9 @@ def link_angles(q: SX) -> SX:
 
 
 def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
-    """Inverse dynamics with given forces below the rear foot.
+    """Return the inverse dynamics of the moving links, q (7,) [rad], with given forces (2,) [N] on points of the rear foot.
 
-    Args:
-        rods: of the robot.
-        gravity: [m/s^2].
-        q: (7,) absolute angles of the links in MOVING [rad]; symbols, for derivatives are taken with respect to them.
-        qd: (7,) rates [rad/s]; symbols.
-        qdd: (7,) [rad/s^2].
-        rear: forces of the ground (2,) [N] by the point of the rear foot on which they act.
+    Derivatives are taken with respect to q and qd, which are symbols.
 
     Source:
         Bhardwaj et al., eqs. (35), (42); the centre of pressure from the moment balance of the flat stance foot.

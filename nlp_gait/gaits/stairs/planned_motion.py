@@ -67,13 +67,9 @@ class ToeFoot(NamedTuple):
 
 
 def stair_height(x: SX, stair: Stair[SX], setback: float, width: float) -> SX:
-    """Height of the ground under a point, relative to the stance ankle [m].
+    """Return the height of the ground under a point at x, relative to the stance ankle [m].
 
-    Args:
-        x: position of the point [m].
-        stair: steps.
-        setback: distance of the edge of each step behind the ankle that stands on it [m].
-        width: an edge is a sigmoid; half of its rise happens within 2.2 widths [m].
+    The edge of each step is ``setback`` behind the ankle that stands on it; half of its rise happens within 2.2 widths [m].
     """
 
     def edge(at: SX | float) -> SX:
@@ -111,13 +107,9 @@ def ankle_on_toe(foot: ToeFoot, sole: SX, toe: SX) -> SX:
 
 
 def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
-    """Angles of sole and toe of the foot that landed last [rad], during the next step's double support.
+    """Return angles of sole and toe of the foot that landed last [rad], at fractions s (4,) of the next step's phases.
 
     The motion of the rear foot backwards in time: about the tip of the toe, then about the sole; see ``ankle_on_toe``.
-
-    Args:
-        plan: of the next step.
-        s: (4,) fractions of the next step's phases.
     """
     first, second = ca.vertsplit(plan.durations[:2])
     remaining = first * (1 - s[0]) + second * (1 - s[1])
@@ -230,17 +222,9 @@ def posture(
     margin: SX,
     ops: Nonsmooth,
 ) -> Posture:
-    """Posture at the fractions s (4,) of the phases, which pass at ``rates`` (4,) [1/s]; symbols s.
+    """Return the posture at fractions s (4,) of the phases, symbols; their rates (4,) are 1 / duration now, else 0 [1/s].
 
-    Args:
-        rods: of the robot.
-        plan: governing parameters.
-        stair: steps.
-        gravity: [m/s^2].
-        s: fractions of the phases, symbols.
-        rates: 1 / duration of the phase that passes, 0 for the others.
-        margin: reach margin on the cosine of a knee.
-        ops: interpretation of acos.
+    The margin is on the cosine of a knee.
     """
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
     swing_foot = ToeFoot(rods["AS"].length, rods["ST"].length)

@@ -90,17 +90,9 @@ def rows(
     upper: MX | float | None = None,
     columns: Sequence[int] = (),
 ) -> Constraint:
-    """Return rows for r quantities at each of m instants.
+    """Return rows for quantities ``of`` (r,) at instants ``columns`` (m,), by default from zero; the value is (r, m) [unit].
 
-    Args:
-        name: of the rows.
-        value: (r, m) [unit].
-        of: (r,) names of the quantities.
-        unit: of the values.
-        scale: of a violation, see ``Constraint``.
-        lower: bound, for all or for each.
-        upper: likewise.
-        columns: (m,) numbers of the instants; from zero if empty.
+    Bounds are for all rows or for each; ``scale`` is that of a violation, see ``Constraint``.
     """
     return Constraint(
         name=name,

@@ -93,19 +93,16 @@ def stairs_track(
     inverse_kinematics: InverseKinematics = "closed-form",
     duration_s: float = 3.5,
 ) -> GaitProblem:
-    """Closed loop over one planned step.
+    """Return the closed loop over one planned step, with the stance ankle as base.
 
-    The plan is given by parameters; its torso pitch is a variable. The stance ankle is the base.
+    The plan is given by parameters; its torso pitch is a variable.
 
     Args:
         gains: one K_p and K_d for all links as in the paper, or one for each link.
         scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
             quantum's pose within each evaluation (which makes one many times slower).
-        duration_s: of the rollout, in whole quanta of 0.01 s.
-
-    Raises:
-        InputError: an option that is not allowed.
+        duration_s: of the rollout, in whole quanta of 0.01 s; InputError if it is longer than a minute.
 
     Source:
         Bhardwaj et al., sections VII to X.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -19,7 +20,7 @@ from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.formulation.stick_figure import LEFT, RIGHT, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
 from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, Zmp
-from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
+from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
 from nlp_gait.robots import Foot, Joint, Link, Robot
 from nlp_gait.robots.inertia import inertia_moments, point_inertia
 from nlp_gait.robots.robot import Vector
@@ -33,12 +34,11 @@ SOLE_SHARE = 0.1  # of the foot's mass that belongs to the sole; the ankle has t
 RANGE = (-np.pi, np.pi)  # of every joint [rad]: the paper has no limits
 RATE_LIMIT = 100.0  # [rad/s], likewise; not used
 FINE_INTERVALS = 1000  # of a step
-BEARINGS = {  # joint by side with its axis: hip yaw, roll, pitch, knee, ankle pitch, ankle roll; pitches lean back (eqs. 2, 3)
+BEARINGS = {  # joints by side: hip yaw, roll, pitch, knee, ankle pitch, ankle roll; pitches lean back (eqs. 2, 3)
     "left": ("theta_4", "theta_6", "theta_5", "theta_3", "theta_2", "theta_1"),
     "right": ("theta_9", "theta_7", "theta_8", "theta_10", "theta_11", "theta_12"),
 }
-AXES: tuple[Vector, ...] = ((0, 0, 1), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, -1, 0), (1, 0, 0))
-PARTS = ("yaw", "roll", "thigh", "shank", "ankle", "foot")  # links behind these joints
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
@@ -46,18 +46,8 @@ def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
     bodies = make_rigid_bodies(robot)
 
     def motion(at: NumericPoint, steps: int) -> Signals:
-        walked = compute_steps(
-            robot,
-            at.x.full().ravel(),
-            step_time_s=float(at["step_time_s"]),
-            turn_rad=float(at["turn_rad"]),
-            reach_margin_rad=float(at["reach_margin_rad"]),
-            steps=steps,
-            intervals=FINE_INTERVALS,
-            zmp=zmp,
-        ).arrays
-        left = walked["left_stance"] > 0.5
-        heading = np.concatenate([[0], np.cumsum(np.diff(left) != 0)]) * float(at["turn_rad"])
+        walked = compute_steps_at(at, robot, intervals=FINE_INTERVALS, zmp=zmp, steps=steps).arrays
+        left, heading = _follow_steps(walked, float(at["turn_rad"]))
         still = np.zeros_like(heading)
         arrays = {
             **{name: walked[name] for name in ("t", "q", "qd", "qdd", "zmp")},
@@ -75,48 +65,47 @@ def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
 @cache
 def make_rigid_bodies(robot: PointMassBiped) -> Robot:
     """Return links with small spheres as masses; the root is the waist, between the hips, and the ankles are on the ground."""
-    thigh_end, shank_end = -robot.thigh_m, -robot.shank_m
     hip, knee, foot = robot.hip_mass_kg, robot.knee_mass_kg, robot.foot_mass_kg
-    up = robot.foot_com_height_m
+    here: Vector = (0, 0, 0)
+    thigh_end, shank_end, up = -robot.thigh_m, -robot.shank_m, robot.foot_com_height_m
     across = robot.hip_distance_m / 2
     weight = GRAVITY * (2 * (knee + foot + hip) + robot.waist_mass_kg)
-    levers = (robot.leg_m,) * 3 + (robot.shank_m,) + (robot.foot_front_m,) * 2
     # By link: masses with their places in its axes. The three links at a hip share its mass, the two at a knee share the knee's.
     contents: dict[str, list[tuple[float, Vector]]] = {
-        "waist": [(robot.waist_mass_kg, (0, 0, 0)), (hip / 3, (0, across, 0)), (hip / 3, (0, -across, 0))]
+        "waist": [(robot.waist_mass_kg, here), (hip / 3, (0, across, 0)), (hip / 3, (0, -across, 0))]
     }
     joints, feet = {}, {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        leg: tuple[Sequence[tuple[float, Vector]], ...] = (
-            [(hip / 3, (0, 0, 0))],
-            [(hip / 3, (0, 0, 0))],
-            [(knee / 2, (0, 0, thigh_end))],
-            [(knee / 2, (0, 0, 0)), ((1 - 2 * SOLE_SHARE) * foot, (0, 0, shank_end + up))],
-            [(SOLE_SHARE * foot, (0, 0, up))],
-            [(SOLE_SHARE * foot, (0, 0, up))],
-        )
-        origins: tuple[Vector, ...] = (
-            (0, sign * across, 0),
-            (0, 0, 0),
-            (0, 0, 0),
-            (0, 0, thigh_end),
-            (0, 0, shank_end),
-            (0, 0, 0),
-        )
-        names = [f"{side} {part}" for part in PARTS]
-        contents |= {name: list(held) for name, held in zip(names, leg, strict=True)}
-        for i, name in enumerate(BEARINGS[side]):
+        # Links from the hip down: axis and place of the joint, length of what it moves, masses.
+        leg: dict[str, tuple[Vector, Vector, float, list[tuple[float, Vector]]]] = {
+            "yaw": ((0, 0, 1), (0, sign * across, 0), robot.leg_m, [(hip / 3, here)]),
+            "roll": ((1, 0, 0), here, robot.leg_m, [(hip / 3, here)]),
+            "thigh": ((0, -1, 0), here, robot.leg_m, [(knee / 2, (0, 0, thigh_end))]),
+            "shank": (
+                (0, 1, 0),
+                (0, 0, thigh_end),
+                robot.shank_m,
+                [(knee / 2, here), ((1 - 2 * SOLE_SHARE) * foot, (0, 0, shank_end + up))],
+            ),
+            "ankle": ((0, -1, 0), (0, 0, shank_end), robot.foot_front_m, [(SOLE_SHARE * foot, (0, 0, up))]),
+            "foot": ((1, 0, 0), here, robot.foot_front_m, [(SOLE_SHARE * foot, (0, 0, up))]),
+        }
+        parent = "waist"
+        for name, (part, (axis, origin, moved, masses)) in zip(BEARINGS[side], leg.items(), strict=True):
+            link = f"{side} {part}"
+            contents[link] = masses
             joints[name] = Joint(
                 name=name,
-                parent=names[i - 1] if i else "waist",
-                child=names[i],
-                origin_m=origins[i],
-                axis=AXES[i],
+                parent=parent,
+                child=link,
+                origin_m=origin,
+                axis=axis,
                 limits_rad=RANGE,
                 planning_limits_rad=RANGE,
                 velocity_limit_rad_s=RATE_LIMIT,
-                torque_limit_Nm=weight * levers[i],
+                torque_limit_Nm=weight * moved,
             )
+            parent = link
         feet[side] = Foot(
             link=f"{side} foot",
             ankle_height_m=0.0,
@@ -147,7 +136,13 @@ def _make_link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:
     return Link(name=name, mass_kg=total, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(tensor))
 
 
-def _compute_torques(bodies: Robot, walked: Mapping[str, Array], left: np.ndarray) -> Array:
+def _follow_steps(walked: Mapping[str, Array], turn: float) -> tuple[Flags, Array]:
+    """Return (T,) whether the left leg stands, and (T,) the heading [rad], which turns with each exchange of the legs."""
+    left = walked["left_stance"] > 0.5
+    return left, np.concatenate([[0], np.cumsum(np.diff(left) != 0)]) * turn
+
+
+def _compute_torques(bodies: Robot, walked: Mapping[str, Array], left: Flags) -> Array:
     """Return (T, 12) torques of the joints with the stance foot still and the other foot free [Nm]."""
     given = [walked[name].T for name in ("q", "qd", "qdd")]
     by_side = [np.array(_make_inverse_dynamics(bodies, side).map(len(left))(*given)).T for side in ("left", "right")]
@@ -165,9 +160,7 @@ def _make_inverse_dynamics(bodies: Robot, side: str) -> ca.Function:
 def make_skeleton(robot: PointMassBiped, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     """Return the stick figure of a motion; the robot turns to the left by ``turn_rad`` after each step."""
     arrays = signals.arrays
-    waist, left_stands = arrays["waist"], arrays["left_stance"] > 0.5
-    steps = np.concatenate([[0], np.cumsum(np.diff(left_stands.astype(int)) != 0)])
-    heading = steps * parameters["turn_rad"]
+    waist, (left_stands, heading) = arrays["waist"], _follow_steps(arrays, parameters["turn_rad"])
     forward = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
     across = np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=1)
     outline = make_rectangle(-robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2)

@@ -46,13 +46,9 @@ Shank: TypeAlias = Callable[[LegMotion, DM], Motion]
 
 
 def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
-    """Return positions (3,) of the swing ankle P12 and of the stance hip P6 over the first step [m].
+    """Return positions (3,) of the swing ankle P12 and of the stance hip P6 [m] over the first step of T [s].
 
-    Args:
-        x: (4,) step length s, frontal shift n, foot lift H, bending height h [m].
-        time: t in [0, T] [s].
-        step_time: T [s].
-        robot: lengths.
+    The variables x (4,) are step length s, frontal shift n, foot lift H and bending height h [m].
 
     Source:
         Eqs. (4), (6).
@@ -74,16 +70,9 @@ def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBi
 def compute_legs(
     x: SX, phase: SX, step_time: SX, turn: SX, margin: SX, robot: PointMassBiped, ops: Nonsmooth
 ) -> tuple[LegMotion, LegMotion]:
-    """Return the stance leg and the swing leg.
+    """Return the stance leg and the swing leg at a phase t / T.
 
-    Args:
-        x: (4,) variables [m].
-        phase: t / T.
-        step_time: T [s].
-        turn: K, yaw of the swing leg at its hip [rad], positive to the left.
-        margin: of the reach, see ``Nonsmooth.acos``.
-        robot: lengths.
-        ops: interpretation of acos.
+    The swing leg is yawed at its hip by K, ``turn`` [rad], positive to the left; for the margin see ``Nonsmooth.acos``.
     """
     swing_ankle, hip = compute_ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
     stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))

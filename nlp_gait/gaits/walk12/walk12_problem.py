@@ -17,11 +17,9 @@ from nlp_gait.formulation import (
     Display,
     GaitProblem,
     Grid,
-    NumericPoint,
     Objective,
     Point,
     RowsOverTime,
-    Signals,
     SolverHints,
     Variable,
     maker,
@@ -30,7 +28,7 @@ from nlp_gait.formulation import (
 from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_display import make_simulation_model, make_skeleton
 from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_knee_cosines, compute_legs, compute_zmp
-from nlp_gait.gaits.walk12.walk12_steps import compute_steps
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Horizon = Literal["step", "1s"]
@@ -68,12 +66,9 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     """Return the gait problem of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
     Args:
-        intervals: of Simpson's rule over a step; even.
+        intervals: of Simpson's rule over a step; InputError if it is not even.
         horizon: Q over one step, as printed in (9), or over one second of walking, as Table IV implies.
-        zmp: reading of the zero-moment point, see ``model.Zmp``.
-
-    Raises:
-        InputError: an option that is not allowed.
+        zmp: reading of the zero-moment point, see ``walk12_model.Zmp``.
 
     Source:
         Goswami, Vadakkepat, Phung (2008), section 5.
@@ -93,17 +88,6 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
             objective=MX(0), constraints=(_limit_reach(point, robot, phases, [""] * phases.shape[1]),), indexes=indexes
         )
 
-    def motion(at: NumericPoint) -> Signals:
-        return compute_steps(
-            robot,
-            at.x.full().ravel(),
-            step_time_s=float(at["step_time_s"]),
-            turn_rad=float(at["turn_rad"]),
-            reach_margin_rad=float(at["reach_margin_rad"]),
-            intervals=intervals,
-            zmp=zmp,
-        )
-
     return GaitProblem(
         name="walk12",
         title="12-joint walk: stability margin against step length",
@@ -113,7 +97,9 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
         display=Display(
-            motion=motion, skeleton=partial(make_skeleton, robot), simulation_model=make_simulation_model(robot, zmp)
+            motion=partial(compute_steps_at, robot=robot, intervals=intervals, zmp=zmp),
+            skeleton=partial(make_skeleton, robot),
+            simulation_model=make_simulation_model(robot, zmp),
         ),
         rows_over_time=(
             RowsOverTime(

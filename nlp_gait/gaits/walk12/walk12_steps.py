@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, Columns, Signals, vector_columns
+from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, vector_columns
 from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
 from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_legs, compute_mass_motion, compute_zmp, list_masses
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -44,20 +44,11 @@ def compute_steps(
     intervals: int = 20,
     zmp: Zmp = "exact",
 ) -> Signals:
-    """Compute time histories over some steps.
+    """Compute time histories over some steps, with x (4,), T, K and kappa as in the problem.
 
     Where two steps meet, the sample belongs to the earlier one. The printed trajectories jump there: the hip's lateral velocity
-    (by n pi / T), and with a turn also theta 4 and theta 9, which the paper takes as constant over a step.
-
-    Args:
-        robot: lengths and masses.
-        x: (4,) variables of the problem [m].
-        step_time_s: T.
-        turn_rad: K.
-        reach_margin_rad: kappa; has an effect only where a leg is out of reach.
-        steps: number of steps.
-        intervals: of each step.
-        zmp: definition of the zero-moment point.
+    (by n pi / T), and with a turn also theta 4 and theta 9, which the paper takes as constant over a step. The reach margin kappa
+    has an effect only where a leg is out of reach.
 
     Returns:
         t [s]; q, qd, qdd (columns theta_1 to theta_12); zmp, waist (between the hips), com, left_ankle and right_ankle in the
@@ -83,6 +74,12 @@ def compute_steps(
         ankle, heading = part["right_ankle" if side > 0 else "left_ankle"][-1], heading + turn_rad
     arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
+
+
+def compute_steps_at(at: NumericPoint, robot: PointMassBiped, *, intervals: int, zmp: Zmp, steps: int = 2) -> Signals:
+    """Compute time histories at a point of the problem, see ``compute_steps``."""
+    settings = {name: float(at[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")}
+    return compute_steps(robot, at.x.full().ravel(), **settings, steps=steps, intervals=intervals, zmp=zmp)
 
 
 def _arrange_joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:
