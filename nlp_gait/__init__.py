@@ -6,7 +6,7 @@ exact functions to search algorithms.
 
 from __future__ import annotations
 
-from nlp_gait.providers import FUNCTIONS, PROBLEMS, import_object
+from nlp_gait.providers import FILE_HASHES, FUNCTIONS, PROBLEMS, import_object
 
 # In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
 TYPE_CHECKING = False
@@ -52,6 +52,7 @@ PROBLEMS.update(
         "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
     }
 )
+FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
 FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 
 __all__ = [

@@ -10,8 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.backends.identity import FORMULAS, HASH, SOURCE, hash_json
-from nlp_gait.robots.loading import is_robot_file
+from nlp_gait.backends.identity import FILES, FORMULAS, HASH, SOURCE, hash_json
 from nlp_gait.user_code import hash_file, shorten_name
 
 SHOWN_DIGITS = 8  # of a hash
@@ -79,9 +78,8 @@ def _remove_paths(definition: Mapping[str, Any]) -> dict[str, Any]:
     problem, solver = dict(definition["problem"]), definition["solver"]
     if SOURCE in problem:
         problem["name"] = shorten_name(problem["name"])
-    robot = problem["options"].get("robot")
-    if isinstance(robot, str) and is_robot_file(robot):
-        problem["options"] = {**problem["options"], "robot": ""}  # the hash includes the robot
+    # The hash of the mathematics includes the content of files.
+    problem["options"] = {**problem["options"], **dict.fromkeys(problem.pop(FILES, ()), "")}
     if isinstance(solver, Mapping) and "name" in solver:
         solver = {**solver, "name": shorten_name(solver["name"])}
     return {**definition, "problem": problem, "solver": solver}

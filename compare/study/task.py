@@ -22,9 +22,8 @@ from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solv
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.registry import check_options, load
+from nlp_gait.formulation.registry import check_options, hash_files, load
 from nlp_gait.providers import PROBLEMS
-from nlp_gait.robots.loading import hash_robot, is_robot_file
 from nlp_gait.user_code import check_reference, find_entry_points, hash_source, is_user_code, load_object, shorten_name
 
 IPOPT = "ipopt"
@@ -75,12 +74,9 @@ class ProblemSpec:
                 )
             return self.name.with_values(**self.values)
         check_options(self.name, self.options)  # before the cache, to which True and 1 are the same
-        robot = self.options.get("robot")
-        contents = (
-            hash_robot(robot) if isinstance(robot, str) and is_robot_file(robot) else "",
-            hash_source(self.name, "problem") if self.name not in PROBLEMS else "",
-        )
-        return _load(self.name, tuple(sorted(self.options.items())), contents).with_values(**self.values)
+        contents = hash_source(self.name, "problem") if self.name not in PROBLEMS else ""
+        options = tuple(sorted(self.options.items()))
+        return _load(self.name, options, (contents, *hash_files(self.options).values())).with_values(**self.values)
 
 
 @lru_cache(maxsize=16)

@@ -8,9 +8,10 @@ from typing import Any
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.registry import hash_files
 from nlp_gait.user_code import hash_source
 
-HASH, SOURCE, FORMULAS = "sha256", "source_sha256", "mathematics_sha256"
+HASH, SOURCE, FORMULAS, FILES = "sha256", "source_sha256", "mathematics_sha256", "files"
 
 
 def hash_json(data: Any, code: str = "") -> str:
@@ -32,6 +33,10 @@ def _hash_mathematics(problem: GaitProblem) -> str:
     return hashlib.sha256(build_exact_model(problem).function.serialize().encode()).hexdigest()
 
 
+def _find_files(problem: GaitProblem) -> list[str]:
+    return sorted(hash_files(problem.options))
+
+
 def identify_problem(problem: GaitProblem) -> dict[str, Any]:
     """Return the problem's part of a definition: how to load it, and a hash of its content."""
     content = [problem.build_once(_hash_mathematics), problem.p.tolist(), problem.names]
@@ -41,6 +46,9 @@ def identify_problem(problem: GaitProblem) -> dict[str, Any]:
         "parameters": dict(problem.values),
         HASH: hash_json(content),
     }
+    files = problem.build_once(_find_files)
+    if files:
+        part[FILES] = files
     if problem.loaded_as:
         part[SOURCE] = hash_source(problem.loaded_as, "problem")
     return part

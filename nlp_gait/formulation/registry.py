@@ -16,7 +16,7 @@ from nlp_gait.formulation.checks import check_mathematics
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
-from nlp_gait.providers import PROBLEMS, import_object
+from nlp_gait.providers import FILE_HASHES, PROBLEMS, import_object
 from nlp_gait.user_code import (
     allow_code,
     call_user_code,
@@ -163,6 +163,15 @@ def check_maker_options(make: Maker, options: Mapping[str, Any]) -> None:
     if math.prod(max(1, count) for count in counts.values()) > LARGEST_COUNT:
         product = " x ".join(f"{name} {count}" for name, count in counts.items())
         raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
+
+
+def hash_files(options: Mapping[str, Any]) -> dict[str, str]:
+    """Return the hashes of the files that options of a problem name, by option."""
+    found = {}
+    for name in FILE_HASHES.keys() & options.keys():
+        hash_file: Callable[[object], str] = import_object(FILE_HASHES[name])  # type: ignore[assignment]
+        found[name] = hash_file(options[name])
+    return {name: digest for name, digest in found.items() if digest}
 
 
 def _to_python(value: Any) -> Any:

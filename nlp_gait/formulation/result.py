@@ -32,6 +32,7 @@ class StoredProblem:
     parameters: Mapping[str, float]  # that differ from the defaults
     sha256: str  # hash of the mathematics and the parameters
     source_sha256: str = ""  # hash of the source of a user-defined problem
+    files: tuple[str, ...] = ()  # options that name files; their content is part of the mathematics
 
 
 @dataclass(frozen=True, kw_only=True)

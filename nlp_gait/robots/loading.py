@@ -111,9 +111,11 @@ def is_robot_file(name_or_path: str) -> bool:
     return split_name(name_or_path)[0].endswith(FILE_ENDINGS)
 
 
-def hash_robot(path: str) -> str:
-    """Return a hash of all files that describe a robot; raises as ``load_robot``."""
-    return hashlib.sha256(repr(_read_merged(_find_description(split_name(path)[0]))).encode()).hexdigest()
+def hash_robot(name_or_path: object) -> str:
+    """Return a hash of all files that describe a robot, "" for one of the package; raises as ``load_robot``."""
+    if not isinstance(name_or_path, str) or not is_robot_file(name_or_path):
+        return ""
+    return hashlib.sha256(repr(_read_merged(_find_description(split_name(name_or_path)[0]))).encode()).hexdigest()
 
 
 @cache
