@@ -7,7 +7,9 @@ imports this module before everything else, so it imports nothing that takes tim
 from __future__ import annotations
 
 PROBLEMS: dict[str, str] = {}  # makers of problems, by the problem's name
-FILE_HASHES: dict[str, str] = {}  # by option of problems that may name a file: hash of its content, "" for another value
+FILE_HASHES: dict[
+    str, str
+] = {}  # by option of problems that may name a file: hash of its content, "" for another value
 FUNCTIONS: dict[str, str] = {}  # by their task, such as ``plot_gait``
 
 
