@@ -19,17 +19,11 @@ COUPLED = ("RHipYawPitch",)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SetPoints:
-    """Poses of all joints.
-
-    Attributes:
-        joints: names of the columns.
-        times_ms: (T,) whole milliseconds, strictly increasing.
-        angles: (T, J) [rad]; NaN leaves a joint alone.
-    """
+    """Poses of all joints."""
 
     joints: tuple[str, ...]
-    times_ms: tuple[int, ...]
-    angles: Array
+    times_ms: tuple[int, ...]  #: (T,) whole milliseconds, strictly increasing
+    angles: Array  #: (T, J) [rad]; NaN leaves a joint alone
 
 
 def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:

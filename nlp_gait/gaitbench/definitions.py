@@ -17,29 +17,18 @@ Subset = Literal["small", "full"]
 
 @dataclass(frozen=True, kw_only=True)
 class Definition:
-    """What an instance is made from.
+    """What an instance is made from."""
 
-    Attributes:
-        id: its name, which never changes.
-        what: one line.
-        problem: name, as in ``nlp-gait list``.
-        options: of the problem.
-        values: parameters that differ from their defaults.
-        held: variables that are constants here.
-        difficulty: graded by the results of the shipped baseline: variables, share of feasible points, local optima.
-        small: whether it also belongs to the subset ``small``.
-        source: paper that the problem comes from.
-    """
-
-    id: str
-    what: str
-    problem: str
-    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    held: Mapping[str, float] = field(default_factory=dict)
+    id: str  #: its name, which never changes
+    what: str  #: one line
+    problem: str  #: name, as in ``nlp-gait list``
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)  #: of the problem
+    values: Mapping[str, float] = field(default_factory=dict)  #: parameters that differ from their defaults
+    held: Mapping[str, float] = field(default_factory=dict)  #: variables that are constants here
+    #: graded by the results of the shipped baseline: variables, share of feasible points, local optima
     difficulty: Difficulty
-    small: bool = False
-    source: str
+    small: bool = False  #: whether it also belongs to the subset ``small``
+    source: str  #: paper that the problem comes from
 
 
 _FILE = files("nlp_gait.gaitbench") / "definitions.json"

@@ -13,22 +13,15 @@ from nlp_gait.decoding import decode
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Why the best known objective may be the optimum.
+    """Why the best known objective may be the optimum."""
 
-    Attributes:
-        starts: of IPOPT, from random points.
-        agreeing: how many of them reach the best within 1e-6, relatively.
-        cma_runs: long runs of CMA-ES, which shares nothing with IPOPT but the functions; 0 if there were none.
-        cma_evaluations: of each of them.
-        cma_gap: by how much the best of them is worse, relatively; negative if it is better, None if none was feasible.
-        proven_gap: no feasible point is better than the best known by more than this, relatively; None without a proof.
-    """
-
-    starts: int
-    agreeing: int
-    cma_runs: int = 0
-    cma_evaluations: int = 0
+    starts: int  #: of IPOPT, from random points
+    agreeing: int  #: how many of them reach the best within 1e-6, relatively
+    cma_runs: int = 0  #: long runs of CMA-ES, which shares nothing with IPOPT but the functions; 0 if there were none
+    cma_evaluations: int = 0  #: of each of them
+    #: by how much the best of them is worse, relatively; negative if it is better, None if none was feasible
     cma_gap: float | None = None
+    #: no feasible point is better than the best known by more than this, relatively; None without a proof
     proven_gap: float | None = None
 
     def __str__(self) -> str:
@@ -50,38 +43,23 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True)
 class Probe:
-    """Published values at a point, which the instance must always have.
+    """Published values at a point, which the instance must always have."""
 
-    Attributes:
-        x: (n,) the point.
-        objective: to be minimised.
-        violation: total.
-        rows: sum over all rows k of ``(1 + k % 7) * G[k]``.
-    """
-
-    x: tuple[float, ...]
+    x: tuple[float, ...]  # (n,) the point
     objective: float
     violation: float
-    rows: float
+    rows: float  # sum over all rows k of ``(1 + k % 7) * G[k]``
 
 
 @dataclass(frozen=True, kw_only=True)
 class Facts:
-    """Facts about an instance.
+    """Facts about an instance."""
 
-    Attributes:
-        best_known: least feasible objective known, in the sense of minimisation.
-        best_x: (n,) its point; its violation is exactly zero.
-        evidence: that it is the optimum.
-        feasible_share: of 100 000 uniform random points.
-        evaluation_us: processor time of one evaluation in a batch of many, on one core of the machine that made the suite [us].
-        probes: fixed points.
-    """
-
-    best_known: float
-    best_x: tuple[float, ...]
+    best_known: float  # least feasible objective known, in the sense of minimisation
+    best_x: tuple[float, ...]  # (n,) its point; its violation is exactly zero
     evidence: Evidence
-    feasible_share: float
+    feasible_share: float  # of 100 000 uniform random points
+    # processor time of one evaluation in a batch of many, on one core of the machine that made the suite [us]
     evaluation_us: float
     probes: tuple[Probe, ...]
 

@@ -23,19 +23,12 @@ ALIKE_M = 2e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Biped:
-    """A robot in the form that the gaits of any humanoid need.
+    """A robot in the form that the gaits of any humanoid need."""
 
-    Attributes:
-        full: with all joints; those outside the legs count from the posture.
-        model: with the joints of the legs only, all others held in the posture.
-        legs: ``"left"`` and ``"right"``.
-        posture_rad: angles of the held joints.
-    """
-
-    full: Robot
-    model: Robot
-    legs: Mapping[str, Leg]
-    posture_rad: Mapping[str, float]
+    full: Robot  # with all joints; those outside the legs count from the posture
+    model: Robot  # with the joints of the legs only, all others held in the posture
+    legs: Mapping[str, Leg]  # ``"left"`` and ``"right"``
+    posture_rad: Mapping[str, float]  # angles of the held joints
 
     @property
     def joints(self) -> tuple[str, ...]:

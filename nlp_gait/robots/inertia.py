@@ -24,17 +24,11 @@ LEAST_MOMENT = 1e-30
 
 
 class Mass(NamedTuple):
-    """Mass and its distribution, whether or not a rigid body can have them.
-
-    Attributes:
-        mass_kg: mass.
-        com_m: (3,) centre of mass.
-        tensor_kgm2: (3, 3) inertia about the centre of mass.
-    """
+    """Mass and its distribution, whether or not a rigid body can have them."""
 
     mass_kg: float
-    com_m: Array
-    tensor_kgm2: Array
+    com_m: Array  # (3,) centre of mass
+    tensor_kgm2: Array  # (3, 3) inertia about the centre of mass
 
     @classmethod
     def from_link(cls, link: Link) -> Mass:

@@ -33,52 +33,32 @@ LEAST_WIDTH_M = 0.01
 
 
 class JointPlace(NamedTuple):
-    """A joint at zero angles, in the root's axes.
-
-    Attributes:
-        parent: link.
-        child: link.
-        place: (3,) from the root's origin [m].
-        axis: (3,).
-        limits: least and greatest angle [rad].
-    """
+    """A joint at zero angles, in the root's axes."""
 
     parent: str
     child: str
-    place: Array
-    axis: Array
-    limits: tuple[float, float]
+    place: Array  # (3,) from the root's origin [m]
+    axis: Array  # (3,) unit vector
+    limits: tuple[float, float]  # least and greatest angle [rad]
 
 
 Chain = list[JointPlace]  # joints from a link towards the root
 
 
 class Sole(NamedTuple):
-    """Part of a foot that touches the ground, from its joint, along the root's axes [m].
+    """Part of a foot that touches the ground, from its joint, along the root's axes [m]."""
 
-    Attributes:
-        height: of the joint above it.
-        low: (2,) least x and y.
-        high: (2,) greatest x and y.
-        points: their number.
-    """
-
-    height: float
-    low: Array
-    high: Array
-    points: int
+    height: float  # of the joint above it
+    low: Array  # (2,) least x and y
+    high: Array  # (2,) greatest x and y
+    points: int  # number of points on the ground
 
 
 class Legs(NamedTuple):
-    """The two legs of a robot, in any order.
-
-    Attributes:
-        feet: links.
-        chains: joints of each leg from the foot to where both meet.
-    """
+    """The two legs of a robot, in any order."""
 
     feet: tuple[str, str]
-    chains: tuple[Chain, Chain]
+    chains: tuple[Chain, Chain]  # joints of each leg from the foot to where both meet
 
     @property
     def links(self) -> set[str]:

@@ -24,22 +24,15 @@ SHORTEST_M = 1e-3
 class Leg:
     """Six turning joints from the torso to a foot, at zero angles, in the torso's axes and from its origin [m].
 
-    Attributes:
-        joints: names, the hip's first.
-        axes: (6, 3) unit vectors.
-        points: (6, 3) one point of each axis.
-        foot_m: (3,) origin of the foot's link.
-        limits_rad: (6, 2) limits of planned gaits.
-
     Raises:
         InputError: there is no bending knee, no hip with three different axes, or no ankle with two.
     """
 
-    joints: tuple[str, ...]
-    axes: Array
-    points: Array
-    foot_m: Array
-    limits_rad: Array
+    joints: tuple[str, ...]  # names, the hip's first
+    axes: Array  # (6, 3) unit vectors
+    points: Array  # (6, 3) one point of each axis
+    foot_m: Array  # (3,) origin of the foot's link
+    limits_rad: Array  # (6, 2) limits of planned gaits
 
     def __post_init__(self) -> None:
         a = self.axes

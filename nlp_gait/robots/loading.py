@@ -68,19 +68,12 @@ class RobotFile:
 
 
 class _Record(NamedTuple):
-    """A link, joint or foot as a file describes it.
-
-    Attributes:
-        raw: its fields.
-        file: the file.
-        about: reference point of the file's inertia tensors, if it states one.
-        reversed: the joint's angle is counted in the opposite direction.
-    """
+    """A link, joint or foot as a file describes it."""
 
     raw: Any
     file: str
-    about: About = None
-    reversed: bool = False
+    about: About = None  # reference point of the file's inertia tensors, if it states one
+    reversed: bool = False  # the joint's angle is counted in the opposite direction
 
 
 def robot_names() -> tuple[str, ...]:

@@ -54,18 +54,12 @@ def are_plausible(numbers: Any) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """Rigid link.
-
-    Attributes:
-        name: link name.
-        mass_kg: mass [kg].
-        com_m: centre of mass in the link frame [m].
-        inertia_com_kgm2: (ixx, iyy, izz, ixy, ixz, iyz) about the centre of mass, link axes [kg m^2].
-    """
+    """Rigid link."""
 
     name: str
     mass_kg: float
-    com_m: Vector
+    com_m: Vector  #: centre of mass in the link frame [m]
+    #: (ixx, iyy, izz, ixy, ixz, iyz) about the centre of mass, link axes [kg m^2]
     inertia_com_kgm2: tuple[float, float, float, float, float, float]
 
     def __post_init__(self) -> None:
@@ -135,27 +129,15 @@ class Motor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """Revolute joint; at q = 0 the child frame is at its origin with the parent's axes.
-
-    Attributes:
-        name: joint name.
-        parent: parent link.
-        child: child link.
-        origin_m: joint centre in the parent frame [m].
-        axis: unit vector of positive rotation.
-        limits_rad: (lower, upper) mechanical limits [rad].
-        planning_limits_rad: (lower, upper) limits of planned gaits [rad]; by default the mechanical ones.
-        velocity_limit_rad_s: [rad/s].
-        torque_limit_Nm: [Nm].
-        motor: motor and gear, if known.
-    """
+    """Revolute joint; at q = 0 the child frame is at its origin with the parent's axes."""
 
     name: str
     parent: str
     child: str
-    origin_m: Vector
-    axis: Vector
-    limits_rad: tuple[float, float]
+    origin_m: Vector  #: joint centre in the parent frame [m]
+    axis: Vector  #: unit vector of positive rotation
+    limits_rad: tuple[float, float]  #: (lower, upper) mechanical limits [rad]
+    #: (lower, upper) limits of planned gaits [rad]; by default the mechanical ones
     planning_limits_rad: tuple[float, float]
     velocity_limit_rad_s: float
     torque_limit_Nm: float
@@ -173,21 +155,15 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Foot:
-    """Flat sole under an ankle; distances are from the ankle's projection on the ground.
+    """Flat sole under an ankle; distances are from the ankle's projection on the ground."""
 
-    Attributes:
-        link: the foot's link, whose frame is at the ankle.
-        ankle_height_m: ankle above the sole [m].
-        front_m: extent of the sole rectangle forward [m], likewise ``back_m``, ``left_m``, ``right_m``.
-        sole_polygon_m: true outline of the sole, (x, y) from the ankle [m], in order.
-    """
-
-    link: str
-    ankle_height_m: float
-    front_m: float
+    link: str  #: the foot's link, whose frame is at the ankle
+    ankle_height_m: float  #: ankle above the sole [m]
+    front_m: float  #: extent of the sole rectangle forward [m], likewise ``back_m``, ``left_m``, ``right_m``
     back_m: float
     left_m: float
     right_m: float
+    #: true outline of the sole, (x, y) from the ankle [m], in order
     sole_polygon_m: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -200,35 +176,23 @@ class Foot:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robot:
-    """Tree of links joined by revolute joints.
+    """Tree of links joined by revolute joints."""
 
-    Attributes:
-        name: for example ``"nao-v5"``.
-        description: one sentence.
-        sources: origin of each group of numbers.
-        root: link with no parent (the torso).
-        links: by name.
-        joints: by name.
-        feet: ``"left"`` and ``"right"``.
-        toes: soles beyond a toe joint, by side; the frame of a toe's link is at that joint.
-        armatures_kgm2: by joint, inertia of rotors at the joint, if the dynamics include it; none by default.
-        posture_rad: angles of joints that a gait does not move; by default zero, or the nearest limit.
-        heat_loss_W_per_Nm2: heat of the motors per squared torque, if the robot's file states it.
-        notes: what was inferred or changed when the robot was read; a sentence each.
-    """
-
-    name: str
-    description: str
-    sources: Mapping[str, str]
-    root: str
-    links: Mapping[str, Link]
-    joints: Mapping[str, Joint]
-    feet: Mapping[str, Foot]
+    name: str  #: for example ``"nao-v5"``
+    description: str  #: one sentence
+    sources: Mapping[str, str]  #: origin of each group of numbers
+    root: str  #: link with no parent (the torso)
+    links: Mapping[str, Link]  #: by name
+    joints: Mapping[str, Joint]  #: by name
+    feet: Mapping[str, Foot]  #: ``"left"`` and ``"right"``
+    #: soles beyond a toe joint, by side; the frame of a toe's link is at that joint
     toes: Mapping[str, Foot] = field(default_factory=dict)
+    #: by joint, inertia of rotors at the joint, if the dynamics include it; none by default
     armatures_kgm2: Mapping[str, float] = field(default_factory=dict)
+    #: angles of joints that a gait does not move; by default zero, or the nearest limit
     posture_rad: Mapping[str, float] = field(default_factory=dict)
-    heat_loss_W_per_Nm2: float | None = None
-    notes: tuple[str, ...] = ()
+    heat_loss_W_per_Nm2: float | None = None  #: heat of the motors per squared torque, if the robot's file states it
+    notes: tuple[str, ...] = ()  #: what was inferred or changed when the robot was read; a sentence each
 
     def __post_init__(self) -> None:
         if self.root not in self.links:

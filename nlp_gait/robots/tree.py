@@ -14,25 +14,15 @@ from nlp_gait.robots.robot import Joint, Link, Robot, Vector
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Body:
-    """Link in a tree from the fixed link; its reference point is the joint to its parent in the tree.
+    """Link in a tree from the fixed link; its reference point is the joint to its parent in the tree."""
 
-    Attributes:
-        link: mass and inertia, in link axes.
-        parent: index of the parent body; -1 for the fixed one.
-        joint: joint to the parent; None for the fixed one.
-        direction: +1 if the joint's child link is this body's, else -1.
-        offset_m: from the parent's reference point to this one, in the parent's axes [m].
-        com_offset_m: from the reference point to the centre of mass, in link axes [m].
-        armature_kgm2: inertia of the rotor at the joint, if the robot's dynamics include it [kg m^2].
-    """
-
-    link: Link
-    parent: int
-    joint: Joint | None
-    direction: int
-    offset_m: Vector
-    com_offset_m: Vector
-    armature_kgm2: float = 0.0
+    link: Link  # mass and inertia, in link axes
+    parent: int  # index of the parent body; -1 for the fixed one
+    joint: Joint | None  # joint to the parent; None for the fixed one
+    direction: int  # +1 if the joint's child link is this body's, else -1
+    offset_m: Vector  # from the parent's reference point to this one, in the parent's axes [m]
+    com_offset_m: Vector  # from the reference point to the centre of mass, in link axes [m]
+    armature_kgm2: float = 0.0  # inertia of the rotor at the joint, if the robot's dynamics include it [kg m^2]
 
 
 def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[Body, ...]:

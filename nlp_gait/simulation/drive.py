@@ -30,24 +30,16 @@ class Drive:
     The stiffness is proportional to the stall torque of the joint's motor: all motors reach it at the same error. The drive
     also follows a planned velocity and torque if its set-point is shifted by damping / stiffness times the velocity, and by
     the torque / stiffness (``set_points``).
-
-    Attributes:
-        full_error_rad: error at which a motor reaches its stall torque.
-        time_constant_s: damping / stiffness.
-        period_s: time between set-points; NAO's own controller works in cycles of 10 ms.
-        interpolation: ``linear`` between set-points, as NAO's controller does between timed commands, or each ``held``.
-        feed_forward: ``torque`` (and velocity), ``velocity``, or ``none``.
-        torque_limits: source of the limits.
-        feedback: corrects the set-points; None for open loop.
     """
 
-    full_error_rad: float = 0.08
-    time_constant_s: float = 0.02
-    period_s: float = 0.01
+    full_error_rad: float = 0.08  #: error at which a motor reaches its stall torque
+    time_constant_s: float = 0.02  #: damping / stiffness
+    period_s: float = 0.01  #: time between set-points; NAO's own controller works in cycles of 10 ms
+    #: ``linear`` between set-points, as NAO's controller does between timed commands, or each ``held``
     interpolation: str = "linear"
-    feed_forward: str = "torque"
-    torque_limits: str = "urdf"
-    feedback: Feedback | None = None
+    feed_forward: str = "torque"  #: ``torque`` (and velocity), ``velocity``, or ``none``
+    torque_limits: str = "urdf"  #: source of the limits
+    feedback: Feedback | None = None  #: corrects the set-points; None for open loop
 
     def __post_init__(self) -> None:
         for name in ("full_error_rad", "time_constant_s", "period_s"):

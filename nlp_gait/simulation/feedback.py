@@ -38,22 +38,6 @@ class Feedback:
     pendulum of height h with w^2 = g / h: gain k corresponds to a spring of m w^2 k and a damper of m w k, which are 480 N/m and
     78 N s/m for NAO's 5.3 kg, h = 0.26 m and k = 2.4.
 
-    Attributes:
-        spring_N_per_m: towards the planned place.
-        damper_Ns_per_m: towards the planned velocity.
-        tilt_spring_Nm_per_rad: towards the planned attitude.
-        tilt_damper_Nms_per_rad: against turning.
-        growth_per_s: integral gain: share of force and moment by which they grow per second.
-        growth_limit: of the integral, along each axis: of the force as a share of the weight, of the moment as that share of the
-            weight at the height of the torso; 0.05 compensates a slope of 3 degrees.
-        period_s: between two measurements, each of which acts until the next.
-        delay_s: from a measurement to the drives: one more cycle of the controller.
-        position_noise_m: standard deviation of the measured place of the torso over the feet.
-        velocity_noise_m_s: of its velocity.
-        tilt_noise_rad: of its attitude about each axis.
-        rate_noise_rad_s: of its rates.
-        seed: of the noise.
-
     Source:
         Virtual model control: Pratt, Chew, Torres, Dilworth, Pratt (2001). Gain k: Caron, Kheddar, Tempier (2019), whose
         controller of HRP-4 has 1 + 5 / w with w = 3.55 / s, and an integral. Noise: joint sensors that round to 0.1 degrees
@@ -61,18 +45,20 @@ class Feedback:
         assumptions. `python -m benchmarks.engine feedback` shows their effects.
     """
 
-    spring_N_per_m: float = 500.0
-    damper_Ns_per_m: float = 50.0
-    tilt_spring_Nm_per_rad: float = 30.0
-    tilt_damper_Nms_per_rad: float = 2.0
-    growth_per_s: float = 2.0
+    spring_N_per_m: float = 500.0  # towards the planned place
+    damper_Ns_per_m: float = 50.0  # towards the planned velocity
+    tilt_spring_Nm_per_rad: float = 30.0  # towards the planned attitude
+    tilt_damper_Nms_per_rad: float = 2.0  # against turning
+    growth_per_s: float = 2.0  # integral gain: share of force and moment by which they grow per second
+    # of the integral, along each axis: of the force as a share of the weight, of the moment as that share of the weight
+    # at the height of the torso; 0.05 compensates a slope of 3 degrees
     growth_limit: float = 0.05
-    period_s: float = 0.01
-    delay_s: float = 0.01
-    position_noise_m: float = 2.5e-4
-    velocity_noise_m_s: float = 0.012
-    tilt_noise_rad: float = 1e-3
-    rate_noise_rad_s: float = 0.01
+    period_s: float = 0.01  # between two measurements, each of which acts until the next
+    delay_s: float = 0.01  # from a measurement to the drives: one more cycle of the controller
+    position_noise_m: float = 2.5e-4  # standard deviation of the measured place of the torso over the feet
+    velocity_noise_m_s: float = 0.012  # of its velocity
+    tilt_noise_rad: float = 1e-3  # of its attitude about each axis
+    rate_noise_rad_s: float = 0.01  # of its rates
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -97,23 +83,14 @@ FEEDBACKS = {"none": None, "torso-spring": Feedback()}
 
 
 class SensorValues(NamedTuple):
-    """Sensor values of the torso at one instant.
+    """Sensor values of the torso at one instant."""
 
-    Attributes:
-        step: of the engine.
-        place: (3,) of its origin from the feet, each weighted with its planned share of the load [m].
-        velocity: (3,) [m/s].
-        attitude: (3, 3) rotation from its axes to those of the floor.
-        tilt_error: (3,) error of the attitude, about the axes of the floor [rad].
-        rate: (3,) about the axes of the floor [rad/s].
-    """
-
-    step: int
-    place: Array
-    velocity: Array
-    attitude: Array
-    tilt_error: Array
-    rate: Array
+    step: int  # number of the engine's step
+    place: Array  # (3,) of its origin from the feet, each weighted with its planned share of the load [m]
+    velocity: Array  # (3,) [m/s]
+    attitude: Array  # (3, 3) rotation from its axes to those of the floor
+    tilt_error: Array  # (3,) error of the attitude, about the axes of the floor [rad]
+    rate: Array  # (3,) about the axes of the floor [rad/s]
 
 
 class Balance:

@@ -31,18 +31,13 @@ WRENCH = 6  # its components
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sharing:
-    """Limits of the load sharing.
+    """Limits of the load sharing."""
 
-    Attributes:
-        friction: coefficient of both soles on the ground.
-        load_rate_1_s: fastest change of a foot's load, in weights per second, from zero at landing and to zero at lifting;
-            infinite for a load that may jump.
-        period_s: between two instants with a chosen wrench; NAO's own controller has cycles of 10 ms.
-    """
-
-    friction: float = SOLE_FRICTION
+    friction: float = SOLE_FRICTION  # coefficient of both soles on the ground
+    # fastest change of a foot's load, in weights per second, from zero at landing and to zero at lifting; infinite for
+    # a load that may jump
     load_rate_1_s: float = math.inf
-    period_s: float = 0.01
+    period_s: float = 0.01  # between two instants with a chosen wrench; NAO's own controller has cycles of 10 ms
 
     def __post_init__(self) -> None:
         for name in ("friction", "load_rate_1_s", "period_s"):
@@ -62,19 +57,12 @@ class Support(NamedTuple):
 
 
 class Instants(NamedTuple):
-    """Loads of n samples that are linear in the wrench w (6,) on the right sole: torque - gain w, left - carried w.
+    """Loads of n samples that are linear in the wrench w (6,) on the right sole: torque - gain w, left - carried w."""
 
-    Attributes:
-        torque: (n, J) without it [Nm].
-        gain: (n, J, 6).
-        left: (n, 6) wrench on the left sole without it [N, Nm].
-        carried: (n, 6, 6).
-    """
-
-    torque: Array
-    gain: Array
-    left: Array
-    carried: Array
+    torque: Array  # (n, J) without it [Nm]
+    gain: Array  # (n, J, 6)
+    left: Array  # (n, 6) wrench on the left sole without it [N, Nm]
+    carried: Array  # (n, 6, 6)
 
 
 def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:

@@ -24,18 +24,13 @@ MIDDLE = (0.2, 0.8)  # of the phase, undisturbed by the start from unloaded driv
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Power:
-    """Mean power over the phase [W].
+    """Mean power over the phase [W]."""
 
-    Attributes:
-        mechanical_W: |torque rate|, summed over the joints.
-        signed_W: torque times rate: work of the drives minus work on them. If set-points jump, |torque rate| depends on the
-            engine's step and this does not.
-        heat_W: K torque^2.
-    """
-
-    mechanical_W: float
+    mechanical_W: float  # |torque rate|, summed over the joints
+    # torque times rate: work of the drives minus work on them. If set-points jump, |torque rate| depends on the
+    # engine's step and this does not
     signed_W: float
-    heat_W: float
+    heat_W: float  # K torque^2
 
     @classmethod
     def compute(cls, torque: Array, rate: Array, heat_loss: float, mean: Callable[[Array], float]) -> Power:
@@ -64,68 +59,41 @@ class Landing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Touchdown:
-    """First contact of a swinging foot that lasts 3 ms, in the second half of its swing.
-
-    Attributes:
-        side: of the foot.
-        planned_s: planned time.
-        measured_s: begin of the contact.
-        speed_m_s: of the sole under the ankle towards the ground just before; 0 if it moved away.
-    """
+    """First contact of a swinging foot that lasts 3 ms, in the second half of its swing."""
 
     side: str
     planned_s: float
-    measured_s: float
-    speed_m_s: float
+    measured_s: float  # begin of the contact
+    speed_m_s: float  # of the sole under the ankle towards the ground just before; 0 if it moved away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
-    """A simulation in numbers; those over time are for the phase, without the settling after it.
+    """A simulation in numbers; those over time are for the phase, without the settling after it."""
 
-    Attributes:
-        fallen: the torso tilted by more than 45 degrees or sank below 60 % of its height, then or while settling.
-        fell_at_s: time of the fall; None if it stayed up.
-        largest_tilt_deg: of the torso, settling included.
-        tracking_rms_rad: planned minus measured angle, over all joints.
-        tracking_max_rad: largest.
-        slip_m: largest distance of a supporting sole from its place at the begin of its support.
-        landings: by side, of the swinging feet.
-        pressure_rms_m: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP.
-        pressure_max_m: largest.
-        pressure_middle_rms_m: over the middle 60 % of the phase.
-        pressure_raw_rms_m: without averaging; contact forces ring at every new set-point.
-        pressure_in_feet_rms_m: both relative to the measured and the planned places of the supporting feet.
-        touchdowns: of the swinging feet, in order of time.
-        earliest_landing_s: largest time by which a foot touched the ground too early; negative if all were late.
-        landing_speed_m_s: largest of the touchdowns; None without any.
-        predicted: power by the rigid model.
-        measured: power of the drives.
-        saturated: share of time at the torque limit, by joint, where not zero.
-        beyond_limit: ratio of the largest planned torque to the torque limit, by joint, where above 1: no drive can follow.
-        joint_limits: joints that left their mechanical range.
-    """
-
-    fallen: bool
-    fell_at_s: float | None
-    largest_tilt_deg: float
-    tracking_rms_rad: float
-    tracking_max_rad: float
-    slip_m: float
-    landings: Mapping[str, Landing]
+    fallen: bool  #: the torso tilted by more than 45 degrees or sank below 60 % of its height, then or while settling
+    fell_at_s: float | None  #: time of the fall; None if it stayed up
+    largest_tilt_deg: float  #: of the torso, settling included
+    tracking_rms_rad: float  #: planned minus measured angle, over all joints
+    tracking_max_rad: float  #: largest
+    slip_m: float  #: largest distance of a supporting sole from its place at the begin of its support
+    landings: Mapping[str, Landing]  #: by side, of the swinging feet
+    #: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP
     pressure_rms_m: float | None
-    pressure_max_m: float | None
-    pressure_middle_rms_m: float | None
-    pressure_raw_rms_m: float | None
-    pressure_in_feet_rms_m: float | None
-    touchdowns: tuple[Touchdown, ...]
+    pressure_max_m: float | None  #: largest
+    pressure_middle_rms_m: float | None  #: over the middle 60 % of the phase
+    pressure_raw_rms_m: float | None  #: without averaging; contact forces ring at every new set-point
+    pressure_in_feet_rms_m: float | None  #: both relative to the measured and the planned places of the supporting feet
+    touchdowns: tuple[Touchdown, ...]  #: of the swinging feet, in order of time
+    #: largest time by which a foot touched the ground too early; negative if all were late
     earliest_landing_s: float | None
-    landing_speed_m_s: float | None
-    predicted: Power
-    measured: Power
-    saturated: Mapping[str, float]
+    landing_speed_m_s: float | None  #: largest of the touchdowns; None without any
+    predicted: Power  #: power by the rigid model
+    measured: Power  #: power of the drives
+    saturated: Mapping[str, float]  #: share of time at the torque limit, by joint, where not zero
+    #: ratio of the largest planned torque to the torque limit, by joint, where above 1: no drive can follow
     beyond_limit: Mapping[str, float]
-    joint_limits: tuple[str, ...]
+    joint_limits: tuple[str, ...]  #: joints that left their mechanical range
 
 
 def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
@@ -257,30 +225,17 @@ def _if_any(statistic: Any, values: Array) -> float | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walk:
-    """A walk in numbers; distances are of the point halfway between the feet, from start to rest.
-
-    Attributes:
-        steps: planned.
-        steps_done: whole steps before a fall; all if it fell later or not at all.
-        planned_m: distance.
-        walked_m: distance forward; None after a fall.
-        drift_m: distance to the left; None after a fall.
-        heading_deg: direction of the torso at the end, positive to the left; None after a fall.
-        model_J_per_m: energy by the model, mechanical and heat, per planned metre.
-        engine_J_per_planned_m: energy of the drives; None after a fall.
-        engine_J_per_m: per metre walked; None after a fall or without progress.
-        measurements: of the simulation.
-    """
+    """A walk in numbers; distances are of the point halfway between the feet, from start to rest."""
 
     steps: int
-    steps_done: int
+    steps_done: int  # whole steps before a fall; all if it fell later or not at all
     planned_m: float
-    walked_m: float | None
-    drift_m: float | None
-    heading_deg: float | None
-    model_J_per_m: float
-    engine_J_per_planned_m: float | None
-    engine_J_per_m: float | None
+    walked_m: float | None  # distance forward; None after a fall
+    drift_m: float | None  # distance to the left; None after a fall
+    heading_deg: float | None  # direction of the torso at the end, positive to the left; None after a fall
+    model_J_per_m: float  # energy by the model, mechanical and heat, per planned metre
+    engine_J_per_planned_m: float | None  # energy of the drives; None after a fall
+    engine_J_per_m: float | None  # per metre walked; None after a fall or without progress
     measurements: Measurements
 
     def course(self) -> dict[str, Any]:

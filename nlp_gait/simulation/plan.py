@@ -26,25 +26,15 @@ MOST_STEPS, LONGEST_S = 1000, 300.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
-    """A gait to simulate.
+    """A gait to simulate."""
 
-    Attributes:
-        robot: of the simulation model: links that never move are welded.
-        full_robot: with all joints, for its shapes.
-        signals: planned time histories on a dense grid.
-        heat_loss: K [W/(Nm)^2].
-        gravity: [m/s^2].
-        ground: stairs on the floor, which is at z = 0.
-        planar: the robot's root stays in the plane y = 0.
-    """
-
-    robot: Robot
-    full_robot: Robot
-    signals: Signals
-    heat_loss: float
-    gravity: float
-    ground: tuple[Tread, ...] = ()
-    planar: bool = False
+    robot: Robot  #: of the simulation model: links that never move are welded
+    full_robot: Robot  #: with all joints, for its shapes
+    signals: Signals  #: planned time histories on a dense grid
+    heat_loss: float  #: K [W/(Nm)^2]
+    gravity: float  #: [m/s^2]
+    ground: tuple[Tread, ...] = ()  #: stairs on the floor, which is at z = 0
+    planar: bool = False  #: the robot's root stays in the plane y = 0
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -19,21 +19,15 @@ MASS_FACTORS = (0.9, 1.1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """Disturbances that a gait survives; a fall while settling counts.
+    """Disturbances that a gait survives; a fall while settling counts."""
 
-    Attributes:
-        undisturbed: whether it survives without any.
-        push_Ns: by direction, the largest impulse on the torso below the first one that makes it fall.
-        slope_deg: by the direction in which the floor rises, the largest slope below the first one that makes it fall.
-        friction: by coefficient, whether it survives.
-        mass_factor: by factor on all masses, whether it survives.
-    """
-
-    undisturbed: bool
+    undisturbed: bool  # whether it survives without any
+    # by direction, the largest impulse on the torso below the first one that makes it fall
     push_Ns: Mapping[str, float]
+    # by the direction in which the floor rises, the largest slope below the first one that makes it fall
     slope_deg: Mapping[str, float]
-    friction: Mapping[float, bool]
-    mass_factor: Mapping[float, bool]
+    friction: Mapping[float, bool]  # by coefficient, whether it survives
+    mass_factor: Mapping[float, bool]  # by factor on all masses, whether it survives
 
 
 def measure_robustness(plan: Plan, drive: Drive | None = None) -> Robustness:

@@ -37,15 +37,10 @@ OnStep = Callable[[Any, Any], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Push:
-    """Impulse on the torso's centre of mass in the middle of the phase.
+    """Impulse on the torso's centre of mass in the middle of the phase."""
 
-    Attributes:
-        impulse_Ns: (x, y) [N s].
-        duration_s: of the constant force.
-    """
-
-    impulse_Ns: tuple[float, float]
-    duration_s: float = 0.05
+    impulse_Ns: tuple[float, float]  # (x, y) [N s]
+    duration_s: float = 0.05  # of the constant force
 
     def force(self, since_s: float) -> tuple[float, float]:
         """Return the force (x, y) at a time since its begin [N]."""
@@ -56,20 +51,12 @@ class Push:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
-    """Differences of the simulated world and robot from the plan's.
+    """Differences of the simulated world and robot from the plan's."""
 
-    Attributes:
-        friction: coefficient of sliding friction.
-        mass_factor: on masses and inertias of all links; the gait was planned for 1.
-        stiffness_factor: on the stiffness of the joints' drives; their damping stays.
-        slope_rad: (x, y) slope of the floor: positive rises forward or to the left.
-        push: none by default.
-    """
-
-    friction: float = FRICTION
-    mass_factor: float = 1.0
-    stiffness_factor: float = 1.0
-    slope_rad: tuple[float, float] = (0.0, 0.0)
+    friction: float = FRICTION  # coefficient of sliding friction
+    mass_factor: float = 1.0  # on masses and inertias of all links; the gait was planned for 1
+    stiffness_factor: float = 1.0  # on the stiffness of the joints' drives; their damping stays
+    slope_rad: tuple[float, float] = (0.0, 0.0)  # (x, y) slope of the floor: positive rises forward or to the left
     push: Push | None = None
 
     def __post_init__(self) -> None:
@@ -89,35 +76,20 @@ class Conditions:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Simulation:
-    """Measurements at every step of the engine; the first axis is time, axes are those of the floor.
+    """Measurements at every step of the engine; the first axis is time, axes are those of the floor."""
 
-    Attributes:
-        t: (T,) [s].
-        q: (T, J) joint angles, columns as in the plan [rad].
-        qd: (T, J) [rad/s].
-        torque: (T, J) of the drives [Nm].
-        set_points: (T, J) of the drives, including the feed-forward [rad].
-        torso: (T, 3) its origin [m].
-        tilt: (T,) angle between the torso's axis and its planned direction [rad].
-        heading: (T,) angle of the torso's forward axis about the floor's normal, positive to the left [rad].
-        feet: (T, 2, 3) soles under the ankles, left and right [m].
-        loads: (T, 2) force of the floor on the left and right foot, along its normal [N].
-        pressure: (T, 2) centre of pressure of both feet [m]; NaN in flight.
-        fell_at_s: None if the robot stayed up.
-    """
-
-    t: Array
-    q: Array
-    qd: Array
-    torque: Array
-    set_points: Array
-    torso: Array
-    tilt: Array
-    heading: Array
-    feet: Array
-    loads: Array
-    pressure: Array
-    fell_at_s: float | None
+    t: Array  #: (T,) [s]
+    q: Array  #: (T, J) joint angles, columns as in the plan [rad]
+    qd: Array  #: (T, J) [rad/s]
+    torque: Array  #: (T, J) of the drives [Nm]
+    set_points: Array  #: (T, J) of the drives, including the feed-forward [rad]
+    torso: Array  #: (T, 3) its origin [m]
+    tilt: Array  #: (T,) angle between the torso's axis and its planned direction [rad]
+    heading: Array  #: (T,) angle of the torso's forward axis about the floor's normal, positive to the left [rad]
+    feet: Array  #: (T, 2, 3) soles under the ankles, left and right [m]
+    loads: Array  #: (T, 2) force of the floor on the left and right foot, along its normal [N]
+    pressure: Array  #: (T, 2) centre of pressure of both feet [m]; NaN in flight
+    fell_at_s: float | None  #: None if the robot stayed up
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """Return the time histories, for an archive."""

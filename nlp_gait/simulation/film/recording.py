@@ -30,35 +30,20 @@ class Simulator(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """A simulation at the instants of a film's pictures; the first axis of arrays is time.
-
-    Attributes:
-        title: one line.
-        model: of the engine.
-        simulation: at every step.
-        t: (F,) [s]; after a fall constant.
-        states: (F, ...) positions in the engine.
-        power: (F,) of the drives, mechanical and heat [W].
-        speed: (F,) of the torso, forward [m/s].
-        path: (F, 3) of the torso without its sway [m].
-        stand: (F, 2) halfway between the feet, without its sway [m].
-        pressure: (F, 2) centre of pressure [m]; NaN in flight.
-        planned: (F, 2) planned zero-moment point [m].
-        load: (F,) force of the floor [N].
-    """
+    """A simulation at the instants of a film's pictures; the first axis of arrays is time."""
 
     title: str
-    model: Any
+    model: Any  # of the engine
     simulation: Simulation
-    t: Array
-    states: Array
-    power: Array
-    speed: Array
-    path: Array
-    stand: Array
-    pressure: Array
-    planned: Array
-    load: Array
+    t: Array  # (F,) [s]; after a fall constant
+    states: Array  # (F, ...) positions in the engine
+    power: Array  # (F,) of the drives, mechanical and heat [W]
+    speed: Array  # (F,) of the torso, forward [m/s]
+    path: Array  # (F, 3) of the torso without its sway [m]
+    stand: Array  # (F, 2) halfway between the feet, without its sway [m]
+    pressure: Array  # (F, 2) centre of pressure [m]; NaN in flight
+    planned: Array  # (F, 2) planned zero-moment point [m]
+    load: Array  # (F,) force of the floor [N]
 
 
 def record_film(title: str, plan: Plan, simulate: Simulator, interval_s: float) -> Recording:

@@ -32,17 +32,9 @@ MOST_GEOMETRIES = 2000
 
 
 class View(NamedTuple):
-    """Part of a picture [pixels]; the origin is the upper left corner.
+    """Part of a picture [pixels]; the origin is the upper left corner."""
 
-    Attributes:
-        name: side, front, back or above.
-        left: edge.
-        top: edge.
-        width: positive.
-        height: positive.
-    """
-
-    name: str
+    name: str  # side, front, back or above
     left: int
     top: int
     width: int
