@@ -55,7 +55,7 @@ class Rule:
 
 
 class ConstraintHandling(Protocol):
-    """Settings of a constraint handling, immutable; gives the rule for each moment of a run."""
+    """Settings of a constraint handling, immutable, SearchError where not allowed; gives the rule for each moment of a run."""
 
     @property
     def name(self) -> str:
@@ -88,7 +88,6 @@ class Deb:
     name: ClassVar[str] = "Deb's feasibility rules"
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Return `FEASIBILITY`; see `ConstraintHandling.rule`."""
         return FEASIBILITY
 
 
@@ -98,9 +97,6 @@ class StaticPenalty:
 
     Attributes:
         weight: Objective units per unit of violation, > 0. There is no default, as none suits every problem.
-
-    Raises:
-        SearchError: The weight is not a finite number > 0.
     """
 
     weight: float
@@ -110,7 +106,6 @@ class StaticPenalty:
         check_number(self, "weight", above=0.0)
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Return the penalty rule; see `ConstraintHandling.rule`."""
         return Rule(keys=lambda f, violation: (np.zeros_like(f), f + self.weight * violation))
 
 
@@ -125,9 +120,6 @@ class EpsilonLevel:
         share: Epsilon starts at the violation below which this share of the first generation lies (theta).
         exponent: Speed of the fall (cp).
         control: Fraction of the budget at which epsilon reaches zero (Tc / T).
-
-    Raises:
-        SearchError: share or control is outside 0..1, or the exponent is not a finite number > 0.
 
     Source:
         Takahama, Sakai (2006), Constrained optimization by the epsilon constrained differential evolution with
@@ -145,7 +137,6 @@ class EpsilonLevel:
         check_number(self, "control", above=0.0, at_most=1.0)
 
     def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Return the rule of the current epsilon; see `ConstraintHandling.rule`."""
         epsilon = self.epsilon(progress, initial_violation)
         return Rule(keys=lambda f, violation: (np.where(violation <= epsilon, 0.0, violation), f))
 

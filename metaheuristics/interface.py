@@ -141,7 +141,10 @@ class PopulationSearch(Generic[Settings]):
 
 
 class Algorithm(Protocol):
-    """Settings of a search algorithm, immutable; each `start` begins an independent run."""
+    """Settings of a search algorithm, immutable; each `start` begins an independent run.
+
+    Settings that are not allowed raise SearchError, as does a package that is not installed.
+    """
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ from metaheuristics.interface import Algorithm
 from metaheuristics.settings import check_installed, is_installed
 
 if TYPE_CHECKING:
-    from metaheuristics.multi_objective.interface import FrontAlgorithm
+    from metaheuristics.multi_objective.minimize_many import FrontAlgorithm
 
 T = TypeVar("T", covariant=True)
 

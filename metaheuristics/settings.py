@@ -6,6 +6,7 @@ import math
 from dataclasses import MISSING, fields
 from importlib.util import find_spec
 from numbers import Integral, Real
+from operator import ge, gt, le
 from typing import TYPE_CHECKING, Any
 
 from metaheuristics.errors import SearchError, abbreviate
@@ -13,29 +14,26 @@ from metaheuristics.errors import SearchError, abbreviate
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+COMPARISONS = {">": gt, ">=": ge, "<=": le}
+
 
 def check_number(
     settings: DataclassInstance,
-    name: str,
-    *,
+    *names: str,
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
 ) -> None:
-    """Raise SearchError unless a field is a finite number within the limits; ``above`` is exclusive."""
-    value: Any = getattr(settings, name)
-    limits = [f"> {above}"] if above is not None else []
-    limits += [f">= {at_least}"] if at_least is not None else []
-    limits += [f"<= {at_most}"] if at_most is not None else []
-    allowed = " ".join(["a finite number", " and ".join(limits)]).strip()
-    number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    if (
-        not number
-        or (above is not None and value <= above)
-        or (at_least is not None and value < at_least)
-        or (at_most is not None and value > at_most)
-    ):
-        raise bad_setting(settings, name, allowed)
+    """Raise SearchError unless fields are finite numbers within the limits; ``above`` is exclusive."""
+    limits = {">": above, ">=": at_least, "<=": at_most}
+    given = " and ".join(f"{sign} {limit}" for sign, limit in limits.items() if limit is not None)
+    for name in names:
+        value: Any = getattr(settings, name)
+        number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or any(
+            limit is not None and not COMPARISONS[sign](value, limit) for sign, limit in limits.items()
+        ):
+            raise bad_setting(settings, name, f"a finite number {given}".strip())
 
 
 def check_count(settings: DataclassInstance, name: str, *, at_least: int, at_most: int | None = None) -> None:

@@ -28,9 +28,6 @@ class CmaEs:
         sigma: First standard deviation, as a share of each variable's range.
         growth: Factor on the population at every restart.
 
-    Raises:
-        SearchError: A setting is not allowed.
-
     Source:
         Hansen, Ostermeier (2001), Completely derandomized self-adaptation in evolution strategies; Auger, Hansen (2005),
         A restart CMA evolution strategy with increasing population size.
@@ -47,7 +44,6 @@ class CmaEs:
         check_number(self, "growth", at_least=1.0)
 
     def start(self, start: Start) -> CmaEsSearch:
-        """Begin a run; see `Algorithm.start`."""
         return CmaEsSearch(self, start)
 
 
@@ -58,7 +54,6 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
     """
 
     def __init__(self, settings: CmaEs, start: Start) -> None:
-        """Ask for the starting points first."""
         super().__init__(settings, start)
         self._cube = UnitCube(start)
         self._size = float(settings.population)
@@ -66,7 +61,6 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
         self._asked: list[Array] = []
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Adapt the distribution and sample it; see `Search.tell`."""
         if self._strategy is None:
             self._strategy = self._begin(self._centre(X[rule.best(f, violation)]))
         else:
@@ -129,7 +123,6 @@ class CmaLagrangian(CmaEs):
     name: ClassVar[str] = "cma-al"
 
     def start(self, start: Start) -> CmaLagrangianSearch:
-        """Begin a run; see `Algorithm.start`."""
         return CmaLagrangianSearch(self, start)
 
 
@@ -137,7 +130,6 @@ class CmaLagrangianSearch(CmaEsSearch):
     """A run of `CmaLagrangian`; see `Search`."""
 
     def __init__(self, settings: CmaEs, start: Start) -> None:
-        """Ask for the starting points first."""
         super().__init__(settings, start)
         self._fitness: Any = None
         self._current: tuple[float, Array] = (np.inf, np.empty(0))

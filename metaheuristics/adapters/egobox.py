@@ -27,9 +27,6 @@ class BayesianOptimisation:
     Attributes:
         population: points evaluated before the first model; 20 are about two for each of 9 variables.
 
-    Raises:
-        SearchError: a setting is not allowed, or egobox is not installed.
-
     Source:
         Lafage (2022), egobox, a Rust toolbox for efficient global optimization; Jones, Schonlau, Welch (1998), Efficient
         global optimization of expensive black-box functions; the transform of constraints after Eriksson, Poloczek (2021),
@@ -44,7 +41,6 @@ class BayesianOptimisation:
         check_installed(self.name, "egobox")
 
     def start(self, start: Start) -> BayesianSearch:
-        """Begin a run; see `Algorithm.start`."""
         return BayesianSearch(self, start)
 
 
@@ -52,7 +48,6 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
     """A run of `BayesianOptimisation`; see `Search`. egobox works in the unit cube of the free variables."""
 
     def __init__(self, settings: BayesianOptimisation, start: Start) -> None:
-        """Ask for the starting points first."""
         super().__init__(settings, start)
         self._cube = UnitCube(start)
         self._known = np.empty((0, self._cube.size))
@@ -60,7 +55,6 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
         self._model: Any = None
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Fit the models and ask for the most promising point; see `Search.tell`."""
         if not self._cube.size:
             return
         inequalities = self._start.inequalities(X, violation)
@@ -71,7 +65,6 @@ class BayesianSearch(PopulationSearch[BayesianOptimisation]):
         self._X = self._cube.points(self._suggest())
 
     def stop(self) -> tuple[str, ...]:
-        """Give up where there is nothing to vary, or too much to fit."""
         if not self._cube.size:
             return ("all variables are fixed",)
         return (f"fitting to more than {MOST} points takes too long",) if len(self._known) >= MOST else ()

@@ -27,17 +27,12 @@ class ScipyStarts:
         margin: tightens each constraint, in units of its scale: a solver stops slightly outside its constraints, which a
             search counts as infeasible. Not applied to the total violation, which has no inside.
         iterations: limit for one start.
-
-    Raises:
-        SearchError: a setting is not allowed.
     """
 
     population: int = 1
     margin: float = 1e-7
     iterations: int = 1000
     name: ClassVar[str]
-    method: ClassVar[str]
-    by_row: ClassVar[bool]
 
     def __post_init__(self) -> None:
         check_count(self, "population", at_least=1)
@@ -45,7 +40,6 @@ class ScipyStarts:
         check_count(self, "iterations", at_least=1)
 
     def start(self, start: Start) -> ScipyStartsSearch:
-        """Begin a run; see `Algorithm.start`."""
         return ScipyStartsSearch(self, start)
 
 
@@ -60,8 +54,6 @@ class SlsqpStarts(ScipyStarts):
     """
 
     name: ClassVar[str] = "scipy:SLSQP"
-    method: ClassVar[str] = "SLSQP"
-    by_row: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -75,15 +67,14 @@ class CobyqaStarts(ScipyStarts):
     """
 
     name: ClassVar[str] = "scipy:COBYQA"
-    method: ClassVar[str] = "COBYQA"
-    by_row: ClassVar[bool] = False
 
 
 class _Functions:
     """Objective and constraints of single points in the unit cube of the free variables; each is evaluated once."""
 
     def __init__(self, start: Start, settings: ScipyStarts, evaluate: Evaluate) -> None:
-        self._start, self._settings, self._evaluate = start, settings, evaluate
+        self._start, self._margin, self._evaluate = start, settings.margin, evaluate
+        self._by_row = isinstance(settings, SlsqpStarts)
         self.cube = UnitCube(start)
         self._at: tuple[bytes, float, Array] = (b"", 0.0, np.empty(0))
         self._slope: tuple[bytes, Array, Array] = (b"", np.empty(0), np.empty((0, 0)))
@@ -111,11 +102,11 @@ class _Functions:
         f, violation, _ = self._evaluate(X)
         constraints = self._start.constraints
         if constraints is None:  # COBYQA treats exactly zero as a binding constraint
-            met = 0.0 if self._settings.by_row else -1.0
+            met = 0.0 if self._by_row else -1.0
             values = np.where(violation > 0.0, violation, met)[:, None]
         else:
-            values = constraints.inequalities(X) if self._settings.by_row else constraints.worst(X)
-            values = values + self._settings.margin
+            values = constraints.inequalities(X) if self._by_row else constraints.worst(X)
+            values = values + self._margin
         finite = np.clip(np.nan_to_num(values, nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN), -UNKNOWN, UNKNOWN)
         return np.minimum(f, UNKNOWN), finite
 
@@ -127,48 +118,28 @@ class ScipyStartsSearch(CallingSearch):
         self._settings, self._start = settings, start
 
     def run(self, evaluate: Evaluate) -> str:
-        """Run start after start until `evaluate` ends the run."""
+        from scipy.optimize import NonlinearConstraint, minimize
+
         functions = _Functions(self._start, self._settings, evaluate)
-        cube = functions.cube
+        cube, iterations = functions.cube, self._settings.iterations
         if not cube.size:
             evaluate(np.array(self._start.initial))
             return "all variables are fixed"
-        solve = _slsqp if self._settings.method == "SLSQP" else _cobyqa
+        how: dict[str, Any]
+        if isinstance(self._settings, SlsqpStarts):
+            inequalities = {
+                "type": "ineq",
+                "fun": lambda z: -functions.at(z)[1],
+                "jac": lambda z: -functions.slope(z)[1],
+            }
+            options = {"maxiter": iterations, "ftol": 1e-10}
+            how = {"jac": lambda z: functions.slope(z)[0], "constraints": inequalities, "options": options}
+        else:
+            inequalities = NonlinearConstraint(lambda z: functions.at(z)[1], -np.inf, 0.0)
+            how = {"constraints": inequalities, "options": {"maxiter": iterations}}
+        how |= {"method": self._settings.name.removeprefix("scipy:"), "bounds": [(0.0, 1.0)] * cube.size}
         starts = iter(self._start.initial)
         while True:
             x0 = next(starts, None)
             z0 = self._start.rng.random(cube.size) if x0 is None else cube.shares(x0)
-            solve(functions, z0, self._settings.iterations)
-
-
-def _slsqp(functions: _Functions, z0: Array, iterations: int) -> Any:
-    return _minimize(
-        functions,
-        z0,
-        method="SLSQP",
-        jac=lambda z: functions.slope(z)[0],
-        constraints={
-            "type": "ineq",
-            "fun": lambda z: -functions.at(z)[1],
-            "jac": lambda z: -functions.slope(z)[1],
-        },
-        options={"maxiter": iterations, "ftol": 1e-10},
-    )
-
-
-def _cobyqa(functions: _Functions, z0: Array, iterations: int) -> Any:
-    from scipy.optimize import NonlinearConstraint
-
-    return _minimize(
-        functions,
-        z0,
-        method="COBYQA",
-        constraints=NonlinearConstraint(lambda z: functions.at(z)[1], -np.inf, 0.0),
-        options={"maxiter": iterations},
-    )
-
-
-def _minimize(functions: _Functions, z0: Array, **how: Any) -> Any:
-    from scipy.optimize import minimize
-
-    return minimize(lambda z: functions.at(z)[0], z0, bounds=[(0.0, 1.0)] * len(z0), **how)
+            minimize(lambda z: functions.at(z)[0], z0, **how)

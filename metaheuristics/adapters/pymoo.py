@@ -43,9 +43,6 @@ class PymooSettings:
         settings: Further arguments of the class.
         modules: Where pymoo has the classes that are allowed.
 
-    Raises:
-        SearchError: Unknown algorithm, a setting is not allowed, or pymoo is not installed.
-
     Source:
         Blank, Deb (2020), pymoo: Multi-objective optimization in Python.
     """
@@ -94,7 +91,6 @@ class Pymoo(PymooSettings):
         return f"pymoo:{self.algorithm}"
 
     def start(self, start: Start) -> PymooSearch:
-        """Begin a run; see `Algorithm.start`."""
         return PymooSearch(self, start)
 
 
@@ -102,7 +98,6 @@ class PymooSearch(PopulationSearch[Pymoo]):
     """A run of `Pymoo` on the free variables; see `Search`."""
 
     def __init__(self, settings: Pymoo, start: Start) -> None:
-        """Ask for the starting points first."""
         super().__init__(settings, start)
         self._algorithm: Any = None
         if (start.upper > start.lower).any():
@@ -110,7 +105,6 @@ class PymooSearch(PopulationSearch[Pymoo]):
             self._infills = self._algorithm.ask()
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Let pymoo select and vary; see `Search.tell`."""
         if self._algorithm is None:
             return
         for individual, values in zip(self._infills, zip(f, violation, strict=True), strict=True):
@@ -123,7 +117,6 @@ class PymooSearch(PopulationSearch[Pymoo]):
         self._X = fill_fixed(self._infills.get("X"), self._start.lower, self._start.upper)
 
     def stop(self) -> tuple[str, ...]:
-        """Give up if there is nothing to vary."""
         return ("all variables are fixed",) if self._algorithm is None else ()
 
     @staticmethod

@@ -31,9 +31,6 @@ class AntColony:
             the higher, the less the search is bound to where it has been, and the slower it converges. An evaporation
             rate of 0.7, as in Bhardwaj et al., Table IV, is thus naturally `spread=0.7`.
 
-    Raises:
-        SearchError: A setting is not allowed.
-
     Source:
         Socha, Dorigo (2008), Ant colony optimization for continuous domains, section 3.
     """
@@ -47,11 +44,9 @@ class AntColony:
     def __post_init__(self) -> None:
         check_count(self, "population", at_least=2)
         check_count(self, "archive", at_least=2)
-        check_number(self, "locality", above=0.0)
-        check_number(self, "spread", above=0.0)
+        check_number(self, "locality", "spread", above=0.0)
 
     def start(self, start: Start) -> AntColonySearch:
-        """Begin a run; see `Algorithm.start`."""
         return AntColonySearch(self, start)
 
 
@@ -83,12 +78,10 @@ class AntColonySearch(PopulationSearch[AntColony]):
     """A run of `AntColony`; see `Search`."""
 
     def __init__(self, settings: AntColony, start: Start) -> None:
-        """Ask for the starting points first; the archive is empty."""
         super().__init__(settings, start)
         self._archive = Points.none(start.initial.shape[1])
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Renew the archive and send the ants out; see `Search.tell`."""
         settings, start = self._settings, self._start
         self._archive = self._archive.join(Points(X, f, violation)).best(settings.archive, rule)
         known = self._archive.X
@@ -99,6 +92,5 @@ class AntColonySearch(PopulationSearch[AntColony]):
         self._X = np.clip(picked + step, start.lower, start.upper)
 
     def stop(self) -> tuple[str, ...]:
-        """Give up once all archived points are equal: the ants would stand still."""
         known = self._archive.X
         return ("archive collapsed to one point",) if len(known) and bool((known == known[0]).all()) else ()

@@ -30,9 +30,6 @@ class AntColonyGrid:
         depositors: Points that deposit: the best so far and the best ants of the generation.
         exploration: Share of choices made regardless of pheromone.
 
-    Raises:
-        SearchError: A setting is not allowed.
-
     Source:
         Bullnheimer, Hartl, Strauss (1999), A new rank based version of the ant system (deposits); Blum, Dorigo (2004),
         The hyper-cube framework (scaling); Stuetzle, Hoos (2000), MAX-MIN ant system (lower bound).
@@ -53,7 +50,6 @@ class AntColonyGrid:
         check_number(self, "exploration", at_least=0.0, at_most=1.0)
 
     def start(self, start: Start) -> AntColonyGridSearch:
-        """Begin a run; see `Algorithm.start`."""
         return AntColonyGridSearch(self, start)
 
 
@@ -88,14 +84,12 @@ class AntColonyGridSearch(PopulationSearch[AntColonyGrid]):
     """A run of `AntColonyGrid`; see `Search`."""
 
     def __init__(self, settings: AntColonyGrid, start: Start) -> None:
-        """Spread pheromone evenly and ask for the starting points first."""
         super().__init__(settings, start)
         self._best = Points.none(start.initial.shape[1])
         self._pheromone = np.full((start.initial.shape[1], settings.levels), 1.0 / settings.levels)
         self._spacing = (start.upper - start.lower) / (settings.levels - 1)
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Renew the pheromone and send the ants out; see `Search.tell`."""
         settings, start = self._settings, self._start
         ants = Points(X, f, violation).best(settings.depositors, rule)
         self._best = self._best.join(ants).best(1, rule)

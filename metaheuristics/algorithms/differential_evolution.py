@@ -43,9 +43,6 @@ class DifferentialEvolution:
         mutation_high: Greatest weight of a difference.
         recombination: Probability of taking a variable from the mutant.
 
-    Raises:
-        SearchError: A setting is not allowed.
-
     Source:
         Storn, Price (1997), Differential evolution; SciPy's `differential_evolution`.
     """
@@ -66,7 +63,6 @@ class DifferentialEvolution:
         check_number(self, "recombination", at_least=0.0, at_most=1.0)
 
     def start(self, start: Start) -> DifferentialEvolutionSearch:
-        """Begin a run; see `Algorithm.start`."""
         return DifferentialEvolutionSearch(self, start)
 
 
@@ -96,12 +92,10 @@ class DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
     """A run of `DifferentialEvolution`; see `Search`."""
 
     def __init__(self, settings: DifferentialEvolution, start: Start) -> None:
-        """Ask for the starting points first, as trials without members."""
         super().__init__(settings, start)
         self._members: Points | None = None
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Select, and make the next trials; see `Search.tell`."""
         trials = Points(X, f, violation)
         if self._members is not None:
             members = self._members

@@ -38,9 +38,6 @@ class GeneticAlgorithm:
             replaces the parents by the children, except for the elites.
         elites: Best parents that replace the worst children in "generational" survival.
 
-    Raises:
-        SearchError: A setting is not allowed.
-
     Source:
         Deb (2000), An efficient constraint handling method for genetic algorithms. Operators and indices (2 and 20)
         as in Gupta, Pratihar, Deb (2023), section 5; the paper is silent on survival and probabilities.
@@ -81,7 +78,6 @@ class GeneticAlgorithm:
         )
 
     def start(self, start: Start) -> GeneticSearch:
-        """Begin a run; see `Algorithm.start`."""
         return GeneticSearch(self, start)
 
 
@@ -106,12 +102,10 @@ class GeneticSearch(PopulationSearch[GeneticAlgorithm]):
     """A run of `GeneticAlgorithm`; see `Search`."""
 
     def __init__(self, settings: GeneticAlgorithm, start: Start) -> None:
-        """Ask for the starting points first, as children without parents."""
         super().__init__(settings, start)
         self._parents = Points.none(start.initial.shape[1])
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Choose the survivors and mate them; see `Search.tell`."""
         settings = self._settings
         children = Points(X, f, violation)
         if settings.survival == "plus":

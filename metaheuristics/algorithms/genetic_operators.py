@@ -89,9 +89,6 @@ class SimulatedBinary:
         index: Distribution index.
         probability: Chance that a pair is crossed at all.
         variable_probability: Chance that a variable of a crossed pair is; it also exchanges sides with chance 0.5.
-
-    Raises:
-        SearchError: A setting is not allowed.
     """
 
     index: float = 2.0
@@ -100,11 +97,9 @@ class SimulatedBinary:
 
     def __post_init__(self) -> None:
         check_number(self, "index", at_least=0.0)
-        check_number(self, "probability", at_least=0.0, at_most=1.0)
-        check_number(self, "variable_probability", at_least=0.0, at_most=1.0)
+        check_number(self, "probability", "variable_probability", at_least=0.0, at_most=1.0)
 
     def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Cross pairs; see `Crossover`."""
         u, choice, side = rng.random((3, *A.shape))
         low, high = simulated_binary(A, B, lower, upper, self.index, u)
         crossed = (rng.random((len(A), 1)) < self.probability) & (choice < self.variable_probability)
@@ -118,9 +113,6 @@ class SinglePoint:
 
     Attributes:
         probability: Chance that a pair is crossed. With one variable there is nothing to exchange.
-
-    Raises:
-        SearchError: The probability is not allowed.
     """
 
     probability: float = 0.8
@@ -129,7 +121,6 @@ class SinglePoint:
         check_number(self, "probability", at_least=0.0, at_most=1.0)
 
     def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Cross pairs; see `Crossover`."""
         pairs, n = A.shape
         cut = 1 + np.floor(rng.random((pairs, 1)) * (n - 1))  # 1..n-1
         tail = (rng.random((pairs, 1)) < self.probability) & (np.arange(n) >= cut)
@@ -143,9 +134,6 @@ class Polynomial:
     Attributes:
         index: Distribution index.
         probability: Chance that a variable mutates; None for 1 / n.
-
-    Raises:
-        SearchError: A setting is not allowed.
     """
 
     index: float = 20.0
@@ -157,7 +145,6 @@ class Polynomial:
             check_number(self, "probability", at_least=0.0, at_most=1.0)
 
     def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-        """Mutate; see `Mutation`."""
         u, choice = rng.random((2, *X.shape))
         probability = 1.0 / X.shape[1] if self.probability is None else self.probability
         return np.where(choice < probability, polynomial(X, lower, upper, self.index, u), X)
@@ -170,9 +157,6 @@ class Flip:
     Attributes:
         probability: Chance that a variable mutates.
 
-    Raises:
-        SearchError: The probability is not allowed.
-
     Source:
         Goswami, Vadakkepat, Phung (2008), section 5.4: s -> (0.05 + 0.13) - s.
     """
@@ -183,6 +167,5 @@ class Flip:
         check_number(self, "probability", at_least=0.0, at_most=1.0)
 
     def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-        """Mutate; see `Mutation`."""
         flipped = np.clip(lower + upper - X, lower, upper)  # the clip only removes rounding
         return np.where(rng.random(X.shape) < self.probability, flipped, X)

@@ -32,9 +32,6 @@ class LShade:
         best: share of the population towards whose members the others move (p).
         memory: entries of what has succeeded (H).
 
-    Raises:
-        SearchError: a setting is not allowed.
-
     Source:
         Tanabe, Fukunaga (2014), Improving the search performance of SHADE using linear population size reduction; epsilon
         levels after Takahama, Sakai (2006). The source has no constraints: a improved that the violation decides counts there
@@ -54,7 +51,6 @@ class LShade:
         check_count(self, "memory", at_least=1)
 
     def start(self, start: Start) -> LShadeSearch:
-        """Begin a run; see `Algorithm.start`."""
         return LShadeSearch(self, start)
 
 
@@ -92,7 +88,6 @@ class LShadeSearch(PopulationSearch[LShade]):
     """A run of `LShade`; see `Search`."""
 
     def __init__(self, settings: LShade, start: Start) -> None:
-        """Ask for the starting points first."""
         super().__init__(settings, start)
         self._members = Points.none(start.initial.shape[1])
         self._archive = np.empty((0, start.initial.shape[1]))
@@ -103,7 +98,6 @@ class LShadeSearch(PopulationSearch[LShade]):
         self._F, self._CR = np.empty(0), np.empty(0)
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Select, learn, shrink and make the next trials; see `Search.tell`."""
         trials = Points(X, f, violation)
         self._used += len(X)
         self._members = self._select(trials, rule) if len(self._members.f) else trials

@@ -30,9 +30,6 @@ class ParticleSwarm:
         social: Pull towards the swarm's best (c2).
         velocity_limit: Largest speed in a variable, as a share of its range, per iteration.
 
-    Raises:
-        SearchError: A setting is not allowed.
-
     Source:
         Kennedy, Eberhart (1995), Particle swarm optimization; Yarpiz project YPEA102 (Heris 2015), the code used by
         Gupta, Pratihar, Deb (2023), section 5.
@@ -48,14 +45,10 @@ class ParticleSwarm:
 
     def __post_init__(self) -> None:
         check_count(self, "population", at_least=1)
-        check_number(self, "inertia", at_least=0.0)
-        check_number(self, "inertia_damping", above=0.0, at_most=1.0)
-        check_number(self, "cognitive", at_least=0.0)
-        check_number(self, "social", at_least=0.0)
-        check_number(self, "velocity_limit", above=0.0, at_most=1.0)
+        check_number(self, "inertia", "cognitive", "social", at_least=0.0)
+        check_number(self, "inertia_damping", "velocity_limit", above=0.0, at_most=1.0)
 
     def start(self, start: Start) -> ParticleSwarmSearch:
-        """Begin a run; see `Algorithm.start`."""
         return ParticleSwarmSearch(self, start)
 
 
@@ -87,7 +80,6 @@ class ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
     """A run of `ParticleSwarm`; see `Search`."""
 
     def __init__(self, settings: ParticleSwarm, start: Start) -> None:
-        """Put the particles at rest on the starting points, with bests that any success will beat."""
         super().__init__(settings, start)
         self._limit = settings.velocity_limit * (start.upper - start.lower)
         self._inertia = settings.inertia
@@ -96,7 +88,6 @@ class ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
         self._own = Points(start.initial, unknown, unknown)
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Update the bests and move; see `Search.tell`."""
         improved = rule.better(f, violation, self._own.f, self._own.violation)
         self._own = self._own.replace_rows(improved, Points(X, f, violation))
         leader = self._own.X[rule.best(self._own.f, self._own.violation)]

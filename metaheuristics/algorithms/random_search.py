@@ -20,9 +20,6 @@ class RandomSearch:
 
     Attributes:
         population: Points of one batch.
-
-    Raises:
-        SearchError: A setting is not allowed.
     """
 
     population: int = 50
@@ -32,7 +29,6 @@ class RandomSearch:
         check_count(self, "population", at_least=1)
 
     def start(self, start: Start) -> RandomSearchRun:
-        """Begin a run; see `Algorithm.start`."""
         return RandomSearchRun(self, start)
 
 
@@ -40,7 +36,6 @@ class RandomSearchRun(PopulationSearch[RandomSearch]):
     """A run of `RandomSearch`; see `Search`."""
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Draw the next points; see `Search.tell`."""
         start = self._start
         width = start.upper - start.lower
         self._X = np.clip(start.lower + start.rng.random(start.initial.shape) * width, start.lower, start.upper)
@@ -53,9 +48,6 @@ class SobolPoints:
     Attributes:
         population: starting points, which all searches share, before the sequence begins.
         batch: points of the sequence asked for at once.
-
-    Raises:
-        SearchError: a setting is not allowed.
 
     Source:
         Sobol (1967), On the distribution of points in a cube; Owen (1998), Scrambling Sobol and Niederreiter-Xing points;
@@ -71,7 +63,6 @@ class SobolPoints:
         check_count(self, "batch", at_least=1)
 
     def start(self, start: Start) -> SobolRun:
-        """Begin a run; see `Algorithm.start`."""
         return SobolRun(self, start)
 
 
@@ -79,7 +70,6 @@ class SobolRun(PopulationSearch[SobolPoints]):
     """A run of `SobolPoints`; see `Search`."""
 
     def __init__(self, settings: SobolPoints, start: Start) -> None:
-        """Ask for the starting points first."""
         from scipy.stats.qmc import Sobol
 
         super().__init__(settings, start)
@@ -88,10 +78,8 @@ class SobolRun(PopulationSearch[SobolPoints]):
         self._sequence = Sobol(self._cube.size, seed=np.random.default_rng(seed)) if self._cube.size else None
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
-        """Take the next points; see `Search.tell`."""
         if self._sequence is not None:
             self._X = self._cube.points(self._sequence.random(self._settings.batch))
 
     def stop(self) -> tuple[str, ...]:
-        """Give up if there is nothing to vary."""
         return ("all variables are fixed",) if self._sequence is None else ()

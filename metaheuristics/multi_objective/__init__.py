@@ -3,8 +3,13 @@
 snapshots = minimize_many(objectives, front_algorithm("NSGA2"), evaluations=(1_000, 10_000), seed=1)
 """
 
-from metaheuristics.multi_objective.interface import FrontAlgorithm, ManyObjectives, check_budgets
-from metaheuristics.multi_objective.minimize_many import Snapshot, minimize_many
+from metaheuristics.multi_objective.minimize_many import (
+    FrontAlgorithm,
+    ManyObjectives,
+    Snapshot,
+    check_budgets,
+    minimize_many,
+)
 from metaheuristics.registry import FRONT_ALGORITHMS, front_algorithm
 
 __all__ = [

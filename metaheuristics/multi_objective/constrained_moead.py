@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from metaheuristics.array import Array
 from metaheuristics.interface import Start
-from metaheuristics.multi_objective.interface import feasible_front
-from metaheuristics.multi_objective.variation import Variation, directions
+from metaheuristics.multi_objective.variation import Variation, directions, feasible_front
 from metaheuristics.settings import check_count, check_installed, check_number
 
 
@@ -31,9 +30,6 @@ class ConstrainedMoead:
         penalty: theta of penalty boundary intersection.
         crossover_index: of simulated binary crossover; the larger, the nearer are children to their parents.
         mutation_index: of polynomial mutation, likewise.
-
-    Raises:
-        SearchError: a setting is not allowed, or pymoo is not installed.
 
     Source:
         Jain, Deb (2014), An evolutionary many-objective optimization algorithm using reference-point-based nondominated
@@ -58,12 +54,10 @@ class ConstrainedMoead:
             check_count(self, "replaced", at_least=1, at_most=self.population)
         check_number(self, "near", at_least=0.0, at_most=1.0)
         check_number(self, "penalty", at_least=0.0)
-        check_number(self, "crossover_index", at_least=3.0, at_most=30.0)
-        check_number(self, "mutation_index", at_least=3.0, at_most=30.0)
+        check_number(self, "crossover_index", "mutation_index", at_least=3.0, at_most=30.0)
         check_installed(self.name, "pymoo")
 
     def start(self, start: Start, objectives: int) -> ConstrainedMoeadSearch:
-        """Begin a run; see `FrontAlgorithm.start`."""
         return ConstrainedMoeadSearch(self, start, objectives)
 
 
@@ -91,7 +85,6 @@ class ConstrainedMoeadSearch:
     """A run of `ConstrainedMoead`; see `FrontSearch`. Each child is evaluated and learned from before the next one is made."""
 
     def __init__(self, settings: ConstrainedMoead, start: Start, objectives: int) -> None:
-        """Ask for the starting points first."""
         from pymoo.decomposition.pbi import PBI
 
         self._settings, self._start = settings, start
@@ -110,7 +103,6 @@ class ConstrainedMoeadSearch:
         self._places: NDArray[np.intp] = np.arange(0)
 
     def ask(self) -> Array:
-        """See `FrontSearch.ask`."""
         if not len(self._F):
             return self._X
         rng = self._start.rng
@@ -120,7 +112,6 @@ class ConstrainedMoeadSearch:
         return self._vary(self._X[[first]], self._X[[second]], one_child=True)
 
     def tell(self, X: Array, F: Array, violation: Array) -> None:
-        """See `FrontSearch.tell`."""
         if not len(self._F):
             self._F, self._violation, self._ideal = np.array(F), np.array(violation), F.min(axis=0)
             return
@@ -133,5 +124,4 @@ class ConstrainedMoeadSearch:
         self._turn = (self._turn + 1) % len(self._X)
 
     def front(self) -> tuple[Array, Array]:
-        """See `FrontSearch.front`."""
         return feasible_front(self._X, self._F, self._violation)

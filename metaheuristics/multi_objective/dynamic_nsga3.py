@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from metaheuristics.array import Array
 from metaheuristics.interface import UNKNOWN, Start
-from metaheuristics.multi_objective.interface import feasible_front
-from metaheuristics.multi_objective.variation import Variation, directions
+from metaheuristics.multi_objective.variation import Variation, directions, feasible_front
 from metaheuristics.settings import check_count, check_installed, check_number
 
 LEAST = 1e-8  # boundary at which the last generation arrives, z
@@ -32,9 +31,6 @@ class DynamicConstrainedNsga3:
         crossover_index: of simulated binary crossover; the larger, the nearer are children to their parents.
         mutation_index: of polynomial mutation, likewise.
 
-    Raises:
-        SearchError: a setting is not allowed, or pymoo is not installed.
-
     Source:
         Jiao, Zeng, Li, Yang, Ong (2021), Handling constrained many-objective optimization problems via problem
         transformation, IEEE Transactions on Cybernetics 51(10), 4834-4847. Implemented from its first
@@ -50,12 +46,10 @@ class DynamicConstrainedNsga3:
     def __post_init__(self) -> None:
         check_count(self, "population", at_least=2)
         check_number(self, "decrease", above=0.0)
-        check_number(self, "crossover_index", at_least=3.0, at_most=30.0)
-        check_number(self, "mutation_index", at_least=3.0, at_most=30.0)
+        check_number(self, "crossover_index", "mutation_index", at_least=3.0, at_most=30.0)
         check_installed(self.name, "pymoo")
 
     def start(self, start: Start, objectives: int) -> DynamicNsga3Search:
-        """Begin a run; see `FrontAlgorithm.start`."""
         return DynamicNsga3Search(self, start, objectives)
 
 
@@ -82,7 +76,6 @@ class DynamicNsga3Search:
     """A run of `DynamicConstrainedNsga3`; see `FrontSearch`."""
 
     def __init__(self, settings: DynamicConstrainedNsga3, start: Start, objectives: int) -> None:
-        """Ask for the starting points first."""
         self._settings, self._start = settings, start
         self._directions = directions(settings.population, objectives)
         self._vary = Variation(start, settings.crossover_index, settings.mutation_index)
@@ -96,11 +89,9 @@ class DynamicNsga3Search:
         self._first = np.empty(0)
 
     def ask(self) -> Array:
-        """See `FrontSearch.ask`."""
         return self._next
 
     def tell(self, X: Array, F: Array, violation: Array) -> None:
-        """See `FrontSearch.tell`."""
         violations = np.maximum(0.0, self._start.inequalities(X, violation))
         if not len(self._X):
             self._X, self._F, self._violation, self._violations = (
@@ -121,7 +112,6 @@ class DynamicNsga3Search:
         self._next = self._make_children()
 
     def front(self) -> tuple[Array, Array]:
-        """See `FrontSearch.front`."""
         return feasible_front(self._X, self._F, self._violation)
 
     def _epsilon(self) -> Array:

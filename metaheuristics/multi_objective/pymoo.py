@@ -32,7 +32,6 @@ class MultiObjective(PymooSettings):
         return self.algorithm
 
     def start(self, start: Start, objectives: int) -> PymooFrontSearch:
-        """Begin a run; see `FrontAlgorithm.start`."""
         search = self.begin(start, objectives)
         if self.algorithm == "CMOPSO":
             _seed_elites(search)
@@ -47,19 +46,16 @@ class PymooFrontSearch:
         self._infills: Any = None
 
     def ask(self) -> Array:
-        """See `FrontSearch.ask`."""
         self._infills = self._search.ask()
         return fill_fixed(self._infills.get("X"), self._start.lower, self._start.upper)
 
     def tell(self, X: Array, F: Array, violation: Array) -> None:
-        """See `FrontSearch.tell`."""
         self._infills.set("F", np.array(F), "G", violation[:, None])
         for individual in self._infills:
             individual.H, individual.evaluated = np.zeros(0), {"F", "G", "H"}
         self._search.tell(infills=self._infills)
 
     def front(self) -> tuple[Array, Array]:
-        """See `FrontSearch.front`."""
         search, start = self._search, self._start
         feasible = search.opt[search.opt.get("FEAS")[:, 0]]
         problem = search.problem

@@ -1,4 +1,4 @@
-"""How new points are made and directions spread, by pymoo's operators."""
+"""How new points are made, directions spread and fronts found, by pymoo's operators."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ class Variation:
     """Simulated binary crossover of pairs, then polynomial mutation of each variable with probability 1 / n."""
 
     def __init__(self, start: Start, crossover_index: float, mutation_index: float) -> None:
-        """Make the operators for the variables that are free."""
         from pymoo.core.problem import Problem
         from pymoo.operators.crossover.sbx import SBX
         from pymoo.operators.mutation.pm import PM
@@ -71,3 +70,13 @@ def directions(number: int, objectives: int) -> Array:
 def _spread(parts: int, objectives: int) -> int:
     """Number of directions whose coordinates are whole numbers of equal parts."""
     return comb(parts + objectives - 1, objectives - 1)
+
+
+def feasible_front(X: Array, F: Array, violation: Array) -> tuple[Array, Array]:
+    """Return the nondominated points among those without violation (P,), of points (P, n) with objectives (P, m)."""
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+    feasible = np.flatnonzero(violation == 0.0)
+    best = NonDominatedSorting().do(F[feasible], only_non_dominated_front=True) if len(feasible) else []
+    chosen = feasible[np.asarray(best, dtype=int)]
+    return X[chosen], F[chosen]

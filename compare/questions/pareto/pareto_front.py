@@ -29,7 +29,7 @@ from compare.questions.pareto.searches import (
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
 from compare.report.document import Figure, Part, Table
 from compare.study.task import describe_problem
-from metaheuristics.multi_objective.interface import check_budgets
+from metaheuristics.multi_objective.minimize_many import check_budgets
 from metaheuristics.registry import front_algorithm
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode

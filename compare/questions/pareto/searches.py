@@ -13,8 +13,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, select_front, solve_point
 from compare.questions.question import Work
 from metaheuristics.array import Array
-from metaheuristics.multi_objective.interface import FrontAlgorithm
-from metaheuristics.multi_objective.minimize_many import minimize_many
+from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, minimize_many
 from metaheuristics.registry import front_algorithm
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
