@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import output_file, print_written
-from compare.cli.interrupts import interruptible
+from compare.cli.common import interruptible, output_file, print_written
 from compare.cli.options import StoredGait
 
 SHEET = ".png"

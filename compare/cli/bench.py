@@ -9,8 +9,15 @@ import typer
 
 from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stderr, stdout
-from compare.cli.interrupts import until_interrupted
+from compare.cli.common import (
+    end_interrupted,
+    print_result,
+    print_table,
+    progress_bar,
+    stderr,
+    stdout,
+    until_interrupted,
+)
 from compare.cli.options import AsJson, Jobs, parse_names
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder

@@ -1,4 +1,4 @@
-"""Output of commands: tables, results, progress, errors."""
+"""Output of commands: tables, results, progress, errors, interruptions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar
+from typing import Any, Literal, NoReturn, TypeVar, cast
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -20,6 +20,7 @@ from rich.text import Text
 
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import check_name, make_writable_folder, replace_nan
+from nlp_gait.interrupts import Interrupted
 
 T = TypeVar("T")
 
@@ -203,3 +204,33 @@ def output_file(path: Path) -> Path:
     except OSError as error:  # its name is too long
         raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
     return path
+
+
+def until_interrupted(work: Callable[[], T], nothing: str = "nothing was written") -> tuple[T, str]:
+    """Return what some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
+
+    ``Interrupted`` carries the part that was found; if it is empty, the command ends with the sentence and ``nothing``.
+    """
+    try:
+        return work(), ""
+    except Interrupted as interrupt:
+        if not interrupt.partial:
+            end_interrupted("; ".join(filter(None, (interrupt.sentence, nothing))))
+        return cast(T, interrupt.partial), interrupt.sentence
+    except KeyboardInterrupt:
+        end_interrupted(f"interrupted before there was a result; {nothing or 'nothing was written'}")
+
+
+def describe_stored(folder: Path) -> str:
+    """Return how many results are stored in a folder, and how to continue."""
+    finished = sum(1 for files in ("store/**/*.json", "records/*/*.json") for _ in folder.glob(files))
+    return f"{finished} finished results are stored in {folder}; rerun the command to continue"
+
+
+@contextmanager
+def interruptible(folder: Path | None = None) -> Iterator[None]:
+    """For a command that has no result before its end, or that continues from the results that are stored in a folder."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        end_interrupted(f"interrupted; {'nothing was written' if folder is None else describe_stored(folder)}")

@@ -13,9 +13,8 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, say_error, stdout
-from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, name_all, parse_names
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.report import plain_simulations, print_simulations, simulate_best
-from compare.cli.search_options import SearchOptions
 from compare.study.settings import SolverSpec, read_settings, resolve_user_code
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import installed_algorithms

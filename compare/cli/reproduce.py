@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import print_written, progress_bar
-from compare.cli.interrupts import interruptible
+from compare.cli.common import interruptible, print_written, progress_bar
 from compare.papers import REPRODUCTIONS, load_reproduction
 
 

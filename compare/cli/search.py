@@ -9,11 +9,18 @@ import typer
 
 from compare.analysis.units import with_unit
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, print_json, print_rows, progress_bar, say, stdout
+from compare.cli.common import (
+    end_interrupted,
+    fail,
+    print_json,
+    print_rows,
+    progress_bar,
+    say,
+    stdout,
+    until_interrupted,
+)
 from compare.cli.compare import print_summaries
-from compare.cli.interrupts import until_interrupted
-from compare.cli.options import AsJson, Jobs, NamedProblem
-from compare.cli.search_options import SearchOptions
+from compare.cli.options import AsJson, Jobs, NamedProblem, SearchOptions
 from compare.study.settings import SolverSpec
 
 if TYPE_CHECKING:

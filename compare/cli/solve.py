@@ -21,8 +21,8 @@ from compare.cli.common import (
     print_written,
     progress_bar,
     stdout,
+    until_interrupted,
 )
-from compare.cli.interrupts import until_interrupted
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, parse_x
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.solution import Solution

@@ -43,9 +43,7 @@ def write_report(
     plays = load_simulations(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, plays))
     if as_csv:
-        written += write_csv_files(
-            folder, records, {record.problem: make_file_name(record.problem) for record in records}
-        )
+        written += _write_csv_files(folder, records)
     return written
 
 
@@ -76,41 +74,19 @@ def _over_problems(comparisons: Sequence[Comparison]) -> Section:
     return Section(title="Over all problems", parts=(figure,))
 
 
-def write_csv_files(folder: Path, records: Sequence[RunRecord], stems: dict[str, str]) -> list[Path]:
-    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; unknown values are empty cells.
-
-    Args:
-        folder: to write to.
-        records: of all problems.
-        stems: of the files, by problem.
-
-    Raises:
-        OutputError: a file cannot be written.
-    """
-    files = [folder / "runs.csv"]
-    write_text(files[0], format_csv([HEADER, *(_cells(make_row(r)) for r in records)]))
-    for problem, stem in stems.items():
+def _write_csv_files(folder: Path, records: Sequence[RunRecord]) -> list[Path]:
+    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; unknown values are empty cells."""
+    tables: dict[str, list[Sequence[object]]] = {"runs": [HEADER, *map(make_row, records)]}
+    for problem in dict.fromkeys(record.problem for record in records):
         own = [record for record in records if record.problem == problem]
         names = list(dict.fromkeys(name for record in own for name in record.x))
         taken = {*names, *JUDGED}
         indexes = list(dict.fromkeys(name for record in own for name in record.verdict.indexes if name not in taken))
-        rows = [
-            _cells(
-                [
-                    r.solver,
-                    r.run,
-                    *(r.x.get(n) for n in names),
-                    *make_judged_cells(r),
-                    *(r.verdict.indexes.get(n) for n in indexes),
-                ]
-            )
-            for r in own
-            if r.x
-        ]
-        files.append(folder / f"{stem}-points.csv")
-        write_text(files[-1], format_csv([("solver", "run", *names, *JUDGED, *indexes), *rows]))
-    return files
-
-
-def _cells(row: list[object]) -> list[object]:
-    return ["" if value is None else value for value in replace_nan(row)]
+        rows = tables[f"{make_file_name(problem)}-points"] = [("solver", "run", *names, *JUDGED, *indexes)]
+        for r in own:
+            if r.x:
+                values = (*map(r.x.get, names), *make_judged_cells(r), *map(r.verdict.indexes.get, indexes))
+                rows.append((r.solver, r.run, *values))
+    for name, rows in tables.items():
+        write_text(folder / f"{name}.csv", format_csv(replace_nan(rows)))  # None is an empty cell
+    return [folder / f"{name}.csv" for name in tables]

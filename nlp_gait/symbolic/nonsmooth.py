@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import MX, SX
@@ -47,64 +47,28 @@ class OpenRoots(NamedTuple):
     start: SX  #: (n,) result of Newton's method
 
 
-class Nonsmooth(Protocol):
-    """Operations that a problem may use in addition to smooth functions."""
+class Nonsmooth:
+    """Operations that a problem may use in addition to smooth functions, as the papers define them; ``Lifted`` overrides all."""
 
-    exact: bool  #: whether the values are the exact ones, which are judged
+    exact = True  #: whether the values are the exact ones, which are judged
 
     def root(self, root: Root, inputs: SX) -> SX:
         """Return the solution (n,) of an equation of one instant, for its inputs."""
-
-    def open_roots(self) -> OpenRoots | None:
-        """Return and forget the equations of the last instant whose unknowns are still symbols; None if there are none."""
-
-    def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
-        """Return the unknowns (n, N) of N instants, tied by residual(unknowns) = 0, near a start (n, N); see ``open_roots``."""
-
-    def acos(self, argument: SX, margin: SX) -> Angle:
-        """Return acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin."""
-
-    def abs(self, v: MX) -> MX:
-        """Return |v| elementwise."""
-
-    def min(self, a: MX, b: MX) -> MX:
-        """Return the minimum elementwise."""
-
-    def largest(self, v: MX) -> MX:
-        """Return the largest |v_i| of a vector (m, 1)."""
-
-    def step(self, switch: MX, below: MX, above: MX) -> MX:
-        """Return ``below`` where switch < 0, else ``above``, elementwise."""
-
-    def tie(self, v: MX) -> MX:
-        """Return the vector v (m, 1), as a separate variable if that saves a solver from differentiating through it."""
-
-    def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
-        """Return the states (n, N) after each of N steps.
-
-        Args:
-            step: from a state (n, 1) and a column of each input to the next state.
-            initial: (n, 1) state before the first step.
-            inputs: (m, N) each, one column per step.
-        """
-
-
-class Exact:
-    """The functions as the papers define them."""
-
-    exact = True
-
-    def root(self, root: Root, inputs: SX) -> SX:
         return root.newton(inputs)
 
     def open_roots(self) -> OpenRoots | None:
+        """Return and forget the equations of the last instant whose unknowns are still symbols; None if there are none."""
         return None
 
     def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
+        """Return the unknowns (n, N) of N instants, tied by residual(unknowns) = 0, near a start (n, N); see ``open_roots``."""
         return start
 
     def acos(self, argument: SX, margin: SX) -> Angle:
-        """Clamp the argument to [-1, 1]: reachable poses are exact, unreachable ones finite and at rest."""
+        """Return acos, defined and finite for every argument; exact at least for |argument| <= 1 - margin.
+
+        Here the argument is clamped to [-1, 1]: reachable poses are exact, unreachable ones finite and at rest.
+        """
         clamped = ca.fmax(-1, ca.fmin(1, argument))
         reachable = ca.fabs(argument) <= 1
         sine_squared = ca.fmax(1 - clamped * clamped, LEAST_SINE_SQUARED)
@@ -112,13 +76,15 @@ class Exact:
         return Angle(ca.acos(clamped), first, first * clamped / sine_squared)
 
     def abs(self, v: MX) -> MX:
+        """Return |v| elementwise."""
         return ca.fabs(v)
 
     def min(self, a: MX, b: MX) -> MX:
+        """Return the minimum elementwise."""
         return ca.fmin(a, b)
 
     def largest(self, v: MX) -> MX:
-        """Halve the vector repeatedly, by elementwise operations only."""
+        """Return the largest |v_i| of a vector (m, 1): it is halved repeatedly, by elementwise operations only."""
         v = ca.fabs(v)
         while v.shape[0] > 1:
             half = (v.shape[0] + 1) // 2
@@ -126,15 +92,23 @@ class Exact:
         return v
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
-        """Return a true jump, without a branch so that it vectorises."""
+        """Return ``below`` where switch < 0, else ``above``, elementwise; without a branch so that it vectorises."""
         return below + (switch >= 0) * (above - below)
 
     def tie(self, v: MX) -> MX:
+        """Return the vector v (m, 1), as a separate variable if that saves a solver from differentiating through it."""
         return v
 
     def rollout(self, step: ca.Function, initial: MX, *inputs: MX) -> MX:
-        """Make one step after the other, in a loop at run time."""
+        """Return the states (n, N) after each of N steps, made one after the other in a loop at run time.
+
+        ``step`` goes from a state (n, 1) and a column of each input (m, N) to the next state, first from ``initial`` (n, 1).
+        """
         return step.mapaccum(inputs[0].shape[1])(initial, *inputs)
+
+
+class Exact(Nonsmooth):
+    """The functions as the papers define them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,7 +123,7 @@ class Lift:
     tight: bool = False  #: whether the rows determine the variable: it equals the exact value at every feasible point
 
 
-class Lifted:
+class Lifted(Nonsmooth):
     """Absolute values and minima as variables with inequalities; a jump as a sigmoid.
 
     ``width`` is that of the sigmoid, in units of the switch (an NLP parameter).

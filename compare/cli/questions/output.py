@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, stdout
-from compare.cli.interrupts import describe_stored
+from compare.cli.common import (
+    describe_stored,
+    end_interrupted,
+    fail,
+    print_result,
+    print_table,
+    progress_bar,
+    say,
+    stdout,
+)
 from compare.cli.options import RESULTS, AsJson
 from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted, defer_interrupts

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli.compare import choose_solvers
-from compare.cli.search_options import SearchOptions
+from compare.cli.options import SearchOptions
 from tests.compare.cli.calls import as_json, one_sentence, process
 
 STUDY = """
