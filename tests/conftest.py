@@ -13,6 +13,7 @@ from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
+from tests.extras import skip_without_extra
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
@@ -36,6 +37,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if any(folder in item.path.parents for folder in SLOW_FOLDERS):
             item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    """Skip a test that stops because a package of an extra is not installed."""
+    try:
+        return (yield)
+    except Exception as error:
+        skip_without_extra(error)
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup() -> Iterator[Any]:
+    """Skip tests whose fixture stops for that reason."""
+    try:
+        return (yield)
+    except Exception as error:
+        skip_without_extra(error)
+        raise
 
 
 @pytest.fixture(scope="session", autouse=True)

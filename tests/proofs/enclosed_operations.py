@@ -8,11 +8,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from flint import arb, ctx, fmpq
+import pytest
 
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
 
+flint = pytest.importorskip("flint", reason="python-flint not installed")
+arb, ctx, fmpq = flint.arb, flint.ctx, flint.fmpq
 PRECISION = 200  # bits
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Range = tuple[float, float]
