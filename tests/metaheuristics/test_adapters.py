@@ -102,6 +102,8 @@ def test_a_bad_setting_is_refused_in_one_sentence(name: str, settings: dict[str,
 
 
 def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("cma", "egobox", "pymoo"):
+        pytest.importorskip(package)
     assert {"lshade", "cma-al", "bayes", "scipy:COBYQA", "pymoo:GA"} <= set(installed_algorithms())
     monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
     assert "lshade" in installed_algorithms() and not {"bayes", "cma-al"} & set(installed_algorithms())

@@ -4,33 +4,36 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
-from metaheuristics import ALGORITHMS, Deb, EpsilonLevel, GeneticAlgorithm, Result, StaticPenalty, algorithm, minimize
+from metaheuristics import ALGORITHMS, Deb, EpsilonLevel, GeneticAlgorithm, Result, StaticPenalty, minimize
+from metaheuristics import algorithm as make_algorithm
 from metaheuristics.array import Array
 from metaheuristics.interface import Algorithm
 from tests.metaheuristics.problems import Function, disc, infeasible, rosenbrock, sphere
 
-ALL = {name: factory() for name, factory in ALGORITHMS.items()}
-ALL |= {name: algorithm(name) for name in ("cma", "cma-al", "de", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")}
-ALL["ga-generational"] = GeneticAlgorithm(survival="generational", elites=2)
-ALL["ga-goswami"] = GeneticAlgorithm.goswami2008()
+ALL: dict[str, Callable[[], Algorithm]] = {
+    **ALGORITHMS,
+    **{name: partial(make_algorithm, name) for name in ("cma", "cma-al", "de", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")},
+    "ga-generational": partial(GeneticAlgorithm, survival="generational", elites=2),
+    "ga-goswami": GeneticAlgorithm.goswami2008,
+}
 BUDGET = 620  # not a multiple of any population, so that the last generation is cut short
 
-OTHERS = (
-    "cma",
-    "cma-al",
-    "pymoo:GA",
-    "pymoo:PSO",
-    "pymoo:NSGA2",
-)  # other packages' algorithms, which take ten times as long
+OTHERS = ("cma", "cma-al", "pymoo:GA", "pymoo:PSO", "pymoo:NSGA2")  # of other packages, which take ten times as long
 
 every_algorithm = pytest.mark.parametrize(
-    "algorithm",
-    [pytest.param(ALL[name], id=name, marks=[pytest.mark.slow] if name in OTHERS else []) for name in ALL],
+    "algorithm", [pytest.param(name, marks=[pytest.mark.slow] if name in OTHERS else []) for name in ALL], indirect=True
 )
+
+
+@pytest.fixture
+def algorithm(request: pytest.FixtureRequest) -> Algorithm:
+    return ALL[request.param]()
 
 
 def same(a: Result, b: Result) -> bool:
@@ -230,19 +233,19 @@ DISC = {
 @pytest.mark.parametrize("name", [name for name in ALL if name not in FLOOR])
 @pytest.mark.parametrize("n", [1, 4])
 def test_sphere_converges(name: str, n: int) -> None:
-    assert minimize(sphere(n), ALL[name], evaluations=5000, seed=1).objective < SPHERE[name]
+    assert minimize(sphere(n), ALL[name](), evaluations=5000, seed=1).objective < SPHERE[name]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in ALL if name not in FLOOR])
 def test_rosenbrock_converges(name: str) -> None:
-    assert minimize(rosenbrock(), ALL[name], evaluations=5000, seed=1).objective < ROSENBROCK[name]
+    assert minimize(rosenbrock(), ALL[name](), evaluations=5000, seed=1).objective < ROSENBROCK[name]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in ALL if name not in FLOOR])
 @pytest.mark.parametrize("handling", [Deb(), EpsilonLevel()], ids=lambda h: h.name)
 def test_constrained_optimum_is_found(name: str, handling: Deb | EpsilonLevel) -> None:
-    result = minimize(disc(), ALL[name], evaluations=5000, seed=1, handling=handling)
+    result = minimize(disc(), ALL[name](), evaluations=5000, seed=1, handling=handling)
     assert result.feasible
     assert -np.sqrt(2.0) - 1e-12 <= result.objective < -np.sqrt(2.0) + DISC[name]

@@ -16,7 +16,7 @@ from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.mirror import partner, partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
-pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+pytest.importorskip("urdf_parser_py")
 
 HAND_KG = 0.1
 

@@ -14,8 +14,8 @@ from nlp_gait.robots import load_robot, mjcf
 from nlp_gait.robots.biped import make_biped_model
 from tests.robots.crooked import crooked, crooked_urdf
 
-mujoco = pytest.importorskip("mujoco", reason="extra sim is not installed")
-pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+mujoco = pytest.importorskip("mujoco")
+pytest.importorskip("urdf_parser_py")
 
 DIGITS = 1e-5  # MuJoCo writes six
 

@@ -18,7 +18,7 @@ from nlp_gait.robots.urdf import urdf_record
 from tests.robots.custom import about_joints, as_urdf, humanoid, nao, partner
 from tests.robots.files import written
 
-pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+pytest.importorskip("urdf_parser_py")
 
 # Rotations to and fro on lengths below 1 m and masses of about 1 kg.
 TOLERANCE = 1e-12

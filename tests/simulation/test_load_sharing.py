@@ -25,6 +25,7 @@ from nlp_gait.simulation.load_sharing import (
     share_loads,
 )
 from nlp_gait.simulation.plan import Plan, make_plan
+
 from tests.pinocchio_oracle import left_over  # isort: skip  # first: the tests of the cycle need Pinocchio too
 from tests.gaits.nao.test_cycle import OPTIMUM
 from tests.properties.mirror import JOINT_SIGNS, partner

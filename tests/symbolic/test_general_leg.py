@@ -51,7 +51,7 @@ def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
 
 @pytest.fixture(scope="module")
 def robots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Robot]:
-    pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+    pytest.importorskip("urdf_parser_py")
     return {
         "nao": load_robot("nao-v5"),
         "crooked": load_robot(crooked(tmp_path_factory.mktemp("crooked"))),

@@ -10,6 +10,8 @@ import pytest
 from compare.bench.baseline import BASELINE, list_instances
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 ID = "walk12-w015"
 # What a user brings: an algorithm with ask and tell, and a plain function around a library's optimiser.
 MINE = '''

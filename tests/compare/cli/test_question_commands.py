@@ -16,6 +16,8 @@ from compare.questions.robust import robust_gait as robust
 from nlp_gait.backends.solvers.solver import IterationWatch
 from tests.compare.cli.calls import nlp_gait, one_sentence
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 # Three free variables, so that both the front and a search of one generation take no time.
 SMALL = ["nao-ssp", "--intervals", "4", "--starts", "1", "--seed", "0"]
 FIXED = {

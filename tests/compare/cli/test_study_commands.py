@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from compare.cli.compare import choose_solvers
 from compare.cli.options import SearchOptions
-from tests.compare.cli.calls import as_json, one_sentence, process
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
 STUDY = """
 runs = 1
@@ -37,18 +38,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "out"
 
 
-def test_resume_needs_no_other_option_and_keeps_everything(folder: Path) -> None:
+def test_resume_needs_no_other_option_and_keeps_everything(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
+) -> None:
     before = {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")}
     assert len(before) == 2
-    assert process("compare", "--resume", "--out", folder, "--jobs", "1").returncode == 0
+    arguments = ["compare", "--resume", "--out", str(folder), "--jobs", "1"]
+    monkeypatch.setattr(sys, "argv", ["nlp-gait", *arguments])  # which the study records
+    nlp_gait(*arguments)
     assert {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")} == before
     sessions = json.loads((folder / "study.json").read_text())["sessions"]
     assert len(sessions) >= 2 and "--resume" in sessions[-1]["command"] and sessions[-1]["machine"]["processor"]
 
 
-def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> None:
-    import shutil
-
+def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
     shutil.copytree(folder / "records", tmp_path / "records")
     files = as_json("report", str(tmp_path), "--gradient-weight", "0", "--hessian-weight", "0")["files"]
     assert (tmp_path / "report.html").as_posix() in files

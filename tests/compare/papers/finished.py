@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
 
 from compare.papers import load_reproduction
 from compare.report import writing
+from tests.compare.pictures import save_coarsely
 
 
 @dataclass(kw_only=True)
@@ -40,14 +40,6 @@ def reproduce(paper: str, folder: Path, *, coarse: bool = False) -> Finished:
             patch.setattr(writing, "save", save_coarsely)
         finished.findings = reproduction.reproduce(folder, reproduction.quick, finished.progress.append, jobs=1)
     return finished
-
-
-def save_coarsely(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
-    figure.set_layout_engine("none")
-    figure.savefig(png, dpi=20)
-    svg.write_text("<svg>" + 1000 * " " + "</svg>", encoding="utf-8")
-    return png, svg
 
 
 def recompute(finished: Finished, stop_at: str = "figures") -> list[str]:

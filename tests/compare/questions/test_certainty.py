@@ -19,6 +19,8 @@ from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 
 def two_valleys(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
     """10 + (x^2 - 1)^2 + x / 10 + y^2 above the line x + y = limit; valleys near x = -1 and x = 1."""

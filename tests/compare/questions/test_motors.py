@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions import real_motors as motors
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 RUN = CliRunner()
 
 

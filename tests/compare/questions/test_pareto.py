@@ -20,6 +20,8 @@ from compare.study.store import Store
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 X = np.array([0.31, -0.00122, 0.0035, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0])
 # Slopes by multipliers and by differences of neighbouring optima agree to this part.
 SLOPE_TOLERANCE = 0.02

@@ -16,6 +16,8 @@ from compare.questions.question import find
 from nlp_gait import load, make_solver
 from nlp_gait.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 RUN = CliRunner()
 
 

@@ -18,6 +18,8 @@ from nlp_gait.gaits.nao.recorded import make_recorded_gait
 from nlp_gait.robots import load_robot
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 X = (0.31, -0.002, 0.0034, 0.008, 0.0025, 0.0243, -0.0256, 0.015, 4.0)
 
 

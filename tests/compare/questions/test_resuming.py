@@ -23,6 +23,8 @@ from nlp_gait.backends.starts import run_starts
 from nlp_gait.formulation.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 RUN = CliRunner()
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
 NAO = ("nao-ssp", "--intervals", "2", "--starts", "1")

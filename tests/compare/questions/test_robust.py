@@ -16,6 +16,8 @@ from compare.questions.robust.robust_gait import make_boxes
 from nlp_gait import load
 from nlp_gait.backends.exact import build_exact_model
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 RUN = CliRunner()
 
 

@@ -14,6 +14,8 @@ from compare.questions.sweep import Axis, Sweep, SweepPoint, parse_axis, plot_sw
 from nlp_gait import load
 from nlp_gait.errors import InputError, UnknownNameError
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 # Verified with two independent implementations to five digits, except 0.8 s: 2.282582 W by IPOPT and by differential evolution.
 SWING_W = {0.015: 0.84587, 0.018: 0.85426, 0.022: 0.86616, 0.024: 0.87244, 0.026: 0.87871, 0.028: 0.88497}
 DURATIONS_W = {0.8: 2.28258, 1.0: 2.02695, 1.5: 1.57457, 4.0: 0.84587}

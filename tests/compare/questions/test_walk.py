@@ -27,6 +27,8 @@ from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.interrupts import Interrupted
 from tests.robots.crooked import crooked
 
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
 # Fewer samples than those of ten intervals: the tests are about what is done with the gaits.
 OVER = "speed_m_s=0.04,0.045"
 COMMAND = ["walk", "--over", OVER, "--starts", "1", "--intervals", "2"]
@@ -104,7 +106,7 @@ def test_other_planners_take_the_same_footsteps(
 @pytest.mark.slow
 def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command with a made-up gait: the planner uses only its footsteps."""
-    pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+    pytest.importorskip("urdf_parser_py")
     robot = crooked(tmp_path)
     problem = load("humanoid-cycle", robot=robot, objective="power", intervals=2)
     assert default_speeds(problem) == "speed_m_s=0.0141:0.141:10"  # NAO's times the root of 0.40452 m / 0.2029 m

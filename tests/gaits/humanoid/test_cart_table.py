@@ -15,7 +15,7 @@ from nlp_gait.gaits.humanoid.problems import make_humanoid_cycles
 from tests.pinocchio_oracle import Standing, floating_model, stand
 from tests.robots.crooked import SOLE_AHEAD_M, crooked
 
-pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+pytest.importorskip("urdf_parser_py")
 
 STEPS = Footsteps(step_m=0.1, single_s=0.8, double_s=0.6, hip_height_m=0.38, lift_m=0.03)
 # Two double-precision algorithms, relative to the largest torque, and on lengths of a metre.

@@ -18,7 +18,7 @@ from nlp_gait.gaits.humanoid.body import GRAVITY
 from tests.pinocchio_oracle import floating_model, stand
 from tests.robots.crooked import crooked
 
-pytest.importorskip("urdf_parser_py", reason="extra urdf is not installed")
+pytest.importorskip("urdf_parser_py")
 
 # Two double-precision algorithms, relative to the largest torque, and on lengths of a metre.
 TORQUE_TOLERANCE, ZMP_TOLERANCE_M = 1e-10, 1e-12
@@ -145,7 +145,7 @@ def test_steps_of_another_length_and_motions_of_more_coefficients(path: str) -> 
 
 @pytest.mark.slow
 def test_the_step_is_simulated_upright_and_exported(problem: GaitProblem, solution: Solution, tmp_path: Path) -> None:
-    pytest.importorskip("mujoco", reason="extra sim is not installed")
+    pytest.importorskip("mujoco")
     from nlp_gait.export.formats import write_as
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import measure
