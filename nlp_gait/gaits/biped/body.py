@@ -31,82 +31,47 @@ State: TypeAlias = tuple[Motion, Angles, Mapping[str, Motion]]
 
 @dataclass(frozen=True, kw_only=True)
 class Coordinate:
-    """An angle that a cycle plans besides the hip.
+    """An angle that a cycle plans besides the hip."""
 
-    Attributes:
-        name: of its variables.
-        rate: name of its rate's variables.
-        bounds: of the angle [rad].
-        largest_rate: in both directions [rad/s].
-        image: +1 or -1, its factor in a mirrored motion.
-        words: description.
-        rate_words: description of its rate.
-    """
-
-    name: str
-    rate: str
-    bounds: tuple[float, float]
-    largest_rate: float
-    image: float
-    words: str
-    rate_words: str
+    name: str  # of its variables
+    rate: str  # name of its rate's variables
+    bounds: tuple[float, float]  # of the angle [rad]
+    largest_rate: float  # in both directions [rad/s]
+    image: float  # +1 or -1, its factor in a mirrored motion
+    words: str  # description
+    rate_words: str  # description of its rate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body(ABC):
-    """A biped whose gaits are planned.
+    """A biped whose gaits are planned."""
 
-    Attributes:
-        family: first part of the names of its problems.
-        title: its name in titles.
-        full: the robot with all its joints, as it is drawn.
-        simulated: the robot of the engine, with links welded that never move and without the motors' rotors.
-        motors: with the robot as the dynamics take it.
-        joints: those whose torques and rates count.
-        planned: those whose angles are limited.
-        images: of every joint on the other side.
-        leg_joints: joints of the left and the right half by ``"L"`` and ``"R"``; the root belongs to both.
-        coordinates: angles that a cycle plans besides the hip.
-        upright: links that never turn.
-        gravity: [m/s^2].
-        feet_y: of the left and the right foot in all gaits, each below its own hip [m].
-        leg_length_m: from hip to ankle.
-        hip_height_m: least and greatest height of the hip.
-        hip_m: (3,) point that is called the hip, from the torso's origin [m].
-        hip_name: of this point, in words.
-        step_length_m: default, from foot to foot.
-        heat: parameter K with the robot's default.
-        closed_form: False if Newton's method computes the legs' angles.
-        drive_limits: whether torques and speeds are within the limits of the robot's file.
-        length_scale: lengths relative to NAO's.
-        time_scale: times and velocities relative to NAO's.
-        torque_scale: torques relative to NAO's.
-    """
-
-    family: str
-    title: str
-    full: Robot
-    simulated: Robot
-    motors: Motors
-    joints: tuple[str, ...]
-    planned: tuple[str, ...]
-    images: tuple[str, ...]
+    family: str  # first part of the names of its problems
+    title: str  # its name in titles
+    full: Robot  # the robot with all its joints, as it is drawn
+    simulated: Robot  # the robot of the engine, with links welded that never move and without the motors' rotors
+    motors: Motors  # with the robot as the dynamics take it
+    joints: tuple[str, ...]  # those whose torques and rates count
+    planned: tuple[str, ...]  # those whose angles are limited
+    images: tuple[str, ...]  # of every joint on the other side
+    # Joints of the left and the right half by ``"L"`` and ``"R"``; the root belongs to both
     leg_joints: Mapping[str, Sequence[str]]
-    coordinates: tuple[Coordinate, ...]
-    upright: frozenset[str]
-    gravity: float
-    feet_y: tuple[float, float]
-    leg_length_m: float
-    hip_height_m: tuple[float, float]
+    coordinates: tuple[Coordinate, ...]  # angles that a cycle plans besides the hip
+    upright: frozenset[str]  # links that never turn
+    gravity: float  # [m/s^2]
+    feet_y: tuple[float, float]  # of the left and the right foot in all gaits, each below its own hip [m]
+    leg_length_m: float  # from hip to ankle
+    hip_height_m: tuple[float, float]  # least and greatest height of the hip
+    # (3,) point that is called the hip, from the torso's origin [m]
     hip_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    hip_name: str = "torso origin"
-    step_length_m: float = 0.06
-    heat: Parameter = HEAT_LOSS
-    closed_form: bool = True
-    drive_limits: bool = False
-    length_scale: float = 1.0
-    time_scale: float = 1.0
-    torque_scale: float = 1.0
+    hip_name: str = "torso origin"  # of this point, in words
+    step_length_m: float = 0.06  # default, from foot to foot
+    heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
+    closed_form: bool = True  # False if Newton's method computes the legs' angles
+    drive_limits: bool = False  # whether torques and speeds are within the limits of the robot's file
+    length_scale: float = 1.0  # lengths relative to NAO's
+    time_scale: float = 1.0  # times and velocities relative to NAO's
+    torque_scale: float = 1.0  # torques relative to NAO's
 
     @property
     def robot(self) -> Robot:
@@ -205,12 +170,8 @@ class Body(ABC):
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         """Return the motion of the whole robot: both legs between the torso and the feet.
 
-        Args:
-            hip: (3,) [m].
-            angles: planned ones [rad]; those left out rest.
-            ankles: (3,) by ``"L"`` and ``"R"`` [m].
-            margin: on the reach of the knees.
-            ops: interpretation.
+        Motions are those of the hip (3,) [m], of the planned angles [rad], of which those left out rest, and of the ankles (3,)
+        by ``"L"`` and ``"R"`` [m]; ``margin`` is on the reach of the knees.
         """
 
     @abstractmethod
@@ -224,13 +185,7 @@ class Body(ABC):
     def make_curve_limits(
         self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
-        """Return the limits that cubics cannot break but splines can.
-
-        Args:
-            phase: of the gait.
-            count: coefficients of each spline, 0 for cubics.
-            state: planned one at an instant.
-        """
+        """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""
         return ()
 
     @property

@@ -35,21 +35,13 @@ SETTLING_S = 10.0  # after which the walk repeats
 
 @dataclass(frozen=True, kw_only=True)
 class Footsteps:
-    """Input of the planner.
+    """Input of the planner."""
 
-    Attributes:
-        step_m: length from foot to foot [m].
-        single_s: time of single support [s].
-        double_s: time of double support [s].
-        hip_height_m: of what the planned cycle calls the hip, constant [m].
-        lift_m: highest point of the swing foot [m].
-    """
-
-    step_m: float
-    single_s: float
-    double_s: float
-    hip_height_m: float
-    lift_m: float
+    step_m: float  # length from foot to foot [m]
+    single_s: float  # time of single support [s]
+    double_s: float  # time of double support [s]
+    hip_height_m: float  # of what the planned cycle calls the hip, constant [m]
+    lift_m: float  # highest point of the swing foot [m]
 
     def __post_init__(self) -> None:
         """Check that all are finite and positive."""
@@ -65,15 +57,10 @@ class Footsteps:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Walker:
-    """Planner of one robot's walk: from the hip's path over the floor to the joints.
+    """Planner of one robot's walk: from the hip's path over the floor to the joints."""
 
-    Attributes:
-        cycles: the robot, and the limits by which its cycles are judged.
-        footsteps: places and times.
-    """
-
-    cycles: RecordedCycles
-    footsteps: Footsteps
+    cycles: RecordedCycles  # the robot, and the limits by which its cycles are judged
+    footsteps: Footsteps  # places and times
 
     @property
     def body(self) -> Body:
@@ -114,10 +101,7 @@ class Walker:
     ) -> Callable[[Array], Array]:
         """Return the path (2, k) of the cart's mass in the cycle whose ZMP follows a repeating, mirrored one [m].
 
-        Args:
-            zmp: (2, k) of a cycle at times (k,) [m].
-            height_m: of the mass.
-            advances: the walk proceeds by a step each time; False for a correction.
+        That ZMP (2, k) of a cycle is a function of times (k,). The walk advances by a step each time; a correction does not.
         """
         controller = PreviewController(sample_s=self.sample_s, height_m=height_m, gravity=self.body.gravity)
         period, begins = self.footsteps.period_s, self.cycle_step * self.footsteps.period_s
@@ -175,13 +159,10 @@ class Walker:
 
 
 def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int = 2) -> Result:
-    """Plan a walking cycle from footsteps alone.
+    """Plan a walking cycle from footsteps and the hip's height alone, judged by the limits of a planned one.
 
-    Args:
-        cycles: the robot, and the limits by which its cycles are judged.
-        footsteps: with the hip's height.
-        passes: 1 models the robot as a cart; each further pass moves the hip so that a cart would remove the distance of the
-            whole body's ZMP from the planned one. The source has two.
+    One pass models the robot as a cart; each further pass moves the hip so that a cart would remove the distance of the whole
+    body's ZMP from the planned one. The source has two.
 
     Raises:
         InputError: a foot is out of reach of the hip.

@@ -32,17 +32,11 @@ HIP_CURVES = ("hip_x", "hip_y", "hip_z")
 
 @dataclass(frozen=True, kw_only=True)
 class Splines:
-    """Splines that are added to cubics.
+    """Splines that are added to cubics."""
 
-    Attributes:
-        trajectory: their order.
-        units: of each curve by name, ``"m"`` or ``"rad"``.
-        length_scale: of the bounds in metres, for a robot of another size than NAO.
-    """
-
-    trajectory: Trajectory
-    units: Mapping[str, str]
-    length_scale: float = 1.0
+    trajectory: Trajectory  # their order
+    units: Mapping[str, str]  # of each curve by name, ``"m"`` or ``"rad"``
+    length_scale: float = 1.0  # of the bounds in metres, for a robot of another size than NAO
 
     @property
     def count(self) -> int:
@@ -97,14 +91,9 @@ class Splines:
 def hip_motion(
     at: InstantPoint, along: tuple[float, float], across: tuple[float, float], duration: SX, phase: SX
 ) -> Motion:
-    """Return the hip's motion as cubics in x, y and z (3,) [m].
+    """Return the hip's motion as cubics in x, y and z (3,) [m], ``along`` and ``across`` from end to end [m].
 
-    Args:
-        at: values of the variables hip_height_m and hip_v<axis>_<end>_m_s.
-        along: x at both ends [m].
-        across: y at both ends [m].
-        duration: of the phase [s].
-        phase: time / duration.
+    Height and velocities are the variables hip_height_m and hip_v<axis>_<end>_m_s.
 
     Source:
         Gupta, Pratihar, Deb (2023), Table 3, rows 3 to 5, and Table 5, rows 1 to 3.

@@ -62,19 +62,12 @@ BALANCE = tuple(f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axi
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WalkingCycle:
-    """A cycle sampled over both phases.
-
-    Attributes:
-        body: the robot.
-        variables: of the motion, the step length last.
-        phases: ``"ssp"`` and ``"dsp"``.
-        at_given_speed: the step length is no decision variable but follows from the speed.
-    """
+    """A cycle sampled over both phases."""
 
     body: Body
-    variables: tuple[Variable, ...]
-    phases: Mapping[PhaseName, Phase]
-    at_given_speed: bool
+    variables: tuple[Variable, ...]  # of the motion, the step length last
+    phases: Mapping[PhaseName, Phase]  # ``"ssp"`` and ``"dsp"``
+    at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
     @property
     def objective(self) -> Objective:
@@ -214,12 +207,8 @@ def make_walking_cycle(
 ) -> WalkingCycle:
     """Return both phases of the cycle, joined.
 
-    Args:
-        body: the robot.
-        sharing: of load in double support.
-        grid: of each phase.
-        goal: of each phase; the cycle's is their mean over time, or energy per metre.
-        at_given_speed: the step length follows from the speed.
+    The goal is that of each phase; the cycle's is their mean over time, or energy per metre. At a given speed the step length
+    follows from it.
     """
     *motion, step = make_cycle_variables(body)
     variables = (*motion, *sharing.variables, step)
@@ -295,12 +284,8 @@ def make_cycle_problem(
 ) -> GaitProblem:
     """Return the problem of a cycle.
 
-    Args:
-        name: of the problem.
-        cycle: both phases.
-        start: start point; None for one within the bounds.
-        rows_over_time: whether its rows are known between the samples, too.
-        repeats: a gait is one step, whose mirror image is the next one.
+    With ``rows_over_time`` its constraints are known between the samples, too; ``repeats`` says that the mirror image of a gait
+    is the next step. Without ``start`` any point within the bounds is a start point.
     """
     problem = GaitProblem(
         name=name,
@@ -318,13 +303,7 @@ def make_cycle_problem(
 
 
 def draw_start(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Draw a start point within the bounds whose times give a step within its bounds, as far as their own bounds allow.
-
-    Args:
-        names: of the decision variables.
-        values: of the parameters, with speed and bounds.
-        rng: random generator.
-    """
+    """Draw a start point within the bounds whose times give a step within its bounds, as far as their own bounds allow."""
     x = rng.uniform(*(np.array([values[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
     times = [names.index(time) for time in TIMES.values()]
     step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])

@@ -41,25 +41,15 @@ class State(NamedTuple):
 
 
 class Cycle(NamedTuple):
-    """What the decision variables say.
+    """What the decision variables say."""
 
-    Attributes:
-        lift_off: state where the right foot leaves the ground.
-        touch_down: state where it lands.
-        lift: height of its swing [m].
-        single: time of single support [s].
-        double: time of double support [s].
-        step: length from foot to foot [m].
-        images: (k,) signs of the coordinates in a mirrored motion.
-    """
-
-    lift_off: State
-    touch_down: State
-    lift: SX
-    single: SX
-    double: SX
-    step: SX
-    images: DM
+    lift_off: State  # state where the right foot leaves the ground
+    touch_down: State  # state where it lands
+    lift: SX  # height of its swing [m]
+    single: SX  # time of single support [s]
+    double: SX  # time of double support [s]
+    step: SX  # length from foot to foot [m]
+    images: DM  # (k,) signs of the coordinates in a mirrored motion
 
     @property
     def end(self) -> State:

@@ -120,17 +120,7 @@ def make_double_support_phase(
     goal: Goal,
     derivatives: Derivatives = "analytic",
 ) -> Phase:
-    """Return the phase from touch-down of the right foot to lift-off of the left one.
-
-    Args:
-        body: the robot.
-        step_m: from foot to foot.
-        splines: see ``make_double_support_splines``.
-        sharing: of the load between the feet.
-        grid: its samples.
-        goal: what it minimises.
-        derivatives: of the angles.
-    """
+    """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
     soles = place_soles(body, step_m)
     box, ends = make_support_box(body.robot, soles), hip_ends(body, soles)
     ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}

@@ -30,21 +30,13 @@ def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Goal:
-    """What is minimised: mean power, or another figure of the samples with power as an index.
+    """What is minimised: mean power, or another figure of the samples with power as an index."""
 
-    Attributes:
-        objective: name and unit.
-        power: of the motors; if it is not the paper's, the paper's is an index too.
-        figure: of the samples; None for power.
-        reads_motion: whether it reads angles or their derivatives.
-        heat: parameter K with the robot's default.
-    """
-
-    objective: Objective = POWER
-    power: PowerModel = compute_paper_power
-    figure: Callable[[Samples], MX] | None = None
-    reads_motion: bool = False
-    heat: Parameter = HEAT_LOSS
+    objective: Objective = POWER  # name and unit
+    power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
+    figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
+    reads_motion: bool = False  # whether it reads angles or their derivatives
+    heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
 
     def evaluate(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
         """Return the objective, and the indexes before and after those of the limits."""

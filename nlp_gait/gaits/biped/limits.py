@@ -35,19 +35,12 @@ RowsAndIndexes: TypeAlias = tuple[Sequence[Constraint], Mapping[str, MX]]
 
 
 class Limit(ABC):
-    """What limits a phase; a subclass overrides what it needs.
+    """What limits a phase; a subclass overrides what it needs."""
 
-    Attributes:
-        parameters: of the limit, which can be changed without rebuilding.
-        reads_motion: whether it reads angles and their derivatives.
-        reads_wrenches: whether it reads those of the ground on the soles.
-        traces: other quantities that it reads at each instant, by name.
-    """
-
-    parameters: tuple[Parameter, ...] = ()
-    reads_motion: bool = False
-    reads_wrenches: bool = False
-    traces: Mapping[str, Trace] = MappingProxyType({})
+    parameters: tuple[Parameter, ...] = ()  # of the limit, which can be changed without rebuilding
+    reads_motion: bool = False  # whether it reads angles and their derivatives
+    reads_wrenches: bool = False  # whether it reads those of the ground on the soles
+    traces: Mapping[str, Trace] = MappingProxyType({})  # other quantities that it reads at each instant, by name
 
     @abstractmethod
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
@@ -87,16 +80,9 @@ def make_rows_at_samples(
     *,
     first: int = 0,
 ) -> Constraint:
-    """Make rows of every instant from a matrix with a column for each sample.
+    """Make rows of every instant from a matrix (k, n) with a column for each sample, the first of them number ``first``.
 
-    Args:
-        name: of the rows.
-        unit: of the values.
-        values: (k, n).
-        names: (k,) of the matrix's rows.
-        lower: scalar or (k n, 1).
-        upper: likewise.
-        first: number of the first sample.
+    Names are those of the matrix's rows (k,); limits are scalars or (k n, 1).
     """
     numbers = range(first, first + values.shape[1])
     return make_rows(name, unit, ca.vec(values), lower, upper, make_labels(names, numbers), "instant")
@@ -148,12 +134,7 @@ class Closure(Limit):
 
 
 class DriveLimits(Limit):
-    """Torque and speed of every joint within the limits of the robot's file, in both directions.
-
-    Args:
-        robot: with these limits.
-        size: of its torques relative to NAO's.
-    """
+    """Torque and speed of every joint within the limits of the robot's file; ``size`` scales NAO's torques."""
 
     reads_motion = True
 
@@ -177,11 +158,7 @@ class DriveLimits(Limit):
 
 
 class TorqueChange(Limit):
-    """Largest change of every torque over an interval of time (sections 4.1 and 4.2).
-
-    Args:
-        size: of the robot's torques relative to NAO's.
-    """
+    """Largest change of every torque over an interval of time (sections 4.1 and 4.2); ``size`` scales NAO's torques."""
 
     def __init__(self, size: float = 1.0) -> None:
         self._size = size
@@ -203,9 +180,7 @@ class TorqueChange(Limit):
 class BalanceMargins(Limit):
     """Least dynamic balance margins, at every sample and in the mean (sections 3.1, 3.2, 4.1 and 4.2).
 
-    Args:
-        margins: of the phase's ground contact.
-        mean_limits_m: default of the least mean margins in x and y [m].
+    ``mean_limits_m`` are the defaults of the least mean margins in x and y [m].
     """
 
     def __init__(self, margins: Margins, mean_limits_m: tuple[float, float]) -> None:
@@ -240,11 +215,7 @@ class BalanceMargins(Limit):
 class AngleLimits(Limit):
     """Angles between the ends of a phase within the robot's limits, which only a richer motion than a cubic can break.
 
-    Args:
-        name: of the rows.
-        robot: with these limits.
-        joints: names.
-        angles: of these joints, a column.
+    The trace ``angles`` is a column of the joints' angles [rad].
     """
 
     def __init__(self, name: str, robot: Robot, joints: Sequence[str], angles: Trace) -> None:
@@ -267,10 +238,7 @@ def make_angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX
 class FootClearance(Limit):
     """A planned swing foot above the ground between its ends, and high enough in the middle of its path halfway in time.
 
-    Args:
-        path: (3,) of the foot, height above the ground [m].
-        middle: where it is halfway [m].
-        least_height: variable with the least height there.
+    The path (3,) has the height above the ground, and ``middle`` is its x halfway [m]; the least height there is a variable.
     """
 
     def __init__(self, path: Trace, middle: float, least_height: str) -> None:
@@ -296,12 +264,7 @@ def make_halfway_rows(
 ) -> tuple[Constraint, ...]:
     """Make rows for a swing foot halfway through the phase: in the middle of its path, as in the papers, and high enough.
 
-    Args:
-        along: position along the path [m].
-        middle: of the path [m].
-        heights: (m, 1) of the foot's points [m].
-        least: lower limit of these [m].
-        corners: names of the points.
+    Its place along the path and the heights (m, 1) of its points, whose names are ``corners``, are in metres.
     """
     return (
         make_rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),

@@ -56,13 +56,10 @@ LOAD_DEGREE = 4
 def torso_shares(hip_y: SX, rule: Division, feet_y: tuple[float, float] = (0.05, -0.05)) -> dict[str, SX]:
     """Compute the share of the torso's mass that each leg carries from the hip's distances to the feet; both add up to 1.
 
-    Distances are signed, so that a hip outside the feet gives shares outside 0 and 1 and no kink.
-
-    Args:
-        hip_y: position of the hip across the walking direction [m].
-        rule: ``"printed"`` is proportional to the distance *from* that leg's own foot, as in the equations; ``"lever"`` to
-            the distance from the other foot, as the text says: the nearer foot carries more.
-        feet_y: of the left and the right foot [m]; by default those of NAO.
+    The hip's place and the feet's, by default NAO's, are across the walking direction [m]. Distances are signed, so that a hip
+    outside the feet gives shares outside 0 and 1 and no kink. By the rule ``"printed"`` a share is proportional to the distance
+    *from* that leg's own foot, as in the equations; by ``"lever"`` to the distance from the other foot, as the text says: the
+    nearer foot carries more.
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (28), (29).
@@ -74,16 +71,10 @@ def torso_shares(hip_y: SX, rule: Division, feet_y: tuple[float, float] = (0.05,
 
 
 class LoadSharing:
-    """Load that a rule of the paper divides: each leg stands on its own foot and carries a share of the torso.
+    """Load that a rule of the paper divides, see ``torso_shares``: each leg stands on its own foot and carries part of the torso.
 
-    Attributes:
-        variables: in addition to those of the motion.
-        limits: likewise.
-        loads: torques of each half from its own foot, and the combined ZMP of both feet.
-
-    Args:
-        body: the robot.
-        rule: see ``torso_shares``.
+    Variables and limits are added to those of the motion; ``loads`` gives the torques of each half from its own foot, and the
+    combined ZMP of both feet.
     """
 
     variables: tuple[Variable, ...] = ()
@@ -102,12 +93,7 @@ class LoadSharing:
 
 
 def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadSharing:
-    """Return how the feet share the load.
-
-    Args:
-        body: the robot.
-        rule: see ``torso_shares``; ``"free"`` plans the wrench on the right foot.
-        degree: of that wrench over the phase.
+    """Return how the feet share the load: by a rule, see ``torso_shares``, or ``"free"``, see ``PlannedLoad``.
 
     Raises:
         InputError: a degree that is not allowed.
@@ -118,12 +104,8 @@ def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadS
 class PlannedLoad(LoadSharing):
     """Wrench of the ground on the right sole, about the point under its ankle: polynomials in Bernstein form, and ramps.
 
-    Args:
-        body: the robot.
-        degree: of the polynomials.
-
     Raises:
-        InputError: a degree that is not allowed.
+        InputError: a degree of the polynomials that is not allowed.
     """
 
     def __init__(self, body: Body, degree: int) -> None:
@@ -236,11 +218,8 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
 class FootLimits(Limit):
     """What both soles can bear at every sample, and how fast load may pass from the left to the right foot.
 
-    That the ground does not pull follows from friction and pressure together.
-
-    Args:
-        body: the robot.
-        load_slope: derivative of the load on the right sole with respect to the phase [N].
+    That the ground does not pull follows from friction and pressure together. ``load_slope`` is the derivative of the load on the
+    right sole with respect to the phase [N].
     """
 
     reads_wrenches = True

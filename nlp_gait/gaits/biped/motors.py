@@ -50,23 +50,16 @@ SUPPLY = Parameter(
 class Motors:
     """Features of real motors that a problem takes into account.
 
-    Attributes:
-        features: see above.
-        robot: without the inertia of the rotors.
-        joints: that the motors turn.
-        shared: two joints that one motor turns.
-        coupling: limit of one ankle joint by the other, if it is known.
-
     Raises:
         UnknownNameError: no such feature.
         InputError: features that exclude each other; a joint of the robot without data of its motor, or of its rotor.
     """
 
-    features: tuple[str, ...]
-    robot: Robot
-    joints: tuple[str, ...]
-    shared: tuple[str, ...] = ()
-    coupling: Limit | None = None
+    features: tuple[str, ...]  # see above
+    robot: Robot  # without the inertia of the rotors
+    joints: tuple[str, ...]  # that the motors turn
+    shared: tuple[str, ...] = ()  # two joints that one motor turns
+    coupling: Limit | None = None  # limit of one ankle joint by the other, if it is known
 
     def __post_init__(self) -> None:
         """Check the features."""
@@ -157,11 +150,8 @@ class Motors:
 class MotorLimits(Limit):
     """Speed, torque against speed |tau| <= stall (1 - |qd| / no-load), and root mean square torque of every motor.
 
-    As two lines of each sign, tau +- qd stall / no-load within +- stall, also in braking, where a motor could do more.
-
-    Args:
-        motors: with these limits.
-        ratings: one for each joint.
+    As two lines of each sign, tau +- qd stall / no-load within +- stall, also in braking, where a motor could do more. Each joint
+    has its rating.
     """
 
     parameters = (SUPPLY,)

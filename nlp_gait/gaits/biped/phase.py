@@ -52,31 +52,18 @@ COLUMNS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Phase:
-    """A support phase: how the robot moves, which loads that causes, what limits it and what it minimises.
-
-    Attributes:
-        body: the robot.
-        variables: of the motion, in the order of x.
-        duration: variable that holds the phase's duration.
-        plan: the motion.
-        loads: torques and ZMP.
-        grid: its samples.
-        derivatives: analytic ones, or finite differences of the sampled angles as in the paper.
-        limits: they add the rows.
-        goal: what it minimises.
-        kinks: phases at which the motion's formula changes: knots of splines.
-    """
+    """A support phase: how the robot moves, which loads that causes, what limits it and what it minimises."""
 
     body: Body
-    variables: tuple[Variable, ...]
-    duration: str
+    variables: tuple[Variable, ...]  # of the motion, in the order of x
+    duration: str  # variable that holds the phase's duration
     plan: Planner
-    loads: Loader
-    grid: Grid
-    derivatives: Derivatives = "analytic"
-    limits: Sequence[Limit] = ()
-    goal: Goal = Goal()
-    kinks: tuple[float, ...] = ()
+    loads: Loader  # torques and ZMP
+    grid: Grid  # its samples
+    derivatives: Derivatives = "analytic"  # analytic ones, or finite differences of the sampled angles as in the paper
+    limits: Sequence[Limit] = ()  # they add the rows
+    goal: Goal = Goal()  # what it minimises
+    kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -137,9 +124,7 @@ class Phase:
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """Return the phase as functions of time; nothing with finite differences, which are of its samples.
 
-        Args:
-            name: of the phase in a longer motion.
-            begins: durations of the phases before it.
+        In a longer motion it has a name and begins after the phases of which ``begins`` lists the durations.
         """
         if self.derivatives != "analytic":
             return ()

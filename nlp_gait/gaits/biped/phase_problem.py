@@ -55,11 +55,8 @@ def make_phase_limits(
 ) -> tuple[Limit, ...]:
     """Return the limits of every phase (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2), and those of the robot's drives.
 
-    Args:
-        body: the robot.
-        margins: of balance.
-        mean_limits_m: default of the least mean margins in x and y [m].
-        solved: the legs' angles are computed from their feet; False where the angles are given.
+    Defaults of the least mean margins in x and y are in metres. ``solved`` says that the legs' angles are computed from their
+    feet.
     """
     size = body.torque_scale
     return (
@@ -75,14 +72,9 @@ def make_phase_limits(
 def make_phase_problem(
     name: str, title: str, phase: Phase, *, start: Start | None = None, searchable: bool = True
 ) -> GaitProblem:
-    """Return the problem of one phase.
+    """Return the problem of one phase; its name is without the robot's family, its title without the robot.
 
-    Args:
-        name: of the problem, without the robot's family.
-        title: one line, without the robot.
-        phase: with its limits and its goal.
-        start: start point; None for one within the bounds.
-        searchable: False for a problem that only gradient methods can solve.
+    Without ``start`` any point within the bounds is a start point; only gradient methods solve a problem that is not searchable.
     """
 
     def assemble(at: Point, ops: Nonsmooth) -> Assembly:
@@ -109,10 +101,7 @@ def make_phase_problem(
 def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False) -> GaitProblem:
     """Return the problem with the robot that its gaits are drawn and simulated with.
 
-    Args:
-        problem: without.
-        body: the robot.
-        repeats: a gait is one step, whose mirror image is the next one.
+    ``repeats`` says that a gait is one step, whose mirror image is the next one.
     """
     simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
     model = SimulationModel(robot=simulated, gravity=body.gravity, heat_loss=HEAT_LOSS.name, repeats=repeats)
@@ -125,11 +114,8 @@ def make_start_within_reach(
 ) -> Start:
     """Return start points at which all knees are within reach, or the nearest of some: beyond reach there is no slope back.
 
-    Args:
-        variables: names.
-        known: parameters that the motion reads besides the margin on the reach.
-        reach: cosines of the knees (2, N + 1) at a point.
-        start: start points to choose from; None for any within the bounds.
+    Besides the margin on the reach, the motion reads the parameters ``known``; ``reach`` gives the cosines of the knees at a
+    point. Start points to choose from are those of ``start``, or any within the bounds.
     """
     read = (REACH_MARGIN, *known)
 

@@ -22,17 +22,11 @@ ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
-    """Motion of a cart with constant jerk between samples.
+    """Motion of a cart with constant jerk between samples."""
 
-    Attributes:
-        sample_s: time between samples [s].
-        states: (T, 3) position, velocity and acceleration at each sample [m, s].
-        jerks: (T,) from each sample on [m/s^3].
-    """
-
-    sample_s: float
-    states: Array
-    jerks: Array
+    sample_s: float  # time between samples [s]
+    states: Array  # (T, 3) position, velocity and acceleration at each sample [m, s]
+    jerks: Array  # (T,) from each sample on [m/s^3]
 
     def at(self, t: Array) -> Array:
         """Return positions (k,) [m] at times (k,) [s], exact between samples."""
@@ -44,23 +38,16 @@ class Course:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreviewController:
-    """Controller of a cart whose ZMP follows a reference that is known in advance (eqs. 13 to 22).
+    """Controller of a cart whose ZMP follows a reference that is known in advance (eqs. 13 to 22)."""
 
-    Attributes:
-        sample_s: T [s].
-        height_m: of the cart [m].
-        gravity: [m/s^2].
-    """
-
-    sample_s: float
-    height_m: float
-    gravity: float
+    sample_s: float  # T [s]
+    height_m: float  # of the cart [m]
+    gravity: float  # [m/s^2]
 
     def follow(self, reference: Array) -> Course:
         """Return the motion of the cart from rest above the first reference.
 
-        Args:
-            reference: (T + preview,) ZMP, longer than the motion by ``self.preview`` samples [m].
+        The ZMP's reference (T + preview,) [m] is longer than the motion by ``self.preview`` samples.
         """
         integral_gain, state_gain, preview_gains = self._gains()
         a, b, c = self._cart()

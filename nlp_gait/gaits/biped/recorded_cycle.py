@@ -29,37 +29,23 @@ from nlp_gait.gaits.biped.single_support import compute_single_support_mean_marg
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedGait:
-    """A gait from elsewhere, as a problem whose only variables are its times.
+    """A gait from elsewhere, as a problem whose only variables are its times."""
 
-    Attributes:
-        gait: name of the problem with whose limits it is judged.
-        problem: the recorded gait; its variables are the durations of its phases, and of a cycle the step length.
-        x: (n,) its own durations and step.
-        motion: on the left foot.
-        step_m: from foot to foot.
-        lean_deg: of the torso at the beginning.
-        make_planned: makes the planned problem with the same robot, step and durations; InputError if there is none.
-    """
-
-    gait: str
+    gait: str  # name of the problem with whose limits it is judged
+    # The recorded gait; its variables are the durations of its phases, and of a cycle the step length
     problem: GaitProblem
-    x: tuple[float, ...]
-    motion: Motion
-    step_m: float
-    lean_deg: float
+    x: tuple[float, ...]  # (n,) its own durations and step
+    motion: Motion  # on the left foot
+    step_m: float  # from foot to foot
+    lean_deg: float  # of the torso at the beginning
+    # Makes the planned problem with the same robot, step and durations; InputError if there is none
     make_planned: Callable[[], GaitProblem]
 
 
 def make_refinable(
     build: Callable[[Grid], GaitProblem], intervals: int, options: Mapping[str, str | int | float | bool]
 ) -> GaitProblem:
-    """Return a problem on the planned one's samples, which can be refined.
-
-    Args:
-        build: the problem on a grid.
-        intervals: of each phase.
-        options: of the problem.
-    """
+    """Return a problem on the planned one's samples, which can be refined: ``build`` makes it on a grid."""
 
     def refined(factor: int) -> GaitProblem:
         grid = Grid(intervals=intervals, samples_per_interval=factor, refined_by="samples_per_interval")
@@ -106,25 +92,16 @@ def make_recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, gri
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedCycles:
-    """Recorded cycles of one robot that begin where the right foot leaves the ground, judged by the planned one's limits.
-
-    Attributes:
-        body: the robot.
-        intervals: of each phase, as in the planned problem.
-        options: of the problem that judges.
-    """
+    """Recorded cycles of one robot that begin where the right foot leaves the ground, judged by the planned one's limits."""
 
     body: Body
-    intervals: int
-    options: Mapping[str, str | int | float | bool]
+    intervals: int  # of each phase, as in the planned problem
+    options: Mapping[str, str | int | float | bool]  # of the problem that judges
 
     def judge(self, t: Array, q: Array, touch_down_s: float) -> Result:
         """Return a cycle with its own times and step, as a result of the problem that judges it.
 
-        Args:
-            t: (T,) from zero [s].
-            q: (T, J) angles of the body's joints [rad].
-            touch_down_s: when the right foot lands.
+        Angles (T, J) of the body's joints [rad] are at times (T,) from zero [s]; the right foot lands at ``touch_down_s``.
 
         Raises:
             InputError: a phase has too few samples.
@@ -139,13 +116,7 @@ class RecordedCycles:
         return Result(problem=problem, x=x)
 
     def make_problem(self, motions: Mapping[PhaseName, Motion], grid: Grid, repeats: bool) -> GaitProblem:
-        """Return the problem of both phases of a motion and the rows that join them.
-
-        Args:
-            motions: of each phase.
-            grid: of each phase.
-            repeats: another step can follow.
-        """
+        """Return the problem of both phases of a motion and the rows that join them; if it repeats, another step can follow."""
         body, margins = self.body, make_cycle_margins(self.body)
         known = {variable.name: variable for variable in make_cycle_variables(body)}
         variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])

@@ -36,21 +36,13 @@ FINE = 400  # instants at which a whole motion is evaluated
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
-    """A motion of all joints of the gait on the left foot.
-
-    Attributes:
-        body: the robot.
-        t: (T,) [s], from zero.
-        q: (T, J) angles of the body's joints [rad].
-        mirrored: the file's left is this motion's right.
-        held: joints that the file leaves out.
-    """
+    """A motion of all joints of the gait on the left foot."""
 
     body: Body
-    t: Array
-    q: Array
-    mirrored: bool = False
-    held: tuple[str, ...] = ()
+    t: Array  # (T,) [s], from zero
+    q: Array  # (T, J) angles of the body's joints [rad]
+    mirrored: bool = False  # the file's left is this motion's right
+    held: tuple[str, ...] = ()  # joints that the file leaves out
 
     @property
     def duration_s(self) -> float:
@@ -125,28 +117,18 @@ class Motion:
 
 
 class FreeParts(NamedTuple):
-    """Places of what does not stand.
+    """Places of what does not stand."""
 
-    Attributes:
-        torso: (3,) origin of the torso [m].
-        ankle: (3,) of the right foot [m].
-        corners: (3, 4) of the right sole [m].
-        rotation: (3, 3) from the torso's axes.
-    """
-
-    torso: SX
-    ankle: SX
-    corners: SX
-    rotation: SX
+    torso: SX  # (3,) origin of the torso [m]
+    ankle: SX  # (3,) of the right foot [m]
+    corners: SX  # (3, 4) of the right sole [m]
+    rotation: SX  # (3, 3) from the torso's axes
 
 
 def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
-    """Return the places of torso and right foot of a robot on its left foot.
+    """Return the places of torso and right foot of a robot on its left foot, from angles by joint name [rad].
 
-    Args:
-        robot: with links welded that never move.
-        q: angles by joint name [rad].
-        support: (3,) the left ankle, which stands [m].
+    The robot's links that never move are welded; its left ankle stands at ``support`` [m].
     """
     tree = tree_from(robot, robot.feet["left"].link)
     found = forward_kinematics(tree, q, SX(DM(support)))

@@ -37,13 +37,9 @@ def _refuse_plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedPhase(Phase):
-    """A phase whose angles over time are given, so that it has no plan.
+    """A phase whose angles over time are given, so that it has no plan."""
 
-    Attributes:
-        recorded: the motion, of the same joints.
-    """
-
-    recorded: Motion
+    recorded: Motion  # the motion, of the same joints
     plan: Planner = _refuse_plan
 
     @cached_property
@@ -137,9 +133,7 @@ GROUND_TOLERANCE = Parameter(
 class HipLimits(Limit):
     """The hip at both ends within the ranges of the planned motion's variables.
 
-    Args:
-        variables: at the start and at the end, by what they limit: ``x``, ``z``, ``vx``, ``vy``, ``vz``.
-        labels: of both ends.
+    ``variables`` are those at the start and at the end, by what they limit: ``x``, ``z``, ``vx``, ``vy``, ``vz``.
     """
 
     def __init__(self, variables: Sequence[Mapping[str, Variable]], labels: Sequence[str]) -> None:
@@ -169,12 +163,7 @@ class HipLimits(Limit):
 
 
 class SwingLimits(Limit):
-    """A swinging right foot: on the ground at both ends, above it and next to the other one in between, lifted high enough.
-
-    Args:
-        motion: recorded.
-        lift: variable of its greatest height.
-    """
+    """A swinging right foot: on the ground at both ends, above it and next to the other one in between, lifted high enough."""
 
     def __init__(self, motion: Motion, lift: Variable) -> None:
         self._motion, self._lift = motion, lift

@@ -19,31 +19,19 @@ LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that 
 
 
 class Instant(NamedTuple):
-    """Motion of the whole robot at one instant, and the loads that it causes.
+    """Motion of the whole robot at one instant, and the loads that it causes."""
 
-    Attributes:
-        joints: motion of every joint by name [rad].
-        hip: (3,) position of the torso's origin [m].
-        ankles: (3,) positions by side ``"L"``, ``"R"`` [m].
-        reach: (2,) cosines of the left and the right knee.
-        wrench: (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty unless planned.
-        miss: (k,) distances by which legs miss their feet [m]; empty where they cannot.
-        attitude: (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright.
-        torques: by joint name [Nm]; this and the rest are computed from the motion by a ``Loader``.
-        zmp: (2,) in the world [m].
-        wrenches: (6,) of the ground on each sole by side, about the point under its ankle [N, Nm].
-    """
-
-    joints: Mapping[str, Motion]
-    hip: SX
-    ankles: Mapping[str, SX]
-    reach: SX = SX(0, 1)
+    joints: Mapping[str, Motion]  # motion of every joint by name [rad]
+    hip: SX  # (3,) position of the torso's origin [m]
+    ankles: Mapping[str, SX]  # (3,) positions by side ``"L"``, ``"R"`` [m]
+    reach: SX = SX(0, 1)  # (2,) cosines of the left and the right knee
+    # (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty unless planned
     wrench: SX = SX(0, 1)
-    miss: SX = SX(0, 1)
-    attitude: SX = SX(0, 1)
-    torques: Mapping[str, SX] = {}
-    zmp: SX = SX(0, 1)
-    wrenches: Mapping[str, SX] = {}
+    miss: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
+    attitude: SX = SX(0, 1)  # (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright
+    torques: Mapping[str, SX] = {}  # by joint name [Nm]; this and the rest are computed from the motion by a ``Loader``
+    zmp: SX = SX(0, 1)  # (2,) in the world [m]
+    wrenches: Mapping[str, SX] = {}  # (6,) of the ground on each sole by side, about the point under its ankle [N, Nm]
 
 
 # From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
@@ -56,38 +44,23 @@ Trace: TypeAlias = Callable[[InstantPoint, SX], SX]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """A phase at N + 1 samples; columns are samples.
+    """A phase at N + 1 samples; columns are samples."""
 
-    Attributes:
-        joints: rows of torque.
-        moving: rows of power and of the motion.
-        per_interval: samples in each interval over which changes are limited.
-        duration: of the phase [s].
-        planned: (k, N + 1) planned angles [rad].
-        reach: (2, N + 1) cosines of the knees.
-        torque: (J, N + 1) [Nm].
-        power: (m, N + 1) mechanical power of the joints that move [W], signed.
-        zmp: (2, N + 1) in the world [m].
-        motion: angles of the joints that move and both derivatives, (m, N + 1) each; empty unless a limit or the goal reads them.
-        traces: quantities that limits requested, by name.
-        wrenches: (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty unless a limit
-            reads them.
-        miss: (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot.
-    """
-
-    joints: tuple[str, ...]
-    moving: tuple[str, ...]
-    per_interval: int
-    duration: MX
-    planned: MX
-    reach: MX
-    torque: MX
-    power: MX
-    zmp: MX
+    joints: tuple[str, ...]  # rows of torque
+    moving: tuple[str, ...]  # rows of power and of the motion
+    per_interval: int  # samples in each interval over which changes are limited
+    duration: MX  # of the phase [s]
+    planned: MX  # (k, N + 1) planned angles [rad]
+    reach: MX  # (2, N + 1) cosines of the knees
+    torque: MX  # (J, N + 1) [Nm]
+    power: MX  # (m, N + 1) mechanical power of the joints that move [W], signed
+    zmp: MX  # (2, N + 1) in the world [m]
+    # Angles of the joints that move and both derivatives, (m, N + 1) each; empty unless a limit or the goal reads them
     motion: tuple[MX, ...]
-    traces: Mapping[str, MX]
+    traces: Mapping[str, MX]  # quantities that limits requested, by name
+    # (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty unless a limit reads them
     wrenches: Mapping[str, MX] = field(default_factory=dict)
-    miss: MX = MX(0, 1)
+    miss: MX = MX(0, 1)  # (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
 
     @property
     def q(self) -> MX:

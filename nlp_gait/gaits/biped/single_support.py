@@ -73,16 +73,7 @@ def make_single_support_phase(
     goal: Goal,
     derivatives: Derivatives = "analytic",
 ) -> Phase:
-    """Return the phase from rest behind the standing foot to rest in front of it.
-
-    Args:
-        body: the robot.
-        step_m: from foot to foot.
-        splines: see ``make_single_support_splines``.
-        grid: its samples.
-        goal: what it minimises.
-        derivatives: of the angles.
-    """
+    """Return the phase from rest behind the standing foot to rest in front of it, with feet ``step_m`` apart."""
     stance, foot = place_stance(body, step_m), body.robot.feet["left"]
     left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
 

@@ -50,15 +50,10 @@ MOST_STEPS = 8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Humanoid(Body):
-    """Any robot with two legs of six turning joints, whose torso may lean.
+    """Any robot with two legs of six turning joints, whose torso may lean."""
 
-    Attributes:
-        biped: its legs and size.
-        newton_steps: of Newton's method, by foot.
-    """
-
-    biped: Biped
-    newton_steps: Mapping[str, int]
+    biped: Biped  # its legs and size
+    newton_steps: Mapping[str, int]  # of Newton's method, by foot
 
     def check_step_length(self, step_m: float) -> float:
         """Return a step length; 0 stands for NAO's in proportion [m].
@@ -141,12 +136,9 @@ class Humanoid(Body):
 
 
 def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") -> Humanoid:
-    """Return a humanoid as its gaits take it.
+    """Return a humanoid, by name or file, as its gaits take it.
 
-    Args:
-        robot: name or file.
-        drive_limits: whether torques and speeds are within the limits of the robot's file.
-        motors: features of the real motors that are taken into account, see ``gaits.biped.motors``.
+    Torques and speeds may be within the limits of the robot's file; for the motors see ``gaits.biped.motors``.
 
     Raises:
         InputError: its legs cannot be solved.

@@ -111,11 +111,6 @@ def humanoid_cycle(
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
     """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged.
 
-    Args:
-        robot: name or file.
-        intervals: of each phase, as in the planned problem.
-        drive_limits: whether torques and speeds must be within the limits of the robot's file.
-
     Raises:
         GaitError: as ``make_humanoid``.
     """

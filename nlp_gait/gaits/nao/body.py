@@ -196,12 +196,9 @@ class NaoBody(Body):
 
 
 def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -> NaoBody:
-    """Return NAO as its gaits take it.
+    """Return NAO, or a robot of its build by name or file, as its gaits take it.
 
-    Args:
-        robot: name or file.
-        rotational_inertia: False takes every link as a point mass.
-        motors: features of the real motors that are taken into account, see ``gaits.biped.motors``.
+    Without rotational inertia every link is a point mass; for the motors see ``gaits.biped.motors``.
 
     Raises:
         InputError: the robot or its motors do not suit the NAO problems.

@@ -54,17 +54,11 @@ FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which fre
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeMotion:
-    """Joint angles as splines.
+    """Joint angles as splines."""
 
-    Attributes:
-        paper: the paper's phase, which defines the ends, for a body none of whose links stays upright.
-        splines: on every curve.
-        support: (3,) the left ankle, which stands [m].
-    """
-
-    paper: Phase
-    splines: Splines
-    support: tuple[float, float, float]
+    paper: Phase  # the paper's phase, which defines the ends, for a body none of whose links stays upright
+    splines: Splines  # on every curve
+    support: tuple[float, float, float]  # (3,) the left ankle, which stands [m]
 
     def joints(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
         """Return the motion of every joint [rad]."""
@@ -111,11 +105,7 @@ class FreeMotion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreePhase(Phase):
-    """A phase on the left foot whose joints are free.
-
-    Attributes:
-        free: the motion.
-    """
+    """A phase on the left foot whose joints are free."""
 
     free: FreeMotion
 
@@ -170,10 +160,7 @@ def name_rows(rows: MX) -> dict[str, MX]:
 class FreeLimits(Limit):
     """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot.
 
-    Args:
-        robot: with the joints' limits.
-        path_middle: x of the swing foot halfway [m].
-        inner_edge: y of the supporting sole's inner edge [m].
+    Halfway the swing foot is at x = ``path_middle``; ``inner_edge`` is y of the supporting sole's inner edge [m].
     """
 
     def __init__(self, robot: Robot, path_middle: float, inner_edge: float) -> None:
@@ -191,14 +178,7 @@ class FreeLimits(Limit):
 
 
 def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
-    """Return single support with free joints between the ends of the paper's.
-
-    Args:
-        body: the robot.
-        step_m: from foot to foot.
-        trajectory: of the joints.
-        grid: one of its samples is the middle.
-    """
+    """Return single support with free joints between the ends of the paper's; one sample of the grid is the middle."""
     body = replace(body, upright=frozenset())
     paper = make_single_support_phase(body, step_m, make_single_support_splines(body, "cubic"), grid, Goal())
     splines = Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
@@ -218,13 +198,7 @@ def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Tra
 
 
 def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
-    """Return the point (n,) of free joints whose motion is nearest to a planned one.
-
-    Args:
-        trajectory: of the free joints.
-        planned: of ``nao_ssp`` with the same robot and step.
-        x: variables of the planned motion.
-    """
+    """Return the point (n,) of free joints whose motion is nearest to a motion x of ``nao_ssp`` with the same robot and step."""
     dense = planned.dense(FIT_FACTOR)
     assert dense is not None  # a phase has one; for the type checker
     own = x[: sum("[" not in name for name in planned.names)]
@@ -239,9 +213,7 @@ def tie(values: MX, ops: Nonsmooth) -> MX:
 def fit_coefficients(signals: Signals, spans: int) -> Array:
     """Return the coefficients, curve by curve, of the free motion that is nearest to another one with the same ends.
 
-    Args:
-        signals: of the other motion, the more samples the better.
-        spans: of the splines; 0 for none.
+    The other motion's signals should have many samples; 0 spans stand for no splines.
     """
     if spans == 0:
         return np.zeros(0)

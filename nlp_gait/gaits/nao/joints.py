@@ -43,19 +43,12 @@ AXIS_TOLERANCE, ORIGIN_TOLERANCE_M = 1e-3, 1e-4
 
 
 class LegGeometry(NamedTuple):
-    """Lengths of one leg.
+    """Lengths of one leg."""
 
-    Attributes:
-        hip_m: (3,) centre of the hip joints from the torso's origin.
-        thigh_m: hip to knee.
-        tibia_m: knee to ankle.
-        ankle_height_m: ankle above the ground.
-    """
-
-    hip_m: Vector
-    thigh_m: float
-    tibia_m: float
-    ankle_height_m: float
+    hip_m: Vector  # (3,) centre of the hip joints from the torso's origin
+    thigh_m: float  # hip to knee
+    tibia_m: float  # knee to ankle
+    ankle_height_m: float  # ankle above the ground
 
 
 def measure_leg(robot: Robot, side: str) -> LegGeometry:

@@ -83,8 +83,7 @@ def make_leaning_nao(body: NaoBody) -> LeaningNao:
 class FlatSoles(Limit):
     """Soles that the closed chain leaves flat between the ends, where Newton's method has converged.
 
-    Args:
-        turns: angle of each sole from flat (2,) [rad].
+    The trace ``turns`` is the angle of each sole from flat (2,) [rad].
     """
 
     def __init__(self, turns: Trace) -> None:
@@ -120,13 +119,8 @@ def solve_leaning_legs(
 ) -> tuple[dict[str, Motion], SX]:
     """Return the motions of both legs [rad] and the cosines of the knees (2,) under a torso whose pose is given.
 
-    Args:
-        robot: with links welded that never move.
-        torso: (3,) its origin [m].
-        lean: (2,) its roll about its own x axis and its pitch before that [rad].
-        ankles: (3,) by side, at rest on flat soles [m].
-        margin: on the reach of a knee (see ``Nonsmooth.acos``).
-        ops: interpretation of acos.
+    Motions are those of the torso's origin (3,) [m] and of its lean (2,), roll about its own x axis and pitch before that [rad];
+    the ankles (3,) rest on flat soles [m]. For the margin on a knee's reach see ``Nonsmooth.acos``.
 
     Source:
         Sole and knee have the angles of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); those at the hip follow from the torso's

@@ -33,11 +33,7 @@ def of_all_joints(angles: JointAngles) -> Array:
 
 
 def motion_of(angles: JointAngles, body: Body) -> Motion:
-    """Return the motion of a robot on its left foot; mirrored if the right one stands.
-
-    Args:
-        angles: of the legs, and of any joints of the arms.
-        body: the robot.
+    """Return the motion of a robot on its left foot; mirrored if the right one stands. Joints of the arms may be missing.
 
     Raises:
         InputError: a joint of the legs is missing, or times or angles are missing or out of order.
@@ -60,11 +56,7 @@ def motion_of(angles: JointAngles, body: Body) -> Motion:
 
 
 def make_nao_cycles(robot: str = "nao-v5", intervals: int = 10) -> RecordedCycles:
-    """Return NAO and the limits of ``nao-cycle``, by which its recorded cycles are judged.
-
-    Args:
-        robot: name or file.
-        intervals: of each phase, as in the planned problem.
+    """Return NAO, or a robot of its build, and the limits of ``nao-cycle``, by which its recorded cycles are judged.
 
     Raises:
         InputError: the robot has other legs.
@@ -81,14 +73,10 @@ def make_recorded_gait(
     gait: str | None = None,
     touch_down_s: float | None = None,
 ) -> RecordedGait:
-    """Make a gait from angles over time.
+    """Make a gait from angles over time; their last instant is its end.
 
-    Args:
-        angles: of the whole gait; its last instant is its end.
-        robot: name or file.
-        intervals: of each phase, as in the planned problem.
-        gait: problem with whose limits it is judged; None to detect it.
-        touch_down_s: where single support ends in a cycle; None to find it.
+    Without ``gait``, the problem with whose limits it is judged, and without ``touch_down_s``, where single support ends in a
+    cycle, both are detected.
 
     Raises:
         InputError: angles that are not a gait, or another gait than named.

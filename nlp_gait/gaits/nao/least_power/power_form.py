@@ -31,9 +31,7 @@ STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 def power_form_maker(robot: Robot, make_phase: Callable[[float], PowerPhase]) -> Callable[[GaitProblem], PowerForm]:
     """Return the function that makes a phase's power form.
 
-    Args:
-        robot: of the phase.
-        make_phase: makes the phase for a largest cosine of the knee's angle, see ``leg_frames``.
+    ``make_phase`` makes the phase for a largest cosine of the knee's angle, see ``leg_frames``.
     """
 
     def make(problem: GaitProblem) -> PowerForm:

@@ -38,58 +38,37 @@ ONE, FORWARD = SX(1), DM([1, 0, 0])
 
 
 class PowerPhase(NamedTuple):
-    """A phase.
+    """A phase."""
 
-    Attributes:
-        instant: makes the sample of z at a phase.
-        sides: of the rectangle that must contain the ZMP, in x and in y [m].
-        margins: balance margins from the ZMP, by axis [m].
-    """
-
-    instant: Callable[[SX, float], PowerInstant]
+    instant: Callable[[SX, float], PowerInstant]  # makes the sample of z at a phase
+    # Of the rectangle that must contain the ZMP, in x and in y [m]
     sides: tuple[tuple[float, float], tuple[float, float]]
-    margins: Mapping[str, Callable[[SX], SX]]
+    margins: Mapping[str, Callable[[SX], SX]]  # balance margins from the ZMP, by axis [m]
 
 
 class LegParts(NamedTuple):
-    """Wrenches of a leg's links, see ``link_wrench``, and positions of its joints.
+    """Wrenches of a leg's links, see ``link_wrench``, and positions of its joints."""
 
-    Attributes:
-        links: of the pelvis about the hip's yaw-pitch joint; of hip link and thigh about the hip; of tibia, the link above the
-            sole and sole about the ankle. No wrench needs the knee, whose bounds are widest where the leg is almost straight.
-        joints: (3,) yaw-pitch joint, hip, knee and ankle [m].
-        yaw_axis: (3,) axis of the yaw-pitch joint.
-        across: (3,) axis of the pitching joints.
-    """
-
+    # Of the pelvis about the hip's yaw-pitch joint; of hip link and thigh about the hip; of tibia, the link above the sole and
+    # sole about the ankle. No wrench needs the knee, whose bounds are widest where the leg is almost straight
     links: tuple[SX, ...]
-    joints: tuple[SX, SX, SX, SX]
-    yaw_axis: DM
-    across: SX
+    joints: tuple[SX, SX, SX, SX]  # (3,) yaw-pitch joint, hip, knee and ankle [m]
+    yaw_axis: DM  # (3,) axis of the yaw-pitch joint
+    across: SX  # (3,) axis of the pitching joints
 
 
 @dataclass(kw_only=True)
 class PowerInstant:
-    """One sample.
+    """One sample."""
 
-    Attributes:
-        robot: of the phase.
-        rate_squared: 1 / T^2 for the time T.
-        cosine: largest one of the knee's angle, see ``leg_frames``.
-        torques: by joint, in the time T.
-        rates: of the joints that turn, in unit time.
-        zmp: (2,) [m].
-        reaches: squared distances of hip and ankle by side [m^2].
-        sideways: of the ankle from the hip across and down, by side [m]: their quotient is the tangent of the leg's roll.
-    """
-
-    robot: Robot
-    rate_squared: SX
-    cosine: float
-    torques: dict[str, SX] = field(default_factory=dict)
-    rates: dict[str, SX] = field(default_factory=dict)
-    zmp: SX = field(default_factory=SX)
-    reaches: dict[str, SX] = field(default_factory=dict)
+    robot: Robot  # of the phase
+    rate_squared: SX  # 1 / T^2 for the time T
+    cosine: float  # largest one of the knee's angle, see ``leg_frames``
+    torques: dict[str, SX] = field(default_factory=dict)  # by joint, in the time T
+    rates: dict[str, SX] = field(default_factory=dict)  # of the joints that turn, in unit time
+    zmp: SX = field(default_factory=SX)  # (2,) [m]
+    reaches: dict[str, SX] = field(default_factory=dict)  # squared distances of hip and ankle by side [m^2]
+    # Of the ankle from the hip across and down, by side [m]: their quotient is the tangent of the leg's roll
     sideways: dict[str, tuple[SX, SX]] = field(default_factory=dict)
 
     def link_wrench(self, name: str, frame: Frame) -> SX:
@@ -196,13 +175,8 @@ def double_support_instants(
 ) -> PowerPhase:
     """Return double support: each leg stands on its own foot.
 
-    Args:
-        robot: of the phase.
-        soles: where the ankles stand, by side [m].
-        hip_ends: of the torso's origin in x and in y [m].
-        arm_swing: arm joints that move, from where to where [rad].
-        rule: how the torso's mass is divided.
-        cosine: largest one of the knee's angle, see ``leg_frames``.
+    Places of the ankles by side, and both ends of the torso's origin in x and in y, are in metres; arm joints move from angle to
+    angle [rad]. For the largest cosine of the knee's angle see ``leg_frames``.
     """
     ankles = {side: SX(DM([*xy, measure_leg(robot, side).ankle_height_m])) for side, xy in soles.items()}
     feet_y = (measure_leg(robot, "L").hip_m[1], measure_leg(robot, "R").hip_m[1])
@@ -240,15 +214,8 @@ def single_support_instants(
 ) -> PowerPhase:
     """Return single support: the left leg carries everything.
 
-    Args:
-        robot: of the phase.
-        support_xy: where the left ankle stands [m].
-        swing_x: where the right ankle begins and ends [m].
-        swing_y: of its path [m].
-        hip_x: where the torso's origin begins and ends [m].
-        hip_y: likewise.
-        arm_swing: arm joints that move, from where to where [rad].
-        cosine: largest one of the knee's angle, see ``leg_frames``.
+    The left ankle stands at ``support_xy``; the right one and the torso's origin move from place to place [m], arm joints from
+    angle to angle [rad]. For the largest cosine of the knee's angle see ``leg_frames``.
     """
     foot, weight = robot.feet["left"], robot.mass_kg * GRAVITY
     support = SX(DM([*support_xy, foot.ankle_height_m]))

@@ -21,15 +21,10 @@ from nlp_gait.symbolic.trajectories import Motion, map_motion
 
 
 class Frame(NamedTuple):
-    """Pose of a link in the world.
+    """Pose of a link in the world."""
 
-    Attributes:
-        axes: (3, 3) motion of the rotation from link axes to world axes.
-        origin: (3,) motion of the origin of the link's frame [m].
-    """
-
-    axes: Motion
-    origin: Motion
+    axes: Motion  # (3, 3) motion of the rotation from link axes to world axes
+    origin: Motion  # (3,) motion of the origin of the link's frame [m]
 
 
 class LegFrames(NamedTuple):
@@ -42,15 +37,10 @@ class LegFrames(NamedTuple):
 
 
 def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_cosine: float = 1.0) -> LegFrames:
-    """Return the frames of a leg's links for the motions of its hip joint and its ankle.
+    """Return the frames of a leg's links for the motions (3,) of its hip joint and its ankle [m].
 
-    Args:
-        hip: (3,) motion of the hip joint [m].
-        ankle: (3,) of the ankle [m].
-        thigh: hip to knee [m].
-        tibia: knee to ankle [m].
-        largest_cosine: of the knee's angle. Larger distances are replaced by the one at this angle, so that nothing is
-            undefined; the result is then wrong.
+    The lengths of thigh and tibia are in metres. Distances beyond the one at the largest cosine of the knee's angle are replaced
+    by it, so that nothing is undefined; the result is then wrong.
 
     Source:
         The pose of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); this form is the package's own.
@@ -84,12 +74,9 @@ def _pitch(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
 
 
 def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Motion) -> dict[str, Frame]:
-    """Return the frames of the links of a chain on a link that does not turn.
+    """Return the frames of the links of a chain of joints, from the base outwards, on a link that does not turn.
 
-    Args:
-        joints: of the chain, from the base outwards.
-        angles: motions by joint name [rad].
-        base: (3,) motion of the origin of the link before the first joint [m].
+    Angles are by joint name [rad]; ``base`` is the motion (3,) of the origin of the link before the first joint [m].
     """
     names = [joint.name for joint in joints]
 
@@ -126,13 +113,8 @@ def move_wrench(wrench: SX, arm: SX) -> SX:
 def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> SX:
     """Return the wrench (6, 2) that moves a link, about the origin of its frame: of gravity, and of its motion in unit time.
 
-    In a time T, the second one is divided by T^2. A wrench is a force [N] above a moment [Nm].
-
-    Args:
-        link: its mass and inertia.
-        axes: (3, 3) motion of its axes in unit time.
-        acceleration: (3,) of the frame's origin in unit time [m].
-        gravity: magnitude, acting along -z [m/s^2].
+    In a time T, the second one is divided by T^2. A wrench is a force [N] above a moment [Nm]. Motions are those of the link's
+    axes (3, 3) and the acceleration (3,) of its frame's origin, in unit time [m]; gravity acts along -z [m/s^2].
 
     Source:
         Sum over the link's matter, by its second moments about the frame's origin.
@@ -156,11 +138,7 @@ class LegRates(NamedTuple):
 def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float) -> LegRates:
     """Compute the rates of roll, pitch, knee, ankle pitch and ankle roll, without their angles.
 
-    Args:
-        hip_to_ankle: (3,) motion of the ankle seen from the hip joint [m].
-        thigh: hip to knee [m].
-        tibia: knee to ankle [m].
-        largest_cosine: of the knee's angle (see ``leg_frames``).
+    From the motion (3,) of the ankle seen from the hip joint and the lengths of both links [m]; see ``leg_frames``.
 
     Source:
         Derivatives of Gupta, Pratihar, Deb (2023), eqs. (5)-(14), as in ``inverse_kinematics.leg_angles``.
