@@ -31,11 +31,10 @@ def write_c_files(
         for word, value in words.items():
             text = text.replace(f"@{word}@", value)
         texts[name.format(prefix=prefix)] = text
-    written = []
-    for name, text in texts.items():
-        written.append(make_writable_folder(folder) / name)
-        write_text(written[-1], text)
-    return written
+    paths = {make_writable_folder(folder) / name: text for name, text in texts.items()}
+    for path, text in paths.items():
+        write_text(path, text)
+    return list(paths)
 
 
 def format_comment(lines: Iterable[str]) -> str:

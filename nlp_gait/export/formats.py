@@ -22,14 +22,10 @@ FORMATS = {"webots": ".motion", "csv": ".csv", "json": ".signals.json", "mjcf": 
 
 
 def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
-    """Write a gait in a format.
+    """Write a gait to a file in one of FORMATS.
 
-    Args:
-        name: one of FORMATS.
-        path: file to write.
-        result: the gait.
-        period_ms: between rows of ``webots`` and ``naoqi``; the longest between those of ``csv`` and ``json``, which have the
-            problem's own samples and refine them.
+    The period is between rows of ``webots`` and ``naoqi``, and the longest between those of ``csv`` and ``json``, which have the
+    problem's own samples and refine them.
 
     Raises:
         UnknownNameError: no such format.

@@ -21,12 +21,10 @@ FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 
 
 def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
-    """Read angles over time of the joints of a robot.
+    """Read angles over time of a robot's joints from a ``.motion`` file of Webots or from CSV.
 
-    Args:
-        path: a ``.motion`` file of Webots, or CSV with a column of times [s] and one of angles for each joint: ``t``,
-            ``LKneePitch``, or ``LKneePitch [deg]``; other columns of ``nlp-gait export --format csv`` are ignored.
-        robot: with all its joints.
+    CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch [deg]``; other columns
+    of ``nlp-gait export --format csv`` are ignored.
 
     Raises:
         InputError: the file cannot be read, or has no times.
@@ -36,12 +34,8 @@ def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
         points = read_motion(path, robot.joints)
         known = [k for k, column in enumerate(points.angles.T) if not np.isnan(column).all()]
         joints = tuple(points.joints[k] for k in known)
-        return JointAngles(
-            owner=f"motion {str(path)!r}",
-            joints=joints,
-            t=np.array(points.times_ms) / 1000.0,
-            q=points.angles[:, known],
-        )
+        t = np.array(points.times_ms) / 1000.0
+        return JointAngles(owner=f"motion {str(path)!r}", joints=joints, t=t, q=points.angles[:, known])
     table = read_table(path, "motion")
     times: int | None = None
     angles: dict[str, tuple[int, float]] = {}

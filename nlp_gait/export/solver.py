@@ -38,11 +38,7 @@ extern "C" void @_second(void* memory, const double* w, const double* p, double 
 
 @lock_casadi
 def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
-    """Write source, header, example and build line of a problem's NLP; return the files.
-
-    Args:
-        problem: with the parameter values of the exported bounds and start.
-        folder: created if missing.
+    """Write source, header, example and build line of a problem's NLP with its parameter values; return the files.
 
     Raises:
         CompilerError: the NLP has an operation without C++ code.

@@ -48,11 +48,7 @@ def format_motion(points: SetPoints) -> str:
 
 
 def read_motion(path: Path, motors: Collection[str] | None = None) -> SetPoints:
-    """Read the set-points of a `.motion` file.
-
-    Args:
-        path: of the file.
-        motors: of the robot; None accepts any name.
+    """Read the set-points of a `.motion` file for the motors of a robot; None accepts any name.
 
     Raises:
         InputError: a violation of the grammar, with its line.

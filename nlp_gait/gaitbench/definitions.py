@@ -37,14 +37,7 @@ BY_ID = {definition.id: definition for definition in DEFINITIONS}
 
 
 def names(subset: Subset = "full") -> tuple[str, ...]:
-    """Return the ids of the instances, from easy to hard.
-
-    Args:
-        subset: ``"small"`` (ten instances, minutes) or ``"full"``.
-
-    Raises:
-        UnknownNameError: no such subset.
-    """
+    """Return the ids of all instances or of the ``"small"`` subset (ten, minutes), from easy to hard; raises UnknownNameError."""
     if subset not in ("small", "full"):
         raise unknown("subset of GaitBench", str(subset), ("small", "full"))
     return tuple(definition.id for definition in DEFINITIONS if definition.small or subset == "full")

@@ -90,10 +90,7 @@ class Instance:
         return f"<GaitBench {self.id}: {len(self.names)} variables, {len(self.row_names)} rows>"
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Evaluate points.
-
-        Args:
-            X: (P, n) points, one a row.
+        """Evaluate points X (P, n), one a row.
 
         Returns:
             (P,) objective, to be minimised; and (P,) violation: the sum of all rows' positive parts and of what exceeds the
@@ -154,16 +151,14 @@ class Instance:
         return self.facts.evidence
 
     def to(self, adapter: str, **options: Any) -> Any:
-        """Return the instance in the form that an optimiser's package takes.
+        """Return the instance in the form that an optimiser's package takes, with options of that adapter.
 
-        Args:
-            adapter: ``scipy`` (arguments of ``scipy.optimize.minimize``: fun, jac, bounds, constraints), ``cma`` (arguments of
-                ``cma.fmin_con2``; a constraint is the worst row of a group of rows), ``ioh`` (problem with the optimum; the
-                total violation is a soft constraint, which adds to the objective), ``pygmo`` (every row an inequality, with
-                gradients and batches), ``pymoo`` (vectorised; G is the total violation, or every row with ``rows=True``),
-                ``optuna`` (benchmark problem of OptunaHub, which is an objective of Optuna; the total violation is its
-                constraint), or ``nevergrad`` (experiment function with a method ``violation``).
-            options: of the adapter.
+        ``scipy``: arguments of ``scipy.optimize.minimize`` (fun, jac, bounds, constraints). ``cma``: arguments of
+        ``cma.fmin_con2``; a constraint is the worst row of a group of rows. ``ioh``: problem with the optimum; the total
+        violation is a soft constraint, which adds to the objective. ``pygmo``: every row an inequality, with gradients and batches.
+        ``pymoo``: vectorised; G is the total violation, or every row with ``rows=True``. ``optuna``: benchmark problem of
+        OptunaHub, which is an objective of Optuna; the total violation is its constraint. ``nevergrad``: experiment function with
+        a method ``violation``.
 
         Raises:
             UnknownNameError: no adapter has this name.
@@ -202,15 +197,7 @@ class Instance:
 
 
 def load(id: str, *, unit_cube: bool = False) -> Instance:
-    """Load an instance of GaitBench.
-
-    Args:
-        id: one of ``names()``.
-        unit_cube: let every variable run from 0 to 1.
-
-    Raises:
-        UnknownNameError: no such instance.
-    """
+    """Load an instance by its id, in the unit cube or in physical units; raises UnknownNameError."""
     check_name("instance", id)
     return _load(id, bool(unit_cube))
 

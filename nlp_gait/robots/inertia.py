@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots.robot import Link
+from nlp_gait.robots.robot import Link, make_tensor
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -31,15 +31,9 @@ class Mass(NamedTuple):
     tensor_kgm2: Array  # (3, 3) inertia about the centre of mass
 
     @classmethod
-    def from_link(cls, link: Link) -> Mass:
-        """Return the mass of a link, in its frame."""
-        return cls(link.mass_kg, np.array(link.com_m), link.inertia_matrix)
-
-    @classmethod
     def from_record(cls, raw: Mapping[str, Any]) -> Mass:
         """Return the mass of a link as a robot file describes it."""
-        ixx, iyy, izz, ixy, ixz, iyz = raw["inertia_com_kgm2"]
-        tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], dtype=float)
+        tensor = make_tensor(raw["inertia_com_kgm2"])
         return cls(float(raw["mass_kg"]), np.array(raw["com_m"], dtype=float), tensor)
 
     def to_record(self) -> dict[str, Any]:
@@ -75,6 +69,12 @@ def inertia_moments(matrix: Array) -> tuple[float, float, float, float, float, f
     """Return (ixx, iyy, izz, ixy, ixz, iyz) of a symmetric tensor (3, 3), as in ``Link``."""
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
     return ixx, iyy, izz, ixy, ixz, iyz
+
+
+def rotate(axis: Array, angle: float) -> Array:
+    """Return the rotation (3, 3) about an axis (3,) by an angle [rad]."""
+    k = np.cross(np.eye(3), axis)
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
 
 
 def point_inertia(mass: float, offset: Array) -> Array:
@@ -117,10 +117,6 @@ def check_inertias(robot: str, links: Sequence[Link]) -> None:
 
 
 def shift_to_com(link: Link) -> Link:
-    """Return the link whose tensor was taken about its joint.
-
-    Raises:
-        RobotDataError: no rigid body has such a tensor about its joint.
-    """
+    """Return the link whose tensor was taken about its joint; raises RobotDataError if no rigid body has such a tensor."""
     about_com = link.inertia_matrix - point_inertia(link.mass_kg, np.array(link.com_m))
     return replace(link, inertia_com_kgm2=inertia_moments(about_com))

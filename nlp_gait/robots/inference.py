@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import combinations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -35,7 +36,6 @@ LEAST_WIDTH_M = 0.01
 class JointPlace(NamedTuple):
     """A joint at zero angles, in the root's axes."""
 
-    parent: str
     child: str
     place: Array  # (3,) from the root's origin [m]
     axis: Array  # (3,) unit vector
@@ -67,45 +67,37 @@ class Legs(NamedTuple):
 
 
 def find_legs(robot: str, joints: Records, feet: Mapping[str, Mapping[str, Any]]) -> Legs:
-    """Find the legs by the feet of the robot file, or else by geometry.
+    """Find the legs by the feet of the robot file, by side, or else by geometry.
 
     The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet.
-
-    Args:
-        robot: its name.
-        joints: records of a robot file.
-        feet: records of a robot file by side; empty if it has none.
 
     Raises:
         RobotDataError: there is no such pair, or it is not clearly lower than others.
     """
-    joint_to = {joint.child: joint for joint in _place_joints(joints)}
+    chains = _find_chains(joints)
     if feet:
-        pair = (str(feet.get("left", {}).get("link")), str(feet.get("right", {}).get("link")))
-        return Legs(pair, _split_chains(_chain_to_root(pair[0], joint_to), _chain_to_root(pair[1], joint_to)))
-    paths = {child: _chain_to_root(child, joint_to) for child in sorted(joint_to)}
-    pairs: list[tuple[float, str, str, tuple[Chain, Chain]]] = []
-    names = list(paths)
-    for i, first in enumerate(names):
-        for second in names[i + 1 :]:
-            chains = _split_chains(paths[first], paths[second])
-            if all(len(chain) == LEG_JOINT_COUNT for chain in chains) and _are_mirror_chains(*chains):
-                pairs.append((chains[0][0].place[2], first, second, chains))
-    pairs.sort(key=lambda pair: pair[:3])
+        left, right = (str(feet.get(side, {}).get("link")) for side in SIDES)
+        return Legs((left, right), _split_chains(chains.get(left, []), chains.get(right, [])))
+    found: list[tuple[float, Legs]] = []
+    for pair in combinations(sorted(chains), 2):
+        own = _split_chains(chains[pair[0]], chains[pair[1]])
+        if all(len(chain) == LEG_JOINT_COUNT for chain in own) and _are_mirror_chains(*own):
+            found.append((own[0][0].place[2], Legs(pair, own)))
     remedy = (
         'name them in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
         "(docs/custom-robots.md describes the supported legs)"
     )
-    if not pairs:
+    if not found:
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other, with {LEG_JOINT_COUNT} turning joints each "
             f"below the link where both legs meet; {remedy}"
         )
-    close = [pair for pair in pairs if pair[0] < pairs[0][0] + CLEARLY_LOWER_M]
-    if len(close) > 1:
-        listed = "; ".join(f"{first!r} and {second!r}" for _, first, second, _ in close)
+    found.sort(key=lambda item: (item[0], item[1].feet))
+    lowest, *others = [legs for height, legs in found if height < found[0][0] + CLEARLY_LOWER_M]
+    if others:
+        listed = "; ".join("{!r} and {!r}".format(*legs.feet) for legs in (lowest, *others))
         raise RobotDataError(f"robot {robot!r}: several pairs of links may be the feet: {listed}; {remedy}")
-    return Legs(pairs[0][1:3], pairs[0][3])
+    return lowest
 
 
 def infer_feet(
@@ -120,15 +112,7 @@ def infer_feet(
 ) -> Records:
     """Return the records of both feet with their soles, and turn the robot's records so that it faces along x.
 
-    Args:
-        robot: its name.
-        legs: of the robot.
-        links: records, turned in place.
-        joints: records, turned in place.
-        feet: what the robot file states about them.
-        cloud: collision points of a link.
-        forward: direction in the root's axes, if the file states it.
-        notes: receive what was inferred.
+    What the robot file states about the feet and the forward direction has precedence; ``notes`` receive what was inferred.
 
     Raises:
         RobotDataError: a leg without six joints, no flat sole, or no clear forward direction.
@@ -141,7 +125,8 @@ def infer_feet(
             )
     soles = [_find_sole(robot, link, cloud) for link in legs.feet]
     angle = FORWARD_ANGLES[forward] if forward else _find_forward(robot, legs.chains, soles)
-    turn = _quarter_turns(angle)
+    c, s = round(math.cos(angle)), round(math.sin(angle))  # exact: quarter turns
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     if angle:
         degrees = math.degrees(angle)
         notes.append(f"forward is not along the root's x axis: the robot was turned by {degrees:.0f} degrees about z")
@@ -168,30 +153,20 @@ def infer_feet(
     return found
 
 
-def _place_joints(joints: Records) -> list[JointPlace]:
+def _find_chains(joints: Records) -> dict[str, Chain]:
+    """Return the joints from each link towards the root."""
     joint_to = {raw["child"]: raw for raw in joints.values()}
-
-    def place(raw: Mapping[str, Any]) -> Array:
-        at, count = np.array(raw["origin_m"], dtype=float), 0
-        while raw["parent"] in joint_to and count < len(joint_to):  # joints may form a ring
-            raw, count = joint_to[raw["parent"]], count + 1
-            at = at + np.array(raw["origin_m"], dtype=float)
-        return at
-
-    return [
-        JointPlace(
-            raw["parent"], raw["child"], place(raw), np.array(raw["axis"], dtype=float), tuple(raw["limits_rad"])
-        )
-        for raw in joints.values()
-    ]
-
-
-def _chain_to_root(link: str, joint_to: Mapping[str, JointPlace]) -> Chain:
-    path: Chain = []
-    while link in joint_to and len(path) <= len(joint_to):  # joints may form a ring
-        path.append(joint_to[link])
-        link = path[-1].parent
-    return path
+    paths: dict[str, list[str]] = {child: [] for child in joint_to}
+    for link, path in paths.items():
+        while link in joint_to and len(path) <= len(joint_to):  # joints may form a ring
+            path.append(link)
+            link = joint_to[link]["parent"]
+    placed = {}
+    for child, path in paths.items():
+        place = np.sum([joint_to[link]["origin_m"] for link in path], axis=0, dtype=float)
+        raw = joint_to[child]
+        placed[child] = JointPlace(child, place, np.array(raw["axis"], dtype=float), tuple(raw["limits_rad"]))
+    return {child: [placed[link] for link in path] for child, path in paths.items()}
 
 
 def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
@@ -254,8 +229,3 @@ def _knee_direction(chain: Chain) -> Array:
     _, fifth, knee, *_ = chain
     bend = 1.0 if knee.limits[1] >= -knee.limits[0] else -1.0
     return np.asarray(-bend * np.cross(knee.axis, fifth.place - knee.place))
-
-
-def _quarter_turns(angle: float) -> Array:
-    c, s = round(math.cos(angle)), round(math.sin(angle))  # exact
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

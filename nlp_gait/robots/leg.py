@@ -116,18 +116,8 @@ class Leg:
 
 
 def make_leg(robot: Robot, side: str) -> Leg:
-    """Return the leg on side ``"left"`` or ``"right"``: the joints between the root and that foot.
-
-    Raises:
-        InputError: these are not six, or not those of a leg.
-    """
-    foot = robot.feet[side].link
-    path = tuple(reversed(robot.path_to_root(foot)))
-    if len(path) != LEG_JOINT_COUNT:
-        raise InputError(
-            f"robot {robot.name!r}: the {side} leg, from {robot.root!r} to {foot!r}, must have {LEG_JOINT_COUNT} turning joints, "
-            f"got {len(path)}: {', '.join(joint.name for joint in path) or 'none'}"
-        )
+    """Return the leg on side ``"left"`` or ``"right"``: the six joints between the root and that foot; raises as ``Leg``."""
+    path = robot.path_to_root(robot.feet[side].link)[::-1]
     points = np.cumsum([joint.origin_m for joint in path], axis=0)
     return Leg(
         joints=tuple(joint.name for joint in path),

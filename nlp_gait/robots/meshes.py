@@ -16,9 +16,8 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.files import read_bytes
+from nlp_gait.robots.inertia import Array, rotate
 from nlp_gait.robots.robot import are_plausible
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PACKAGE = "package://"
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
@@ -28,12 +27,7 @@ RIM = 24  # points of a cylinder's edge
 
 
 def find_mesh(address: str, robot_file: Path) -> Path | None:
-    """Find the file of a mesh; None if it does not exist.
-
-    Args:
-        address: in the robot's file; ``package://`` is searched for above that file and in the folders of ROS.
-        robot_file: path of the robot's file.
-    """
+    """Find the file of a mesh; ``package://`` is searched for above the robot's file and in the folders of ROS."""
     if "\0" in address:
         return None
     if not address.startswith(PACKAGE):
@@ -165,7 +159,5 @@ def _transform(part: Any) -> Array:
     elif part.tag == "scale":
         pose[:3, :3] = np.diag(values)
     else:
-        axis, angle = np.array(values[:3]) / np.linalg.norm(values[:3]), math.radians(values[3])
-        k = np.cross(np.eye(3), axis)
-        pose[:3, :3] = np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
+        pose[:3, :3] = rotate(np.array(values[:3]) / np.linalg.norm(values[:3]), math.radians(values[3]))
     return pose

@@ -50,12 +50,8 @@ def are_mirror_images(
 def mirror_sign(robot: Robot, joint: str, image: str | None = None) -> float:
     """Return +1 if a joint and its image turn the same way in motions mirrored left to right, otherwise -1.
 
-    A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z).
-
-    Args:
-        robot: with the joints.
-        joint: name.
-        image: joint on the other side; None for the partner by name.
+    A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z). Without an image, the
+    partner by name is meant.
 
     Raises:
         UnknownNameError: the robot lacks the joint or its partner.

@@ -33,9 +33,6 @@ def mjcf_record(path: str) -> dict[str, Any]:
     The robot is the heaviest tree of bodies in the world. All frames get its root's axes at the reference pose, where all angles
     count as zero. Bodies that do not turn against each other become one.
 
-    Args:
-        path: of the file.
-
     Raises:
         MissingExtraError: MuJoCo is not installed.
         RobotDataError: MuJoCo cannot read the file.
@@ -43,7 +40,7 @@ def mjcf_record(path: str) -> dict[str, Any]:
     """
     _read.cache_clear()  # the file, or one that it includes, may have changed
     model = _compile(path)
-    root, frames, carriers = _tree(model, path)
+    root, frames, carriers = _tree(model)
     names = {i: model.body(i).name or f"body {i}" for i in frames}
     if len(set(names.values())) < len(names):
         raise ValueError("two bodies have the same name")
@@ -80,7 +77,7 @@ def mjcf_record(path: str) -> dict[str, Any]:
 def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
     """Return points of all collision shapes that move with a link, as ``urdf.collision_points``; MuJoCo reads the meshes."""
     model = _compile(path)
-    _, frames, carriers = _tree(model, path)
+    _, frames, carriers = _tree(model)
     found = [np.zeros((0, 3))]
     for i, frame in frames.items():
         if (model.body(carriers[i]).name or f"body {carriers[i]}") != link:
@@ -130,7 +127,7 @@ def log_warnings(mujoco: Any, path: str) -> Iterator[None]:
             mujoco.set_mju_user_warning(earlier)
 
 
-def _tree(model: Any, path: str) -> tuple[int, dict[int, Array], dict[int, int]]:
+def _tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:
     """Return the root body, poses (4, 4) of its tree in its frame, and the body with the hinge that carries each."""
     tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
     if not tops:

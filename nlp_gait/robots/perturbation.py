@@ -33,11 +33,7 @@ LENGTHS = {"thigh_m": 2, "tibia_m": 1}
 
 
 def perturb(robot: Robot, changes: Mapping[str, float]) -> Robot:
-    """Return the robot with some quantities changed, in the given order.
-
-    Args:
-        robot: to change.
-        changes: by name; factors of masses, and lengths to add [m].
+    """Return the robot with some quantities changed, in the given order: factors of masses, and lengths to add [m].
 
     Raises:
         UnknownNameError: no such quantity, link or joint.
@@ -128,17 +124,14 @@ def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:
 def _with_sole(foot: Foot, shares: Mapping[str, int], metres: float) -> Foot:
     """Return a foot with other extents; its true outline is shifted, or stretched on the side whose extent changes."""
     extents = {name: getattr(foot, name) + share * metres for name, share in shares.items()}
-    outline = tuple(
-        (_stretch(x, "front_m", "back_m", shares, foot, metres), _stretch(y, "left_m", "right_m", shares, foot, metres))
-        for x, y in foot.sole_polygon_m
-    )
+
+    def move(value: float, positive: str, negative: str) -> float:
+        if positive in shares and negative in shares:
+            return value + shares[positive] * metres
+        extent = positive if value > 0.0 else negative
+        if extent not in shares or value == 0.0:
+            return value
+        return value * (1.0 + shares[extent] * metres / getattr(foot, extent))
+
+    outline = tuple((move(x, "front_m", "back_m"), move(y, "left_m", "right_m")) for x, y in foot.sole_polygon_m)
     return replace(foot, **extents, sole_polygon_m=outline)
-
-
-def _stretch(value: float, positive: str, negative: str, shares: Mapping[str, int], foot: Foot, metres: float) -> float:
-    if positive in shares and negative in shares:
-        return value + shares[positive] * metres
-    extent = positive if value > 0.0 else negative
-    if extent not in shares or value == 0.0:
-        return value
-    return value * (1.0 + shares[extent] * metres / getattr(foot, extent))

@@ -58,21 +58,15 @@ def weld_faults(
             f"first: {next(iter(faults.values()))}"
         )
     while faults := {name: fault for name, raw in links.items() if (fault := find_link_fault(name, raw)) is not None}:
-        joint_to = {raw["child"]: name for name, raw in joints.items()}
-        loose = [name for name in faults if name not in legs and name in joint_to]
-        if loose:
-            name, joint = loose[0], joint_to[loose[0]]
-            notes.append(f"{name!r} is welded to its parent {joints[joint]['parent']!r}: {faults[name]}")
-        else:
-            name, joint = _find_child_of_root(links, joints, legs, faults)
-            notes.append(f"{joints[joint]['child']!r} is welded to {name!r}: {faults[name]}")
-        _weld(links, joints, joint)
+        loose = (name for name, raw in joints.items() if raw["child"] in faults and raw["child"] not in legs)
+        name = next(loose, None) or _find_child_of_root(links, joints, legs, faults)
+        parent, child = joints[name]["parent"], joints[name]["child"]
+        notes.append(f"{child!r} is welded to its parent {parent!r}: {faults.get(child) or faults[parent]}")
+        _weld(links, joints, name)
 
 
-def _find_child_of_root(
-    links: Records, joints: Records, legs: Collection[str], faults: Mapping[str, GaitError]
-) -> tuple[str, str]:
-    """Return the faulty root and the joint to its heaviest child outside the legs."""
+def _find_child_of_root(links: Records, joints: Records, legs: Collection[str], faults: Mapping[str, GaitError]) -> str:
+    """Return the joint from the faulty root to its heaviest child outside the legs."""
     root = next((name for name in faults if name not in legs), None)
     below = [name for name, raw in joints.items() if raw["parent"] == root and raw["child"] not in legs]
     if root is None or not below:
@@ -80,7 +74,7 @@ def _find_child_of_root(
             f"{next(iter(faults.values()))}. It moves in every gait, so it matters; correct it, or have it replaced by the "
             'nearest one that a body can have: "unphysical": "repair" in the JSON file next to the model'
         )
-    return root, max(below, key=lambda name: float(links[joints[name]["child"]]["mass_kg"]))
+    return max(below, key=lambda name: float(links[joints[name]["child"]]["mass_kg"]))
 
 
 def _weld(links: Records, joints: Records, name: str) -> None:

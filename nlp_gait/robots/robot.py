@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -27,16 +27,7 @@ def check_name(name: str, where: str) -> None:
 
 
 def check_numbers(owner: str, record: Any, positive: Collection[str]) -> None:
-    """Check the numbers of a dataclass.
-
-    Args:
-        owner: for messages.
-        record: the dataclass; fields without numbers are ignored.
-        positive: names of the fields that must be > 0.
-
-    Raises:
-        RobotDataError: a number is not finite, or not within ``LARGEST_NUMBER``, or not positive.
-    """
+    """Raise RobotDataError for a number of a dataclass that is not finite, not within ``LARGEST_NUMBER``, or not positive."""
     for item in fields(record):
         value = getattr(record, item.name)
         if item.name in positive and not value > 0.0:  # NaN fails too
@@ -50,6 +41,12 @@ def check_numbers(owner: str, record: Any, positive: Collection[str]) -> None:
 def are_plausible(numbers: Any) -> bool:
     """Return whether all numbers of a sequence or array of any depth are finite and within ``LARGEST_NUMBER``."""
     return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not
+
+
+def make_tensor(moments: Sequence[float]) -> np.ndarray:
+    """Return the symmetric tensor (3, 3) of (ixx, iyy, izz, ixy, ixz, iyz)."""
+    ixx, iyy, izz, ixy, ixz, iyz = moments
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], dtype=float)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +74,7 @@ class Link:
     @property
     def inertia_matrix(self) -> np.ndarray:
         """(3, 3) inertia about the centre of mass, link axes [kg m^2]."""
-        ixx, iyy, izz, ixy, ixz, iyz = self.inertia_com_kgm2
-        return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        return make_tensor(self.inertia_com_kgm2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.robots.inertia import Mass, combine_masses, inertia_moments
+from nlp_gait.robots.inertia import Mass, combine_masses, inertia_moments, rotate
 from nlp_gait.robots.robot import Joint, Link, Robot, Vector
 
 
@@ -26,14 +26,9 @@ class Body:
 
 
 def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[Body, ...]:
-    """Return the bodies from the fixed link outwards, parents before children.
+    """Return the bodies from the fixed link outwards, parents before children, connected by some joints (None: by all).
 
     The fixed link's reference point is its frame's origin.
-
-    Args:
-        robot: with the links.
-        fixed_link: name of the first body's link.
-        joints: only these, for a part of the robot; None means all.
 
     Raises:
         InputError: no such link.
@@ -60,8 +55,8 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
                 parent=parent,
                 joint=joint,
                 direction=1 if forward else -1,
-                offset_m=_minus(centre_in_parent, parent_reference),
-                com_offset_m=_minus(link.com_m, reference),
+                offset_m=_vector(np.subtract(centre_in_parent, parent_reference)),
+                com_offset_m=_vector(np.subtract(link.com_m, reference)),
                 armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
             )
         )
@@ -75,13 +70,12 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
     links = dict(robot.links)
     remaining = dict(robot.joints)
     # From the leaves inwards, so that a welded child already contains its own welded children.
-    by_depth = sorted(joints, key=lambda name: -len(robot.path_to_root(robot.joint(name).child)))
-    for name in by_depth:
+    for name in sorted(joints, key=lambda name: -len(robot.path_to_root(robot.joint(name).child))):
         joint = remaining.pop(name)
-        child = Mass.from_link(links.pop(joint.child)).move(np.array(joint.origin_m))
-        total = combine_masses([Mass.from_link(links[joint.parent]), child])
-        links[joint.parent] = Link(
-            name=joint.parent,
+        child = _read_mass(links.pop(joint.child)).move(np.array(joint.origin_m))
+        total = combine_masses([_read_mass(links[joint.parent]), child])
+        links[joint.parent] = replace(
+            links[joint.parent],
             mass_kg=total.mass_kg,
             com_m=_vector(total.com_m),
             inertia_com_kgm2=inertia_moments(total.tensor_kgm2),
@@ -91,13 +85,12 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
     return replace(robot, links=links, joints=remaining)
 
 
-def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
-    """Return the robot with some joints turned: their new angles count as zero, and all links get the root's axes there.
+def _read_mass(link: Link) -> Mass:
+    return Mass(link.mass_kg, np.array(link.com_m), link.inertia_matrix)
 
-    Args:
-        robot: to turn.
-        angles: by joint [rad].
-    """
+
+def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
+    """Return the robot with joints turned by angles [rad], which then count as zero; all links get the root's axes there."""
     turns = {robot.root: np.eye(3)}
     joints: dict[str, Joint] = {}
     links = dict(robot.links)
@@ -105,17 +98,11 @@ def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
     while waiting:
         joint = waiting.pop()
         before, angle = turns[joint.parent], angles.get(joint.name, 0.0)
-        turns[joint.child] = before @ _rotation(joint.axis, angle) if angle else before
+        turns[joint.child] = before @ rotate(np.array(joint.axis), angle) if angle else before
         joints[joint.name] = _turn_joint(joint, before, angle)
         links[joint.child] = _turn_link(links[joint.child], turns[joint.child])
         waiting += [other for other in robot.joints.values() if other.parent == joint.child]
     return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
-
-
-def _rotation(axis: Vector, angle: float) -> np.ndarray:
-    k = np.cross(np.eye(3), np.array(axis))
-    turn: np.ndarray = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
-    return turn
 
 
 def _turn_joint(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
@@ -154,13 +141,8 @@ def reverse_joint(joint: Joint) -> Joint:
 
 def point_masses(robot: Robot) -> Robot:
     """Return the robot with every link's inertia about its centre of mass set to zero."""
-    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    links: Mapping[str, Link] = {n: replace(link, inertia_com_kgm2=zero) for n, link in robot.links.items()}
+    links = {name: replace(link, inertia_com_kgm2=(0.0,) * 6) for name, link in robot.links.items()}
     return replace(robot, links=links)
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return plus(a, (-b[0], -b[1], -b[2]))
 
 
 def plus(a: Vector, b: Vector) -> Vector:

@@ -32,11 +32,8 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
     """Read links and joints of a URDF by the schema of a robot file, without feet.
 
     All frames get the root's axes at the zero pose. Links that do not turn against each other become one: those behind fixed,
-    prismatic, planar and floating joints, which stay at zero.
-
-    Args:
-        path: of the file.
-        about_joint: the tensors refer to the origins of the link frames instead of the centres of mass.
+    prismatic, planar and floating joints, which stay at zero. With ``about_joint``, the tensors refer to the origins of the
+    link frames instead of the centres of mass.
 
     Raises:
         MissingExtraError: the parser is not installed.
@@ -62,10 +59,6 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
 
 def collision_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
     """Return points of all collision shapes that move with a link, from its joint, along the root's axes at zero angles.
-
-    Args:
-        path: of the file.
-        link: of ``urdf_record``.
 
     Returns:
         (N, 3) corners of boxes and meshes, edges of cylinders and lowest points of spheres [m], and meshes that do not exist.

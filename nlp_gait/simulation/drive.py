@@ -62,12 +62,9 @@ class Drive:
         return self.stiffness(joint) * self.time_constant_s
 
     def set_points(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
-        """Return the set-points at given times (T, J) [rad]: planned angles, shifted by the feed-forward.
+        """Return the set-points at times (T,) [s] of joints, (T, J) [rad]: planned angles, shifted by the feed-forward.
 
-        Args:
-            at: planned ``q`` [rad], ``qd`` [rad/s] and ``tau`` [Nm] at any times (N,), each (N, J).
-            times: (T,) [s].
-            joints: of the columns.
+        ``at`` returns planned ``q`` [rad], ``qd`` [rad/s] and ``tau`` [Nm] at any times (N,), each (N, J).
         """
         before, share = np.divmod(times / self.period_s + ROUNDING, 1.0)
         last = int(before[-1]) + 1

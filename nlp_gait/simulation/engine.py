@@ -13,10 +13,7 @@ DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def load_mujoco(*, pictures: bool = False) -> ModuleType:
-    """Import the engine.
-
-    Args:
-        pictures: it will draw: without a display and without another choice, through EGL.
+    """Import the engine; with pictures, it will draw: without a display and without another choice, through EGL.
 
     Raises:
         MissingExtraError: it is not installed.

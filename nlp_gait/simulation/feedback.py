@@ -94,14 +94,7 @@ class SensorValues(NamedTuple):
 
 
 class Balance:
-    """Controller of one simulation.
-
-    Args:
-        feedback: its settings.
-        plan: what it holds on to.
-        stiffness: (J,) of the servos as their driver assumes it [Nm/rad].
-        model: of the engine.
-    """
+    """Controller of one simulation; ``stiffness`` (J,) is that of the drives as their driver assumes it [Nm/rad]."""
 
     def __init__(self, feedback: Feedback, plan: Plan, stiffness: Array, model: Any) -> None:
         self._feedback, self._plan, self._stiffness, self._model = feedback, plan, stiffness, model

@@ -68,10 +68,6 @@ class Instants(NamedTuple):
 def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:
     """Return the same motion with the torques in double support of least power, |torque rate| + K torque^2.
 
-    Args:
-        plan: of a gait with double support.
-        sharing: its settings.
-
     Raises:
         MissingExtraError: Clarabel is not installed.
         InputError: there is no double support, or soles, friction and rate allow no division; with its time.

@@ -37,9 +37,9 @@ class Power:
         """Compute it from torques [Nm] and rates [rad/s] (T, J), K [W/(Nm)^2], and a function for the mean of samples (T,)."""
         work = torque * rate
         return cls(
-            mechanical_W=mean(np.abs(work).sum(axis=1)),
-            signed_W=mean(work.sum(axis=1)),
-            heat_W=heat_loss * mean((torque**2).sum(axis=1)),
+            mechanical_W=float(mean(np.abs(work).sum(axis=1))),
+            signed_W=float(mean(work.sum(axis=1))),
+            heat_W=heat_loss * float(mean((torque**2).sum(axis=1))),
         )
 
     @property
@@ -100,7 +100,7 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     """Compute the numbers of a simulation."""
     during = simulation.t <= plan.duration_s
     error = plan.at("q", simulation.t[during]) - simulation.q[during]
-    torque, rate = simulation.torque[during], simulation.qd[during]
+    torque = simulation.torque[during]
     joints = [plan.robot.joint(name) for name in plan.joints]
     limits = np.array([drive.torque_limit(joint) for joint in joints])
     low, high = np.array([joint.limits_rad for joint in joints]).T
@@ -129,7 +129,7 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
         earliest_landing_s=max((at.planned_s - at.measured_s for at in landed), default=None),
         landing_speed_m_s=max((at.speed_m_s for at in landed), default=None),
         predicted=predict_power(plan),
-        measured=Power.compute(torque, rate, plan.heat_loss, lambda samples: float(samples.mean())),
+        measured=Power.compute(torque, simulation.qd[during], plan.heat_loss, np.mean),
         saturated=_by_joint(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
         beyond_limit=_by_joint(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
         joint_limits=tuple(_by_joint(plan, outside.any(axis=0), above=0)),
@@ -138,8 +138,11 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
 
 def predict_power(plan: Plan) -> Power:
     """Compute the power of the planned motion by the rigid model."""
-    arrays, duration = plan.signals.arrays, plan.duration_s
-    mean = lambda samples: float(trapezoid(samples, arrays["t"]) / duration)  # noqa: E731
+    arrays = plan.signals.arrays
+
+    def mean(samples: Array) -> float:
+        return float(trapezoid(samples, arrays["t"]) / plan.duration_s)
+
     return Power.compute(arrays["tau"], arrays["qd"], plan.heat_loss, mean)
 
 
@@ -189,25 +192,16 @@ def _touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
             if middle > 0 and lasting_from.size:
                 first = middle + int(lasting_from[0])
                 speed = max(0.0, float(simulation.feet[first - 1, i, 2] - simulation.feet[first, i, 2]) / TIME_STEP)
-                found.append(
-                    Touchdown(
-                        side=side,
-                        planned_s=float(simulation.t[planned]),
-                        measured_s=float(simulation.t[first]),
-                        speed_m_s=speed,
-                    )
-                )
+                times = {"planned_s": float(simulation.t[planned]), "measured_s": float(simulation.t[first])}
+                found.append(Touchdown(side=side, **times, speed_m_s=speed))
     return tuple(sorted(found, key=lambda at: at.planned_s))
 
 
 def _landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
-    planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2]
-    measured = simulation.feet[-1, SIDES.index(side), :2]
-    return Landing(
-        planned_m=(float(planned[0]), float(planned[1])),
-        measured_m=(float(measured[0]), float(measured[1])),
-        error_m=float(np.linalg.norm(measured - planned)),
-    )
+    planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2].tolist()
+    measured = simulation.feet[-1, SIDES.index(side), :2].tolist()
+    error = float(np.linalg.norm(np.subtract(measured, planned)))
+    return Landing(planned_m=tuple(planned), measured_m=tuple(measured), error_m=error)
 
 
 def _by_joint(plan: Plan, shares: Array, above: float) -> dict[str, float]:

@@ -56,14 +56,7 @@ def make_model(
 ) -> str:
     """Return the model of a robot on a floor with position drives; only solid shapes can touch the ground.
 
-    Args:
-        robot: to simulate.
-        shapes: by link.
-        drive: gains and limits of the joints' drives.
-        gravity: [m/s^2], along -z.
-        friction: coefficient of sliding friction between robot and ground.
-        ground: stairs on the floor.
-        planar: the robot's root stays in the plane y = 0.
+    Gravity is along -z [m/s^2]. The ground adds stairs; if planar, the robot's root stays in the plane y = 0.
     """
     root, option = make_document(robot.name, gravity)
     Xml.SubElement(option, "flag", autoreset="disable")  # otherwise a divergence is hidden

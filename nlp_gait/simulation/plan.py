@@ -99,11 +99,9 @@ class Plan:
         return {name: CubicSpline(arrays["t"], arrays[name]) for name in names}
 
     def at(self, name: str, times: Array) -> Array:
-        """Return planned values at any times: after the end, positions and torques stay, and rates are zero.
+        """Return planned values at any times (T,) [s]: after the end, positions and torques stay, and rates are zero.
 
-        Args:
-            name: ``q`` [rad], ``qd`` [rad/s], ``tau`` [Nm], ``zmp``, ``hip``, ``left_foot`` or ``right_foot`` [m].
-            times: (T,) [s].
+        Names are ``q`` [rad], ``qd`` [rad/s], ``tau`` [Nm], ``zmp``, ``hip``, ``left_foot`` and ``right_foot`` [m].
         """
         within = np.clip(times, 0.0, self.duration_s)
         if name in self._splines:
@@ -128,11 +126,7 @@ class Plan:
 
 @lock_casadi
 def make_plan(result: Result, steps: int | None = None) -> Plan:
-    """Return the plan of a solved problem.
-
-    Args:
-        result: of a problem with a simulation model.
-        steps: number of consecutive steps; by default one phase or one cycle.
+    """Return the plan of a solved problem: of several consecutive steps, or by default of one phase or one cycle.
 
     Raises:
         InputError: the problem has no simulation model, the gait cannot be repeated or has samples that are not finite, or there

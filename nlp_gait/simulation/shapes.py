@@ -55,10 +55,7 @@ Shape: TypeAlias = Capsule | Prism
 def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
     """Return the shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
 
-    Args:
-        robot: with all its joints.
-        sole: outline of the soles.
-        welded: joints that the simulated robot does not have; the shapes of their children move to the parents.
+    The shapes of the children of welded joints, which the simulated robot does not have, move to the parents.
 
     Raises:
         InputError: no such outline.

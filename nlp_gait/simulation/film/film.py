@@ -51,12 +51,9 @@ def parse_picture_size(text: str) -> tuple[int, int]:
 
 
 def draw_pictures(recordings: Sequence[Recording], size: tuple[int, int], note: str = "") -> Iterator[Frame]:
-    """Yield pictures (height, width, 3) of all recordings side by side; a shorter one stops at its end.
+    """Yield pictures (height, width, 3) of one or two recordings side by side; the shorter one stops at its end.
 
-    Args:
-        recordings: one or two, with the same time between pictures.
-        size: width and height [pixels].
-        note: one line about all of them.
+    They have the same time between pictures; ``size`` is width and height [pixels], and ``note`` one line about all of them.
 
     Raises:
         OutputError: this machine cannot draw off the screen.
@@ -103,17 +100,7 @@ def lay_out(width: int, height: int, end: str) -> tuple[View, ...]:
 
 
 class Captions:
-    """Title, labels, numbers and chart of the power of one recording.
-
-    Args:
-        figure: of the picture.
-        recording: to describe.
-        views: of the recording.
-        left: edge of the views [pixels].
-        most_power: upper limit of the chart [W].
-        end_s: right limit of the chart.
-        note: one line below the title.
-    """
+    """Title, note, labels, numbers and chart of the power of one recording, whose views begin at ``left`` [pixels]."""
 
     def __init__(
         self,

@@ -47,14 +47,7 @@ class Recording:
 
 
 def record_film(title: str, plan: Plan, simulate: Simulator, interval_s: float) -> Recording:
-    """Simulate a gait and record the data of a film.
-
-    Args:
-        title: one line.
-        plan: of the gait.
-        simulate: simulates it.
-        interval_s: simulated time from one picture to the next.
-    """
+    """Simulate a gait and record the data of a film, with ``interval_s`` of simulated time between pictures."""
     models: list[Any] = []
     states: list[Array] = []
     indexes: list[int] = []

@@ -47,13 +47,7 @@ def find_stairs(model: Any) -> Any:
 
 
 class Scene:
-    """Views of one recording; call ``close`` at the end.
-
-    Args:
-        recording: to draw.
-        views: from several sides.
-        width: of all views together [pixels].
-        height: of all views together [pixels].
+    """Views of one recording, together of a width and height [pixels]; call ``close`` at the end.
 
     Raises:
         OutputError: this machine cannot draw off the screen.
