@@ -153,12 +153,13 @@ class Instance:
     def to(self, adapter: str, **options: Any) -> Any:
         """Return the instance in the form that an optimiser's package takes, with options of that adapter.
 
-        ``scipy``: arguments of ``scipy.optimize.minimize`` (fun, jac, bounds, constraints). ``cma``: arguments of
-        ``cma.fmin_con2``; a constraint is the worst row of a group of rows. ``ioh``: problem with the optimum; the total
-        violation is a soft constraint, which adds to the objective. ``pygmo``: every row an inequality, with gradients and batches.
-        ``pymoo``: vectorised; G is the total violation, or every row with ``rows=True``. ``optuna``: benchmark problem of
-        OptunaHub, which is an objective of Optuna; the total violation is its constraint. ``nevergrad``: experiment function with
-        a method ``violation``.
+        - ``scipy``: arguments of ``scipy.optimize.minimize`` (fun, jac, bounds, constraints)
+        - ``cma``: arguments of ``cma.fmin_con2``; a constraint is the worst row of a group of rows
+        - ``ioh``: problem with the optimum; the total violation is a soft constraint, which adds to the objective
+        - ``pygmo``: problem with every row as an inequality, with gradients and batches
+        - ``pymoo``: vectorised problem; G is the total violation, or every row with ``rows=True``
+        - ``optuna``: benchmark problem of OptunaHub, an objective of Optuna; the total violation is its constraint
+        - ``nevergrad``: experiment function with a method ``violation``
 
         Raises:
             UnknownNameError: no adapter has this name.
