@@ -12,8 +12,8 @@ from compare.analysis.comparison import compare_problems
 from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
+from nlp_gait.backends.solve import available_workers
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.backends.starts import available_workers
 from nlp_gait.formulation.solution import Outcome
 
 TARGET = 1e-6  # relative distance from the best known objective: 1e-4 %

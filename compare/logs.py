@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.run_length import Curve
-from compare.study.record import RunRecord
 from nlp_gait.files import make_file_name, make_writable_folder, write_json, write_text
 
 __all__ = ["NOTHING_FEASIBLE", "Trace", "make_traces", "write_coco", "write_ioh"]
@@ -54,21 +52,12 @@ class Trace:
 def make_traces(solver: SolverRuns) -> Iterator[Trace]:
     """Yield the trace of every run of a solver on one problem."""
     for record, curve in zip(solver.records, solver.curves, strict=True):
-        yield _make_trace(record, curve)
-
-
-def _make_trace(record: RunRecord, curve: Curve) -> Trace:
-    lines = [(1, NOTHING_FEASIBLE)]
-    for evaluations, gap in zip(curve.evaluations.tolist(), curve.gap.tolist(), strict=True):
-        gap = max(gap, SMALLEST)
-        if not gap < lines[-1][1]:
-            continue
-        at = max(1, math.ceil(evaluations))
-        if at == lines[-1][0]:  # both in one evaluation: the better one
-            lines.pop()
-        lines.append((at, gap))
-    total = max(1, math.ceil(curve.total_cost()))
-    return Trace(run=record.run, x=tuple(record.x.values()), lines=tuple(lines), total=total)
+        best = {1: NOTHING_FEASIBLE}
+        for evaluations, gap in zip(curve.evaluations.tolist(), curve.gap.tolist(), strict=True):
+            if max(gap, SMALLEST) < min(best.values()):
+                best[max(1, math.ceil(evaluations))] = max(gap, SMALLEST)
+        total = max(1, math.ceil(curve.total_cost()))
+        yield Trace(run=record.run, x=tuple(record.x.values()), lines=tuple(best.items()), total=total)
 
 
 def write_ioh(comparisons: Sequence[Comparison], folder: Path, suite: str = "nlp-gait") -> list[Path]:

@@ -18,10 +18,9 @@ from compare.cli.bench import bench
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
+from compare.cli.exchange import import_results, logs
 from compare.cli.export import export, export_objective, export_solver
-from compare.cli.import_results import import_results
 from compare.cli.list import list_problems
-from compare.cli.logs import logs
 from compare.cli.questions.certainty import certainty
 from compare.cli.questions.motions import motions
 from compare.cli.questions.motors import motors

@@ -25,9 +25,7 @@ def plot_ecdf(comparison: Comparison) -> Figure:
         last = max([c.total_cost(axis) for s in comparison.solvers if s.has_costs(axis) for c in s.curves] + [1e-3])
         costs = np.array([c.cost_to_reach(target, axis) for c in solver.curves for target in ECDF_TARGETS])
         at, share = ecdf(costs)
-        if at.size:
-            at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
-        _draw_share(axes, at, share, solver.name, look)
+        _draw_share(axes, at, share, solver.name, look, last)
 
     return plot_by_cost(comparison, draw, "share of runs and targets")
 
@@ -47,10 +45,7 @@ def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
         last = max(end for _, _, end in drawn.values())
         best_first = sorted(drawn, key=lambda name: -drawn[name][1][-1] if drawn[name][1].size else 0.0)
         for name, look in assign_looks(best_first).items():
-            at, share, _ = drawn[name]
-            if at.size:
-                at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
-            _draw_share(axes, at, share, name, look)
+            _draw_share(axes, *drawn[name][:2], name, look, last)
         axes.set_xlabel("equivalent evaluations per variable")
         axes.set_ylabel("share of problems, runs and targets")
         use_log_axes(axes)
@@ -91,9 +86,7 @@ def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
         profile = performance_profile(costs)
         last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
         for name, look in assign_looks(profile).items():
-            factor, share = profile[name]
-            height = np.append(share, share[-1] if share.size else 0.0)
-            _draw_share(axes, np.append(factor, last), height, name, look)
+            _draw_share(axes, *profile[name], name, look, last)
         use_log_axes(axes)
         axes.set_xlim(left=1.0)
         axes.set_xlabel("factor of the cheapest solver's expected evaluations")
@@ -102,7 +95,10 @@ def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
     return figure
 
 
-def _draw_share(axes: Axes, at: Array, share: Array, name: str, look: Look) -> None:
+def _draw_share(axes: Axes, at: Array, share: Array, name: str, look: Look, last: float) -> None:
+    """Draw a share that rises at some costs, up to a last cost."""
+    if at.size:
+        at, share = np.append(at, max(last, at[-1])), np.append(share, share[-1])
     axes.step(at, share, where="post", color=look.colour, linestyle=look.line, label=name)
     axes.set_ylim(0.0, 1.02)
 

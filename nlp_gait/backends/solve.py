@@ -1,25 +1,35 @@
-"""Solve a problem from several starts, and judge every end point by the exact functions."""
+"""Solve a problem from several starts, in forked processes where that pays, and judge every end point by the exact functions.
+
+Threads are no alternative: CasADi and MUMPS work for one caller at a time (see ``formulation/locking.py``).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import multiprocessing
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from nlp_gait.backends.exact import ExactValues, build_exact_model
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
-from nlp_gait.interrupts import Interrupted, defer_interrupts
+from nlp_gait.interrupts import Interrupted, defer_interrupts, never
+from nlp_gait.processes import run_in_forks
 
 # A price below this, times the bound's scale, is numerical noise and not reported.
 PRICE_TOLERANCE = 1e-6
 MOST_STARTS = 100_000
 MOST_WORKERS = 4096
+# Forking two processes and ending them costs 10 to 20 ms; it pays where the work that they share takes ten times as long.
+FORK_PAYS_FROM_S = 0.2
 
 
 def solve(
@@ -61,7 +71,10 @@ def solve(
     problem = load(problem) if isinstance(problem, str) else problem
     _check_types(problem, fix, solver, progress)
     problem = problem.fix(**(fix or {}))
-    points = _choose_start_points(problem, starts, seed, x0)
+    rng = np.random.default_rng(seed)
+    points = [problem.start_point(rng) for _ in range(starts)]
+    if x0 is not None:
+        points[0] = problem.check_within(x0)
     ready = (solver or IpoptSettings()).prepare(problem, starts)
     outcomes: list[Outcome] = []
     with defer_interrupts() as interrupted:
@@ -90,14 +103,50 @@ def _check_types(problem: object, fix: object, solver: object, progress: object)
         raise InputError(f"progress must be a function of one start's outcome, got {format_value(progress)}")
 
 
-def _choose_start_points(
-    problem: GaitProblem, starts: int, seed: int, x0: Sequence[float] | Array | Mapping[str, float] | None
-) -> list[Array]:
-    rng = np.random.default_rng(seed)
-    points = [problem.start_point(rng) for _ in range(starts)]
-    if x0 is not None:
-        points[0] = problem.check_within(x0)
-    return points
+def available_workers() -> int:
+    """Return the default number of processes for several starts: one for each processor that this process may use.
+
+    1 where a fork is not available or not safe: outside Linux, in another thread than the main one, and in worker processes.
+    """
+    alone = (
+        not sys.platform.startswith("linux")
+        or threading.current_thread() is not threading.main_thread()
+        or multiprocessing.parent_process() is not None
+    )
+    return 1 if alone else available_cores()
+
+
+def run_starts(
+    solver: Solver,
+    problem: GaitProblem,
+    points: Sequence[Array],
+    stop: Callable[[], bool] = never,
+    workers: int | None = None,
+) -> Iterator[Outcome]:
+    """Yield the outcome of the run from each point (n,), in their order; fewer after ``stop`` returns True.
+
+    Without ``workers``, the first run is made in this process, and the others are divided among ``available_workers`` if they
+    take long enough. Raises WorkerError if a process died, perhaps out of memory.
+    """
+    if workers is None and points:  # the first run says whether a fork pays for the others
+        started = time.perf_counter()
+        yield solver.run(problem, points[0], stop)
+        points = points[1:]
+        fork_pays = (time.perf_counter() - started) * len(points) >= FORK_PAYS_FROM_S
+        workers = available_workers() if fork_pays else 1
+        if stop():
+            return
+    count = min(workers or 1, len(points))
+    if count > 1:
+        build_exact_model(problem)  # every run needs it: built before the fork
+        yield from run_in_forks(
+            lambda k, is_ending: solver.run(problem, points[k], is_ending), len(points), count, stop
+        )
+        return
+    for point in points:
+        yield solver.run(problem, point, stop)
+        if stop():
+            return
 
 
 def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int = 0) -> Solution:

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import nlp_gait
+from nlp_gait.backends.solve import available_workers
 from nlp_gait.backends.solvers.solver import Solver, judge_point
-from nlp_gait.backends.starts import available_workers
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Evaluations, Outcome

@@ -2,12 +2,63 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import casadi as ca
 import numpy as np
+from casadi import SX
 
 from nlp_gait.backends.derivatives.glue import Assembler, union
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Block, Call, Integers, Plan, Row
-from nlp_gait.backends.derivatives.sample import derive_sample
-from nlp_gait.backends.derivatives.structure import Stage
+from nlp_gait.backends.derivatives.structure import Stage, nonzeros
+
+# Longest function whose derivatives are all written out, if that is cheaper than one direction after the other.
+LONGEST_WRITTEN_OUT = 2000
+# Largest ratio of their lengths: the source is compiled once, and written out it saves time in every call.
+MOST_GROWTH = 2.0
+
+
+class SampleDerivatives(NamedTuple):
+    """Functions of one sample. Some of its inputs u are active: they depend on the NLP's variables."""
+
+    value: ca.Function  #: u (m,) to v (nv,)
+    jacobian: ca.Sparsity  #: sparsity (nv, ma) of dv / du
+    hessian: ca.Sparsity  #: sparsity (ma, ma) of the second derivatives of any sum of outputs, symmetric
+    directional: bool  #: whether ``first`` and ``second`` take a direction
+    first: ca.Function  #: (u, du) to dv; or u to the nonzeros of the Jacobian
+    #: (u, weights of the outputs, du) to their gradient and its change; or (u, weights) to the gradient and the nonzeros of
+    #: the Hessian
+    second: ca.Function
+
+
+def derive_sample(function: ca.Function, active: Integers, used: Integers, directions: int) -> SampleDerivatives:
+    """Return the derivatives of a function in the cheapest form.
+
+    Args:
+        function: from one vector to one vector.
+        active: places of the inputs that vary.
+        used: places of the outputs that are read.
+        directions: largest number of directions of a sample, where these are not its active inputs.
+    """
+    u = function.sx_in(0)
+    v = function.call([u])[0][used.tolist()]
+    x, weights, du = u[active.tolist()], SX.sym("weights", v.shape[0]), SX.sym("du", len(active))
+    gradient = ca.densify(ca.jtimes(v, x, weights, True))
+    value = ca.Function("value", [u], [ca.cse(v)])
+    jacobian = ca.jacobian_sparsity(v, x)
+    hessian = ca.jacobian_sparsity(gradient, x)
+    hessian = hessian + hessian.T
+    first = ca.Function("first", [u, du], ca.cse([ca.densify(ca.jtimes(v, x, du))]))
+    second = ca.Function("second", [u, weights, du], ca.cse([gradient, ca.densify(ca.jtimes(gradient, x, du))]))
+    in_directions = first.n_instructions() + second.n_instructions()
+    if value.n_instructions() <= LONGEST_WRITTEN_OUT:
+        J, H = ca.jacobian(v, x), ca.triu(ca.jacobian(gradient, x))
+        all_first = ca.Function("first", [u], ca.cse([nonzeros(ca.project(J, jacobian))]))
+        all_second = ca.Function("second", [u, weights], ca.cse([gradient, nonzeros(ca.project(H, ca.triu(hessian)))]))
+        written_out = all_first.n_instructions() + all_second.n_instructions()
+        if written_out <= MOST_GROWTH * in_directions and written_out <= in_directions * min(directions, len(active)):
+            return SampleDerivatives(value, jacobian, hessian, False, all_first, all_second)
+    return SampleDerivatives(value, jacobian, hessian, True, first, second)
 
 
 class Samples:
@@ -32,14 +83,18 @@ class Samples:
         value = plan.add_function(self.derivatives.value)
         self.read = Block(self.u, m, m, 1, 0)
         plan.add_call(VALUES, Call(value, count, None, (self.read,), (Block(self.v, len(used), len(used), 1, 0),)))
-        for place, o in enumerate(used):
-            numbers = before + o + all_outputs * np.arange(count)
-            assembler.value_places[numbers] = self.v + place + len(used) * np.arange(count)
         self.outputs = all_outputs
+        self.place_outputs(assembler.value_places, self.v)
         self.width = most if self.by_column else len(active)
         self.rows = self._add_input_rows(assembler, patterns)
         if len(active) and len(used):
             self._add_output_rows(assembler)
+
+    def place_outputs(self, places: Integers, first: int) -> None:
+        """Write the places of numbers of all used outputs, sample by sample from the first place, into places (y,)."""
+        for place, o in enumerate(self.used):
+            numbers = self.before + o + self.outputs * np.arange(self.count)
+            places[numbers] = first + place + len(self.used) * np.arange(self.count)
 
     def count_directions(self) -> Integers:
         """Return the number of directions of each sample."""
@@ -60,31 +115,28 @@ class Samples:
         """Add the derivatives of active inputs with respect to the variables."""
         plan, ma = assembler.plan, len(self.active)
         rows: list[list[Row]] = []
+        changes = not self.by_column
+        mark, begin = len(plan.steps[FIRST]), plan.size
         if self.by_column:
             self.d = plan.allocate(self.count * ma * self.width)
-            mark, changes = len(plan.steps[FIRST]), False
-            for e, each in enumerate(patterns):
-                rows.append([])
-                for a, pattern in enumerate(each):
-                    base = self.d + (e * ma + a) * self.width
-                    row = Row(pattern, base + np.searchsorted(self.columns[e], pattern))
-                    changes |= _add_entries(assembler, row, self.glue.entries[e * self.m + self.active[a]])
-                    rows[-1].append(row)
-            if changes:  # else they are constant
-                plan.reset(FIRST, self.d, self.count * ma * self.width, mark)
-            return rows
-        mark, begin = len(plan.steps[FIRST]), plan.size
         for e, each in enumerate(patterns):
             rows.append([])
             for a, pattern in enumerate(each):
                 entries = self.glue.entries[e * self.m + self.active[a]]
-                if len(entries) == 1 and entries[0][1] == ONE:
+                if self.by_column:
+                    places = self.d + (e * ma + a) * self.width + np.searchsorted(self.columns[e], pattern)
+                elif len(entries) == 1 and entries[0][1] == ONE:
                     rows[-1].append(assembler.derivatives[entries[0][0]])
                     continue
-                row = Row(pattern, plan.allocate(len(pattern)) + np.arange(len(pattern)))
-                _add_entries(assembler, row, entries)
-                rows[-1].append(row)
-        plan.reset(FIRST, begin, plan.size - begin, mark)
+                else:
+                    places = plan.allocate(len(pattern)) + np.arange(len(pattern))
+                rows[-1].append(Row(pattern, places))
+                for j, factor in entries:
+                    source = assembler.derivatives[j]
+                    targets = places[np.searchsorted(pattern, source.columns)]
+                    changes |= plan.add_row(FIRST, source, targets, factor)
+        if changes:  # else they are constant
+            plan.reset(FIRST, begin, plan.size - begin, mark)
         return rows
 
     def _add_output_rows(self, assembler: Assembler) -> None:
@@ -126,14 +178,3 @@ class Samples:
                     plan.add_row(FIRST, given, row.places[np.searchsorted(columns, given.columns)], int(slope))
                 assembler.derivatives[y] = row
         plan.reset(FIRST, begin, plan.size - begin, mark)
-
-
-def _add_entries(assembler: Assembler, row: Row, entries: list[tuple[int, int]]) -> bool:
-    """Add up a row of D; return whether that is done at run time."""
-    changes = False
-    for j, factor in entries:
-        source = assembler.derivatives[j]
-        changes |= assembler.plan.add_row(
-            FIRST, source, row.places[np.searchsorted(row.columns, source.columns)], factor
-        )
-    return changes

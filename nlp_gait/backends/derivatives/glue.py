@@ -44,13 +44,8 @@ class Assembler:
         self.evaluate(VALUES, rows, places)
         J = ca.jacobian(rows, self.y)
         values = scalars(J)
-        factors = np.empty(len(values), int)
-        varying = []
-        for k, value in enumerate(values):
-            if value.is_constant():
-                factors[k] = self.plan.place_constant(float(value))
-            else:
-                varying.append(k)
+        varying = [k for k, value in enumerate(values) if not value.is_constant()]
+        factors = np.array([self.plan.place_constant(float(v)) if v.is_constant() else -1 for v in values], int)
         factors[varying] = self.plan.allocate(len(varying)) + np.arange(len(varying))
         self.evaluate(FIRST, ca.vertcat(SX(0, 1), *(values[k] for k in varying)), factors[varying])
         entries: list[list[tuple[int, int]]] = [[] for _ in range(rows.shape[0])]
@@ -61,12 +56,9 @@ class Assembler:
     def evaluate(self, phase: int, outputs: SX, targets: Integers, *more: tuple[SX, Integers]) -> None:
         """Add expressions of y, p and more symbols; constants go into the initial values."""
         listed = scalars(ca.densify(outputs))
-        varying = []
-        for k, each in enumerate(listed):
-            if each.is_constant():
-                self.plan.initial[int(targets[k])] = float(each)
-            else:
-                varying.append(k)
+        varying = [k for k, each in enumerate(listed) if not each.is_constant()]
+        constants = {int(targets[k]): float(each) for k, each in enumerate(listed) if each.is_constant()}
+        self.plan.initial.update(constants)
         p = self.structure.p
         inputs = [self.y, p, *(symbols for symbols, _ in more)]
         places = [self.value_places, self.p + np.arange(p.shape[0]), *(place for _, place in more)]

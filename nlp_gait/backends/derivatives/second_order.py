@@ -24,21 +24,19 @@ class Hessian:
     def __init__(self, assembler: Assembler, stages: Sequence[Samples], last: Glue, weights: int) -> None:
         self.assembler, self.plan = assembler, assembler.plan
         plan = self.plan
-        bars = {id(samples): plan.allocate(samples.count * len(samples.used)) for samples in stages}
-        for samples in stages:
-            plan.reset(SECOND, bars[id(samples)], samples.count * len(samples.used))
+        bars = []
         self.bar_places = np.full(assembler.y.shape[0], -1)
         for samples in stages:
-            bar, nv = bars[id(samples)], len(samples.used)
-            for place, o in enumerate(samples.used):
-                numbers = samples.before + o + samples.outputs * np.arange(samples.count)
-                self.bar_places[numbers] = bar + place + nv * np.arange(samples.count)
+            size = samples.count * len(samples.used)
+            bars.append(plan.allocate(size))
+            plan.reset(SECOND, bars[-1], size)
+            samples.place_outputs(self.bar_places, bars[-1])
         marker = len(plan.steps[SECOND])
         contributions: Products = []
         self._add_glue(last, weights + np.arange(last.rows.shape[0]), contributions)
-        for samples in reversed(stages):
+        for samples, bar in zip(reversed(stages), reversed(bars), strict=True):
             if len(samples.active) and len(samples.used):
-                self._add_samples(samples, bars[id(samples)], contributions)
+                self._add_samples(samples, bar, contributions)
         keys = union(d * assembler.n + c for d, c, *_ in contributions)
         self.place = plan.allocate(len(keys))
         plan.reset(SECOND, self.place, len(keys), marker)

@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nlp_gait.backends.solve import MOST_STARTS, make_solution
+from nlp_gait.backends.solve import MOST_STARTS, make_solution, run_starts
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.backends.starts import run_starts
 from nlp_gait.errors import check_count
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome, Solution

@@ -19,7 +19,7 @@ from compare.questions import local_optima, real_motors
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
-from nlp_gait.backends.starts import run_starts
+from nlp_gait.backends.solve import run_starts
 from nlp_gait.formulation.solution import Best, Outcome
 from tests.compare.cli.test_question_commands import PARETO
 
