@@ -8,7 +8,7 @@ import pytest
 from casadi import DM, MX, SX
 
 import nlp_gait
-from nlp_gait.backends.derivatives import plan, sample
+from nlp_gait.backends.derivatives import first_order, plan
 from nlp_gait.backends.derivatives.assembly import make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import CompiledNlp
 from nlp_gait.backends.derivatives.structure import NotMapped, split_nlp
@@ -56,9 +56,9 @@ def compared(nlp: dict[str, MX], p: Array, points: Array) -> float:
     return worst
 
 
-@pytest.mark.parametrize("longest", [0, sample.LONGEST_WRITTEN_OUT], ids=["in directions", "written out"])
+@pytest.mark.parametrize("longest", [0, first_order.LONGEST_WRITTEN_OUT], ids=["in directions", "written out"])
 def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sample, "LONGEST_WRITTEN_OUT", longest)
+    monkeypatch.setattr(first_order, "LONGEST_WRITTEN_OUT", longest)
     monkeypatch.setattr("nlp_gait.backends.derivatives.compiled._hash_generator", lambda: f"longest {longest}")
     points = np.random.default_rng(0).uniform(0.4, 1.5, (20, 8))
     assert compared(chain(), np.array([1.1, 0.7]), points) < TOLERANCE
