@@ -1,7 +1,6 @@
-"""The judge: exact values at a point, whatever a solver claims.
+"""The judge: exact values at a point, whatever a solver claims: at the problem's samples, and on a dense grid between them.
 
-A point is evaluated at the problem's samples and again on a dense grid, which shows violations between the samples. For rows that
-are functions of time, it is also proven which are satisfied at every instant.
+For rows that are functions of time, it is also proven which are satisfied at every instant.
 """
 
 from __future__ import annotations

@@ -142,6 +142,12 @@ def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting
     )
 
 
+def index_solvers(comparisons: Sequence[Comparison]) -> tuple[list[dict[str, SolverRuns]], list[str]]:
+    """Return the solvers of each comparison by name, and the names of those that ran on all problems."""
+    found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
+    return found, [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
+
+
 def read_objective(record: RunRecord) -> Objective:
     """Return the objective of a record; raises InputError if the record has none, or an invalid one."""
     with convert_errors(f"record of {record.solver}, run {record.run}", InputError):

@@ -108,7 +108,6 @@ def format_cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, .
 
 
 def _if_known(statistic: Callable[[list[float]], float], values: list[float]) -> float:
-    """Return a statistic of numbers; NaN if one is NaN."""
     return math.nan if any(math.isnan(value) for value in values) else statistic(values)
 
 

@@ -1,4 +1,4 @@
-"""Format numbers with units, and lists, for tables, figures and sentences; natural steps of quantities.
+"""Numbers with units, names of quantities, and lists in words, for tables, figures and sentences; natural steps.
 
 The unit of a pure number is "1" and is not shown.
 """
@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from nlp_gait.formulation import Parameter
+from nlp_gait.formulation import GaitProblem, Parameter
 
 
 def number(value: float, digits: str) -> str:
@@ -46,6 +46,30 @@ def join_words(parts: Iterable[str]) -> str:
     """Join words: ``a``, ``a and b``, ``a, b and c``."""
     *most, last = [*parts] or [""]
     return f"{', '.join(most)} and {last}" if most else last
+
+
+def axis_label(name: str, unit: str) -> str:
+    """Return the label of an axis, for example ``hip height [m]``."""
+    return heading(name_in_words(name, unit), unit)
+
+
+def quantity(name: str, unit: str, value: float) -> str:
+    """Format a value with its name, for example ``hip height = 0.31 m``."""
+    return f"{name_in_words(name, unit)} = {with_unit(value, unit, 'g')}"
+
+
+def name_in_words(name: str, unit: str) -> str:
+    """Return a name without its unit, for example ``hip height``."""
+    for end in ("lower", "upper"):
+        if name.endswith(f".{end}"):
+            return f"{end} bound of {name_in_words(name.removesuffix(f'.{end}'), unit)}"
+    return name.removesuffix("_" + unit.replace("/", "_").replace("^", "")).replace("_", " ")
+
+
+def units_of(problem: GaitProblem) -> dict[str, str]:
+    """Return the units of a problem's variables and parameters by name."""
+    variables = {variable.name: variable.unit for variable in problem.variables}
+    return variables | {parameter.name: parameter.unit for parameter in problem.parameters}
 
 
 class NaturalStep(NamedTuple):

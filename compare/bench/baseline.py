@@ -1,7 +1,6 @@
 """The rules of GaitBench 1, and the shipped records of its baseline: one compressed file for each instance.
 
-A packed record lacks time histories, the dense grid, prices and indexes; everything that an expected running time, a distribution
-or a test needs is kept.
+A packed record lacks time histories, the dense grid, prices and indexes.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.analysis.comparison import Comparison, SolverRuns, compare_problems
+from compare.analysis.comparison import Comparison, SolverRuns, compare_problems, index_solvers
 from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
 from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import load_baseline
@@ -62,7 +62,7 @@ class Leaderboard:
     def duels(self, solver: str) -> list[Duel]:
         """Compare a solver with every other one, in the order of the standings."""
         others = [standing.solver for standing in self.standings if standing.solver != solver]
-        found = [_by_name(comparison) for comparison in self.comparisons]
+        found, _ = index_solvers(self.comparisons)
         if not others:
             return []
         gaps = {name: [self._gaps(on[name], k) for k, on in enumerate(found)] for name in (solver, *others)}
@@ -103,15 +103,10 @@ def load_references(instances: Sequence[str]) -> Mapping[str, float]:
     return {id: instance.gait_problem.objective.sign * instance.best_known for id, instance in loaded.items()}
 
 
-def _by_name(comparison: Comparison) -> dict[str, SolverRuns]:
-    return {solver.name: solver for solver in comparison.solvers}
-
-
 def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     from scipy.stats import rankdata
 
-    found = [_by_name(comparison) for comparison in comparisons]
-    names = [name for name in found[0] if all(name in on for on in found)]
+    found, names = index_solvers(comparisons)
     costs = np.array([[[on[name].expected_cost(t) for name in names] for t in TARGETS] for on in found])
     rows = costs.reshape(-1, len(names))
     rows = rows[np.isfinite(rows).any(axis=1)]

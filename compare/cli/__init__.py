@@ -1,7 +1,5 @@
 """Command line: ``nlp-gait COMMAND``.
 
-``PANELS`` lists the commands.
-
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
 130 interrupted.
 """

@@ -65,7 +65,6 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
 
 
 def _options(group: Any) -> Iterator[inspect.Parameter]:
-    """Yield a parameter for each field of a group."""
     hints = get_type_hints(group, include_extras=True)
     for field in fields(group):
         default = inspect.Parameter.empty if field.default is MISSING else field.default
@@ -98,7 +97,6 @@ def _report_os_error(error: OSError) -> None:
 
 
 def _is_output_closed() -> bool:
-    """Return whether an output is a pipe without a reader."""
     outputs = select.poll()
     for stream in (sys.stdout, sys.stderr):
         outputs.register(stream.fileno(), select.POLLOUT)

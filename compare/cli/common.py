@@ -87,8 +87,7 @@ def print_json(data: Any) -> None:
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table on stdout, not wider than the terminal; numbers are right-aligned, except in the first column.
 
-    Columns that do not fit follow in another table with the first column repeated; narrow terminals get a block of
-    lines per row.
+    Columns that do not fit follow in another table; narrow terminals get a block of lines per row.
     """
     if stdout.width <= STACKED_WIDTH and len(header) > 2:
         _print_stacked(title, header, rows)

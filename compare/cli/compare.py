@@ -212,7 +212,6 @@ def choose_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
 
 
 def _reject_study_options(context: typer.Context, flag: str) -> None:
-    """Reject options that a study file or an earlier session determines."""
     for parameter in context.command.params:
         name = str(parameter.name)
         source = context.get_parameter_source(name)

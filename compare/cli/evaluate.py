@@ -133,7 +133,6 @@ def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_
 
 
 def _print_gait(judged: JudgedGait) -> None:
-    """Print the gait and the optimum, violated limits, and results of the engine."""
     gait = judged.recorded
     times = ", ".join(
         f"{name} {value:.4g} s" for name, value in zip(gait.problem.display.durations, gait.x, strict=False)
@@ -159,7 +158,6 @@ def _print_gait(judged: JudgedGait) -> None:
 
 
 def _print_many(judged: Sequence[Evaluation]) -> None:
-    """Print a row per candidate with its largest violation."""
     objective = judged[0].objective
     print_table(
         f"{judged[0].problem}: {len(judged)} candidates",
@@ -188,7 +186,6 @@ def _print_many(judged: Sequence[Evaluation]) -> None:
 
 
 def _write(path: Path, judged: Sequence[Evaluation]) -> None:
-    """Write one row per candidate: variables, verdict and indexes."""
     found = ("violation", "feasible", "feasible_between_samples", "guaranteed")
     name = judged[0].objective["name"]
     indexes = [index for index in judged[0].indexes if index != name]

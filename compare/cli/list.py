@@ -109,25 +109,21 @@ def _overview(as_json: bool) -> None:
     from nlp_gait.user_code import find_entry_points
 
     problems = {name: load(name) for name in problem_names()}
+    installed = {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")}
     if as_json:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
         }
-        algorithms = [*list_solvers(), *find_entry_points("algorithm")]
-        data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names())}
-        print_json(
-            {
-                **data,
-                "installed": {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")},
-            }
-        )
+        algorithms = [*list_solvers(), *installed["algorithms"]]
+        data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names()), "installed": installed}
+        print_json(data)
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "description", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(list_solvers())}")
     stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
     stdout.print(f"robots: {', '.join(robot_names())}")
-    for kind, listed in (("problems", find_entry_points("problem")), ("algorithms", find_entry_points("algorithm"))):
+    for kind, listed in installed.items():
         if listed:
             packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
             stdout.print(f"{kind} of other installed packages: {packages}")

@@ -179,11 +179,7 @@ class SearchOptions:
     def make_study(
         self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20
     ) -> StudySettings:
-        """Return the study of problems by solvers, with a number of starts of gradient methods.
-
-        Raises:
-            InputError: a penalty without weight, or a weight without penalty.
-        """
+        """Return the study of problems by solvers; InputError unless a penalty and its weight are given together."""
         if (self.handling == "penalty") != (self.penalty_weight is not None):
             raise InputError("--handling penalty and --penalty-weight go together; no weight suits every problem")
         weight = {} if self.penalty_weight is None else {"weight": self.penalty_weight}
@@ -246,7 +242,6 @@ def _parse_pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]
 
 
 def _parse_option(name: str, text: str, default: Any) -> str | int | float | bool:
-    """Return the text as the type of the option's default."""
     kind = type(default)
     try:
         return {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)

@@ -99,7 +99,6 @@ def _is_polish(record: RunRecord) -> bool:
 
 
 def _run(record: RunRecord) -> dict[str, Any]:
-    """Return a run as plain data for scripts."""
     plain = record.to_json()
     same = ("run", "seed", "claimed_objective", "claimed_violation", "failed_evaluations", "status", "x", "verdict")
     return {

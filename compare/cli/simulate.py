@@ -138,7 +138,6 @@ def simulate(
 def _write_film(
     film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Simulator]]
 ) -> list[Simulation]:
-    """Simulate the gaits and write the film."""
     from nlp_gait.simulation.film.film import draw_pictures
     from nlp_gait.simulation.film.recording import record_film
     from nlp_gait.simulation.film.video import write_video

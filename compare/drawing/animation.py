@@ -150,7 +150,6 @@ def _draw_3d(axis: Any, skeleton: Skeleton, k: int) -> None:
 
 
 def _make_legend(skeleton: Skeleton, views: Collection[str]) -> list[Artist]:
-    """Return legend entries of everything drawn."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

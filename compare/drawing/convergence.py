@@ -26,8 +26,7 @@ AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solv
 def plot_convergence(comparison: Comparison) -> Figure:
     """Plot bands from the least to the greatest gap of all runs, with the median, over evaluations and seconds.
 
-    A line begins where half of the runs are feasible, a band where all are. Runs of a gradient method are points at
-    their total cost.
+    A line begins where half of the runs are feasible, a band where all are. A run of a gradient method is a point at its end.
     """
     return plot_by_cost(comparison, _draw_gaps, "gap to the best known [%]", both=True)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.analysis.comparison import Comparison, SolverRuns
+from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS, ecdf, performance_profile
 from compare.drawing.convergence import clip_percent, plot_by_cost
 from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
@@ -32,8 +32,7 @@ def plot_ecdf(comparison: Comparison) -> Figure:
 
 def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
     """Plot the share of problems, runs and targets solved within evaluations per variable; solvers that ran on all."""
-    solvers = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
-    shared = [name for name in solvers[0] if all(name in on_problem for on_problem in solvers)]
+    solvers, shared = index_solvers(comparisons)
     with style():
         figure = new_figure(7.4, 3.6)
         axes = figure.subplots()
@@ -105,6 +104,5 @@ def _draw_share(axes: Axes, at: Array, share: Array, name: str, look: Look, last
 
 def list_expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:
     """Return expected evaluations for each problem and target by solver; only solvers that ran on all problems."""
-    found = [{solver.name: solver for solver in comparison.solvers} for comparison in comparisons]
-    shared = [name for name in found[0] if all(name in solvers for solvers in found)] if found else []
+    found, shared = index_solvers(comparisons)
     return {name: [solvers[name].expected_cost(target) for solvers in found for target in TARGETS] for name in shared}

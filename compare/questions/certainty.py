@@ -12,9 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import with_unit
+from compare.analysis.units import axis_label, with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
-from compare.drawing.labels import axis_label
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_starts
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import Figure, text_table

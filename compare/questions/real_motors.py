@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from compare.analysis.units import axis_label, name_in_words, units_of
 from compare.drawing.figures import add_legend_below, new_figure, style
-from compare.drawing.labels import axis_label, name_in_words, units_of
 from compare.questions.perturbed_problem import rebuild
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_optima_table, make_table
 from compare.report.document import Figure, Table, Value, text_table

@@ -14,9 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import with_unit
+from compare.analysis.units import axis_label, quantity, units_of, with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
-from compare.drawing.labels import axis_label, quantity, units_of
 from compare.questions.question import Answer, Question, Work, make_csv_table
 from compare.report.document import Figure, Table, Value, text_table
 from compare.study.record import RunRecord, parse_record

@@ -1,8 +1,4 @@
-"""Documents for studies, papers and questions: text, tables, figures and sections of them.
-
-``compare.report.writing`` writes them: ``write_document`` an HTML and a Markdown page with everything, ``write_parts``
-tables and figures alone. ``compare.report.template`` makes a document from a text with fields.
-"""
+"""Documents for studies, papers and questions: text, tables, figures and sections of them."""
 
 from __future__ import annotations
 

@@ -274,6 +274,5 @@ def make_gaits_part(comparison: Comparison) -> Figure | str | None:
 
 
 def _gait(record: RunRecord) -> GaitCurves | None:
-    """Return a record's gait, or None for a problem without time histories."""
     gait = load_gait(record)
     return None if gait.problem.display.motion is None else prepare_gait(gait)

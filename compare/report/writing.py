@@ -60,7 +60,6 @@ def markdown_page(document: Document) -> str:
 
 
 def _environment(*, page: bool) -> Environment:
-    """Of the templates: an HTML page, or Markdown."""
     environment = Environment(
         loader=PackageLoader("compare.report"),
         autoescape=page,

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from compare.study.settings import StudySettings, parse_settings
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes, read_cpu_info
 from nlp_gait.decoding import decode
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import convert_errors, read_json, write_json
@@ -44,7 +44,7 @@ class Session:
             command=command,
             started=datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
             machine={
-                "processor": _processor(),
+                "processor": read_cpu_info("model name") or platform.processor() or "unknown",
                 "system": f"{platform.system()} {platform.release()} {platform.machine()}",
                 "processors": str(available_cores()),
             },
@@ -103,11 +103,3 @@ def _kernel() -> str:
         return " ".join([find_compiler().summary, *BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"])
     except CompilerError as error:
         return f"interpreted: {error}"
-
-
-def _processor() -> str:
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or "unknown"

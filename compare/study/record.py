@@ -182,8 +182,6 @@ class RunRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class _Definition:
-    """Fields of a definition, see ``Task.definition``."""
-
     problem: StoredProblem
     objective: Objective
     solver: str | Mapping[str, Any]

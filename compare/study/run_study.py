@@ -48,7 +48,6 @@ class Study:
 
     @property
     def _groups(self) -> Counter[tuple[str, str]]:
-        """Runs by problem and solver."""
         return Counter((task.problem.title, task.title) for task in self.tasks)
 
     def __repr__(self) -> str:

@@ -155,8 +155,6 @@ def parse_settings(raw: Any, source: str, *, runs_code: bool = True) -> StudySet
 
 @dataclass(frozen=True, kw_only=True)
 class _Problem:
-    """Table ``problem`` of a study."""
-
     name: str
     label: str = ""
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
@@ -174,8 +172,6 @@ class _Problem:
 
 @dataclass(frozen=True, kw_only=True)
 class _Study(Stop):
-    """A study as in a file."""
-
     problem: tuple[_Problem, ...]
     solver: tuple[SolverSpec, ...]
     runs: int = 11

@@ -69,7 +69,6 @@ def run_jobs(
 
 
 def _connect(address: str) -> AbstractContextManager[object]:
-    """Connect to a Dask scheduler, and make it joblib's backend."""
     try:
         from distributed import Client
     except ImportError as error:

@@ -116,7 +116,6 @@ class _Rewriter:
         return cos_a * cos_b - sin_a * sin_b, sin_a * cos_b + cos_a * sin_b
 
     def _has_closed_form(self, angle: int) -> bool:
-        """Return whether an angle is acos, atan2, or a sum, difference or negative of such angles."""
         node = self._tape[angle]
         if node.operation in (ca.OP_ADD, ca.OP_SUB, ca.OP_NEG):
             return all(self._has_closed_form(i) for i in node.arguments)

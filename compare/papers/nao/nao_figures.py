@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.analysis.units import axis_label
 from compare.drawing.animation import plot_poses
 from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.gait_figure import make_skeleton
-from compare.drawing.labels import axis_label
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points
 from compare.papers.nao.nao_paper import SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from compare.analysis.units import axis_label
 from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_axes
-from compare.drawing.labels import axis_label
 from compare.papers.nao_pareto.nao_pareto_findings import NAMES, ParetoFindings, PhaseFindings
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS
 from compare.questions.pareto.pareto_front import SEARCH_COLOURS

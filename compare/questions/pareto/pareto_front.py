@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from compare.analysis.units import axis_label
 from compare.drawing.figures import COLOURS, new_figure, style
-from compare.drawing.labels import axis_label
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, solve_front

@@ -14,8 +14,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure as Drawing
 
+from compare.analysis.units import axis_label
 from compare.drawing.figures import new_figure, style
-from compare.drawing.labels import axis_label
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import solve_ends
 from compare.questions.question import Answer, Question, Work

@@ -10,9 +10,8 @@ from typing import Any, ClassVar
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import heading, with_unit
+from compare.analysis.units import heading, name_in_words, with_unit
 from compare.drawing.figures import new_figure, style
-from compare.drawing.labels import name_in_words
 from compare.questions.perturbed_problem import perturb_robot
 from compare.questions.prices.price import (
     Price,

@@ -10,9 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import with_unit
+from compare.analysis.units import axis_label, units_of, with_unit
 from compare.drawing.figures import new_figure, style
-from compare.drawing.labels import axis_label, units_of
 from compare.questions.perturbed_problem import rebuild
 from compare.questions.question import Work, make_csv_table, make_table
 from compare.questions.walk.cheapest_cycle import Gait, describe_end, simulate_walk

@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.simulated_gaits import compute_agreement
-from compare.analysis.units import millimetres, with_unit
+from compare.analysis.units import axis_label, millimetres, name_in_words, units_of, with_unit
 from compare.drawing.figures import new_figure, style
-from compare.drawing.labels import axis_label, name_in_words, units_of
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
 from compare.questions.sweep import Axis, Sweep, mark_values
 from compare.questions.walk.cheapest_cycle import Gait, describe_end, make_gait, simulate_walk

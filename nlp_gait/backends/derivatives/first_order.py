@@ -112,7 +112,6 @@ class Samples:
         return Block(place, 0, size, size, 1)
 
     def _add_input_rows(self, assembler: Assembler, patterns: list[list[Integers]]) -> list[list[Row]]:
-        """Add the derivatives of active inputs with respect to the variables."""
         plan, ma = assembler.plan, len(self.active)
         rows: list[list[Row]] = []
         changes = not self.by_column

@@ -70,7 +70,6 @@ class Assembler:
         return union(self.derivatives[j].columns for j, _ in entries)
 
     def _find_used(self) -> Integers:
-        """Return (y,) whether any glue reads the entry."""
         rows = ca.vertcat(*(stage.inputs for stage in self.structure.stages), self.structure.rows)
         found = np.zeros(self.y.shape[0] + self.structure.p.shape[0], bool)
         for each in read_tape(ca.Function("all", [self.y, self.structure.p], [rows])):

@@ -137,7 +137,6 @@ class CompiledObjective:
         return self._pool[1]
 
     def _check(self, X: Array | Mapping[str, float]) -> Array:
-        """Return X as contiguous, aligned doubles, copied only if necessary."""
         if isinstance(X, Mapping):
             return self.problem.check_x(X)[None]
         array = np.require(to_floats(f"X of {self.problem.name}", X), requirements=("C", "A"))

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.util import find_spec
@@ -144,17 +145,14 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
 
 
 @functools.cache
-def cpu_features() -> frozenset[str]:
-    """Return the names of this CPU's instruction sets as the operating system spells them; empty where they are unknown."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="ignore").splitlines()
-    except OSError:
-        return frozenset()
-    for line in lines:
-        name, _, value = line.partition(":")
-        if name.strip() in ("flags", "Features"):
-            return frozenset(value.split())
-    return frozenset()
+def read_cpu_info(*names: str) -> str:
+    """Return the first entry of one of these names in Linux's list of processors; empty where there is none."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            name, _, value = line.partition(":")
+            if name.strip() in names:
+                return value.strip()
+    return ""
 
 
 # Instruction sets that a lane count needs; the compiler may use them.
@@ -165,7 +163,8 @@ def native_lanes() -> int:
     """Return how many doubles one instruction of this CPU works on: 8 (AVX-512), 4 (AVX2), 2 (SSE2, NEON), else 1."""
     machine = platform.machine().lower()
     if machine in ("x86_64", "amd64"):
-        return next((lanes for lanes, needed in X86_SETS.items() if cpu_features().issuperset(needed)), 2)
+        available = set(read_cpu_info("flags", "Features").split())
+        return next((lanes for lanes, needed in X86_SETS.items() if available.issuperset(needed)), 2)
     return 2 if machine in ("aarch64", "arm64") else 1
 
 

@@ -1,8 +1,7 @@
 """A local optimum to machine precision, with its active bounds.
 
-IPOPT stops near an optimum, where no multiplier is exactly zero. Here the bounds with a price are taken as equations and the
-first-order conditions are solved by Newton's method; a bound whose multiplier gets the wrong sign is released, a violated one is
-added, until nothing changes.
+IPOPT stops near an optimum, where no multiplier is exactly zero. Here the bounds with a price are equations, and Newton's
+method solves the first-order conditions; wrong signs release a bound, violations add one, until nothing changes.
 """
 
 from __future__ import annotations

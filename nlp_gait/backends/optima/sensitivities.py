@@ -1,10 +1,8 @@
 """Derivatives of an optimum, its objective and x*, with respect to parameters and to the model.
 
-The objective's derivative is that of the Lagrangian at fixed x* and multipliers (envelope theorem); x* moves by the linearised
-first-order conditions with the active bounds as equations (implicit function theorem).
-
-Source:
-    Fiacco (1983), Introduction to Sensitivity and Stability Analysis in Nonlinear Programming, theorem 3.2.2.
+The objective's derivative is that of the Lagrangian at fixed x* and multipliers (envelope theorem); x* moves by the
+linearised first-order conditions with the active bounds as equations (Fiacco (1983), Introduction to Sensitivity and
+Stability Analysis in Nonlinear Programming, theorem 3.2.2).
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """IPOPT on the few rows of an NLP that matter: most limits of a gait are far away during the whole run.
 
-The time of an iteration grows with the number of rows, and there are limits at every sample. A run begins with few rows. At its
-end all rows are checked: those that are violated are added, and the run continues, until no row is violated. So the result
-satisfies all rows, and is a local optimum of the whole NLP; the multipliers of rows that were never added are zero. If IPOPT does
-not converge on some of the rows, it starts again with all of them.
+A run begins with few rows. At its end those that are violated are added, and the run continues, until no row is violated. So
+the result is a local optimum of the whole NLP; the multipliers of rows that were never added are zero. If IPOPT does not
+converge on some of the rows, it starts again with all of them.
 """
 
 from __future__ import annotations

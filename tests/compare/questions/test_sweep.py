@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.drawing.labels import axis_label, quantity
+from compare.analysis.units import axis_label, quantity
 from compare.questions.question import Work, find
 from compare.questions.sweep import Axis, Sweep, SweepPoint, parse_axis, plot_sweep
 from nlp_gait import load
