@@ -15,11 +15,11 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from nlp_gait.errors import WorkerError
 from nlp_gait.interrupts import block_interrupts_in_children, never
@@ -34,12 +34,7 @@ COUNTER_BYTES = 8
 PR_SET_PDEATHSIG = 1
 
 
-class _Child(NamedTuple):
-    process: BaseProcess
-    results: Connection
-
-
-def _fork(work: Callable[[Connection], None]) -> _Child:
+def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("fork")
     results, sender = context.Pipe(duplex=False)
     process = context.Process(target=work, args=(sender,), daemon=True)
@@ -48,7 +43,7 @@ def _fork(work: Callable[[Connection], None]) -> _Child:
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
     sender.close()
-    return _Child(process, results)
+    return results, process
 
 
 def run_in_forks(
@@ -89,15 +84,15 @@ def run_in_forks(
         if stop():
             ending[0] = 1
 
-    children: list[_Child] = []
+    children: list[tuple[Connection, BaseProcess]] = []
     try:
         with block_interrupts_in_children():
             for _ in range(workers):
                 children.append(_fork(run))
-        yield from _collect(children, check_stop)
+        yield from _collect(dict(children), check_stop)
     finally:
         ending[0] = 1
-        for process, results in children:
+        for results, process in children:
             results.close()
             process.join(END_WITHIN_S)
             if process.is_alive():
@@ -105,11 +100,10 @@ def run_in_forks(
                 process.join()
 
 
-def _collect(children: Sequence[_Child], check_stop: Callable[[], None]) -> Iterator[Any]:
+def _collect(processes: dict[Connection, BaseProcess], check_stop: Callable[[], None]) -> Iterator[Any]:
     """Yield the results of all children by their numbers."""
     early: dict[int, Any] = {}
     following = 0
-    processes = {child.results: child.process for child in children}
     while processes:
         for results in wait(list(processes), timeout=STOP_CHECKED_EVERY_S):
             assert isinstance(results, Connection)
@@ -146,7 +140,7 @@ def run_in_isolation(call: Callable[[], bytes], time_limit_s: float | None, most
         TimeoutError: the time limit, if there is one, has passed.
         WorkerError: the process ended without a result; the message says how.
     """
-    process, results = _fork(lambda sender: _isolate(sender, call))
+    results, process = _fork(lambda sender: _isolate(sender, call))
     try:
         if not wait([results, process.sentinel], time_limit_s):
             raise TimeoutError

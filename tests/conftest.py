@@ -81,7 +81,7 @@ def built_once() -> Iterator[None]:
             robot = options.get("robot", "")
             if isinstance(robot, str) and is_robot_file(robot):
                 return make(**options)
-            registry.check_maker_options(make, options)  # first, for what is not hashable
+            registry.check_options(make, options)  # first, for what is not hashable
             return made(name, tuple((option, type(value).__name__, value) for option, value in options.items()))
 
         return shared

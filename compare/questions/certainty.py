@@ -103,23 +103,15 @@ class Evidence:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certainty(Question[Evidence]):
-    """How certain is it that the best known optimum is the global one: many starts, a long search and, if possible, a proof.
-
-    Attributes:
-        starts: of IPOPT.
-        evaluations: of CMA-ES; 0 for none.
-        tolerance: of the proof, relative.
-        time_limit_s: of the proof [s]; 0 for none.
-        seed: of starts and search.
-    """
+    """How certain is it that the best known optimum is the global one: many starts, a long search and, if possible, a proof."""
 
     name: ClassVar[str] = "certainty"
 
-    starts: int
-    evaluations: int
-    tolerance: float = 0.01
-    time_limit_s: float = 1800.0
-    seed: int = 0
+    starts: int  # of IPOPT
+    evaluations: int  # of CMA-ES; 0 for none
+    tolerance: float = 0.01  # of the proof, relative
+    time_limit_s: float = 1800.0  # of the proof [s]; 0 for none
+    seed: int = 0  # of starts and search
 
     def __post_init__(self) -> None:
         """Validate the limits of the proof.

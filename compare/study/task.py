@@ -22,7 +22,7 @@ from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solv
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.registry import check_options, hash_files, load
+from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import check_reference, find_entry_points, hash_source, is_user_code, load_object, shorten_name
 
@@ -73,7 +73,7 @@ class ProblemSpec:
                     f"problem {self.address!r} is already built; options are not allowed: {', '.join(self.options)}"
                 )
             return self.name.with_values(**self.values)
-        check_options(self.name, self.options)  # before the cache, to which True and 1 are the same
+        check_options(find_maker(self.name), self.options)  # before the cache, to which True and 1 are the same
         contents = hash_source(self.name, "problem") if self.name not in PROBLEMS else ""
         options = tuple(sorted(self.options.items()))
         return _load(self.name, options, (contents, *hash_files(self.options).values())).with_values(**self.values)

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, Concatenate, Literal, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 from casadi import DM, MX
@@ -40,17 +40,12 @@ T = TypeVar("T")
 LARGEST = 1e100  # of a parameter: squares of larger ones overflow
 # Changes what a problem assembles.
 Change = Callable[[Assembly, Point, Nonsmooth], Assembly]
+# Maker of a problem, and all its options.
+Origin: TypeAlias = "tuple[Callable[..., GaitProblem], Mapping[str, Any]]"
 # Start point (n,) from the parameters by name.
 Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point is on a bound if it misses it by at most this share of the variable's default range.
 ROUNDING = 1e-6
-
-
-class Origin(NamedTuple):
-    """Maker of a problem, and all its options."""
-
-    make: Callable[..., GaitProblem]
-    options: Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -173,9 +168,7 @@ class GaitProblem:
                     f"parameter {name!r} must be within [{parameter.minimum}, {parameter.maximum}] {parameter.unit}, got {value}"
                 )
         merged = {**self.values, **{name: float(value) for name, value in values.items()}}
-        changed = replace(self, values=merged)
-        object.__setattr__(changed, "_cache", self._cache)  # the mathematics is the same
-        object.__setattr__(changed, "_origin", self._origin)
+        changed = self._copy(self._origin, values=merged)
         changed._check_pairs()
         return changed
 
@@ -345,9 +338,13 @@ class GaitProblem:
 
     def with_origin(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
         """Return the same problem, pickled as ``make`` with these options."""
-        made = replace(self)
+        return self._copy((make, dict(options)))
+
+    def _copy(self, origin: Origin | None, **changes: Any) -> GaitProblem:
+        """Return a copy with the same mathematics, so that it shares what is built from it."""
+        made = replace(self, **changes)
         object.__setattr__(made, "_cache", self._cache)
-        object.__setattr__(made, "_origin", Origin(make, dict(options)))
+        object.__setattr__(made, "_origin", origin)
         return made
 
     def __copy__(self) -> GaitProblem:  # it cannot be changed
@@ -357,13 +354,13 @@ class GaitProblem:
         return self
 
     def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
-        origin = self._origin
-        if origin is None or "<locals>" in getattr(origin.make, "__qualname__", ""):
+        make, options = self._origin or (None, {})
+        if make is None or "<locals>" in getattr(make, "__qualname__", ""):
             raise InputError(
                 f"problem {self.name!r} cannot be pickled: only unchanged problems of a module-level @maker function can; "
                 "make it in the other process, or write a maker"
             )
-        return _unpickle, (origin.make, origin.options, dict(self.values), repr(self.display.robot))
+        return _unpickle, (make, options, dict(self.values), repr(self.display.robot))
 
     def build_once(self, build: Callable[Concatenate[GaitProblem, P], T], *arguments: P.args, **named: P.kwargs) -> T:
         """Return ``build(self, ...)``, computed once for all copies that differ in parameter values only.

@@ -5,18 +5,22 @@ from __future__ import annotations
 import functools
 import inspect
 import math
+import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
+from casadi import Function, vertcat
 
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
-from nlp_gait.formulation.checks import check_mathematics
+from nlp_gait.formulation.assembly import Assembly
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
 from nlp_gait.providers import FILE_HASHES, PROBLEMS, import_object
+from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.user_code import (
     allow_code,
     call_user_code,
@@ -29,6 +33,7 @@ from nlp_gait.user_code import (
 
 # More intervals and samples than this are of no use, and such a problem takes too long to build.
 LARGEST_COUNT = 10_000
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}")
 GRID = ("intervals", "samples_per_interval")  # options whose product has the same limit as each
 
 Maker = Callable[..., GaitProblem]
@@ -45,7 +50,7 @@ def maker(make: Maker) -> Maker:
     @functools.wraps(make)
     def make_problem(**options: Any) -> GaitProblem:
         options = {name: _to_python(value) for name, value in options.items()}
-        check_maker_options(make, options)
+        check_options(make, options)
         call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
         problem = make(**call)
         if not isinstance(problem, GaitProblem):
@@ -111,7 +116,7 @@ def _user_maker(name: str) -> Maker:
     @lock_casadi
     @functools.wraps(make)
     def make_checked(**options: Any) -> GaitProblem:
-        check_maker_options(make, options)
+        check_options(make, options)
         problem = call_user_code(name, path, lambda: make(**options))
         call_user_code(name, path, lambda: check_mathematics(problem))
         return replace(problem, loaded_as=name).with_origin(origin, options)
@@ -133,12 +138,7 @@ class UserMaker:
         return load(self.name, **options)
 
 
-def check_options(name: str, options: Mapping[str, Any]) -> None:
-    """Check that a problem has these options and allows their values; raises as ``load``."""
-    check_maker_options(find_maker(name), options)
-
-
-def check_maker_options(make: Maker, options: Mapping[str, Any]) -> None:
+def check_options(make: Maker, options: Mapping[str, Any]) -> None:
     """Check that a maker has these options, with values of the default's type and among those allowed.
 
     Raises:
@@ -192,3 +192,50 @@ def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """
     check_name("problem", name)
     return find_maker(name)(**options)
+
+
+def check_mathematics(problem: GaitProblem) -> None:
+    """Assemble a problem once and check that backends can use it.
+
+    Raises:
+        InputError: no assembly, duplicated rows, symbols that are neither variables nor parameters, a bound of a row that
+            depends on variables, or a start point of the wrong length.
+    """
+    owner = f"problem {problem.name!r}"
+    if not NAME.fullmatch(problem.name):  # files are named after it
+        raise InputError(f"{owner}: a name has 1 to 64 letters, digits and . _ + -, and starts with a letter or digit")
+    if not problem.variables:
+        raise InputError(f"{owner} has no variables")
+    point = problem.symbols()
+    assembly = problem.assemble(point, Exact())
+    if not isinstance(assembly, Assembly):
+        raise InputError(f"{owner}: assemble must return an Assembly, it returned {type(assembly).__name__}")
+    counts = Counter(name for constraint in assembly.constraints for name in constraint.row_names)
+    duplicates = [name for name, count in counts.items() if count > 1]
+    if duplicates:
+        raise InputError(f"{owner}: duplicated rows: {', '.join(duplicates[:5])}")
+    inputs = {point.x.name(): point.x, point.p.name(): point.p}
+    parts = {"objective": assembly.objective, **{f"index {name!r}": value for name, value in assembly.indexes.items()}}
+    for constraint in assembly.constraints:
+        row = f"constraint {constraint.name!r}"
+        parts[row] = constraint.value
+        for end in ("lower", "upper"):
+            bound = getattr(constraint, end)
+            if bound is None:
+                continue
+            parts[f"{row}, {end}"] = bound
+            function = Function("bound", list(inputs.values()), [bound], {"allow_free": True})
+            if function.sparsity_jac(0, 0).nnz():
+                raise InputError(
+                    f"{owner}: {row}: {end} must depend on parameters only; move terms with variables into value"
+                )
+    for part, value in parts.items():
+        free = Function("part", list(inputs.values()), [vertcat(value)], {"allow_free": True}).free_mx()
+        if free:
+            raise InputError(
+                f"{owner}: {part} contains {free[0].name()!r}, which is neither a variable nor a parameter"
+            )
+    if problem.hints.start is not None:
+        start = np.asarray(problem.hints.start(problem.parameter_values, np.random.default_rng(0)))
+        if start.shape != (len(problem.names),):
+            raise InputError(f"{owner}: start must return {len(problem.names)} values, it returned shape {start.shape}")

@@ -206,18 +206,12 @@ class Solution:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, with the schema version of results."""
+        shown = ("claimed", "feasible", "status", "objective", "violation", "iterations", "time_s")
         starts = [
             {
                 "index": index,
-                "claimed": start.claimed,
-                "feasible": start.feasible,
-                "status": start.status,
-                "objective": start.objective,
-                "violation": start.violation,
-                "iterations": start.iterations,
-                "time_s": start.time_s,
-                "x0": dict(zip(self.x, start.x0.tolist(), strict=True)),
-                "x": dict(zip(self.x, start.x.tolist(), strict=True)),
+                **{name: getattr(start, name) for name in shown},
+                **{name: dict(zip(self.x, getattr(start, name).tolist(), strict=True)) for name in ("x0", "x")},
             }
             for index, start in enumerate(self.starts)
         ]

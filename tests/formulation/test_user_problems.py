@@ -16,7 +16,7 @@ from compare.study.task import ProblemSpec, Task
 from nlp_gait import load, solve, user_code
 from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable, registry
-from nlp_gait.formulation.checks import check_mathematics
+from nlp_gait.formulation.registry import check_mathematics
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import hash_source, is_reference
 from tests.backends.toys import corner, toy

@@ -95,14 +95,8 @@ def joint_angles(q: Array, *, rates: bool = False) -> Array:
 
 def joint_torques(model: Array, stance_toe: Array) -> Array:
     """Return joint torques (T, 8) from ``loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
-    columns = []
-    for name in JOINTS:
-        if name in MODEL_JOINT:
-            joint, sense = MODEL_JOINT[name]
-            columns.append(sense * model[:, MODEL_JOINTS.index(joint)])
-        else:
-            columns.append(stance_toe)
-    return np.stack(columns, axis=1)
+    found = {name: sense * model[:, MODEL_JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
+    return np.stack([found.get(name, stance_toe) for name in JOINTS], axis=1)
 
 
 def torso_lean(q: Array) -> Array:
@@ -129,11 +123,5 @@ def _link(name: str, rod: Rod, along: Vector) -> Link:
 
 
 def _plate(link: str, length: float) -> Foot:
-    return Foot(
-        link=link,
-        ankle_height_m=0.0,
-        front_m=length,
-        back_m=0.0,
-        left_m=FOOT_HALF_WIDTH,
-        right_m=FOOT_HALF_WIDTH,
-    )
+    half = FOOT_HALF_WIDTH
+    return Foot(link=link, ankle_height_m=0.0, front_m=length, back_m=0.0, left_m=half, right_m=half)

@@ -33,14 +33,8 @@ def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     at = {name: np.array(value.full().T) for name, value in values.items()}
     tread = parameters["stair_length_m"] / 2
     rise = tread * parameters["rise_run_ratio"]
-    edges = [
-        (-1.6 * tread, -1),
-        (-SETBACK, -1),
-        (-SETBACK, 0),
-        (tread - SETBACK, 0),
-        (tread - SETBACK, 1),
-        (1.8 * tread, 1),
-    ]
+    first, second = -SETBACK, tread - SETBACK
+    edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
     zmp = signals.arrays.get("zmp")
     return Skeleton(
         t=signals.arrays["t"],
@@ -103,15 +97,8 @@ def make_standing_step(
     whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
     flat = np.zeros((len(t), len(LINKS) - len(MOVING)))
     q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
-    return StepMotion(
-        t,
-        q,
-        qd,
-        qdd,
-        joint_torques(torque, _stance_toe_torque(stance[:, 1], pressure[:, 0])),
-        carried / whole,
-        double_support_s,
-    )
+    tau = joint_torques(torque, _stance_toe_torque(stance[:, 1], pressure[:, 0]))
+    return StepMotion(t, q, qd, qdd, tau, carried / whole, double_support_s)
 
 
 def compute_ground_force(q: Array, qd: Array, qdd: Array) -> Array:

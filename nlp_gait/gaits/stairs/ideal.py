@@ -25,20 +25,12 @@ from nlp_gait.formulation import (
     parameters,
 )
 from nlp_gait.formulation.blocks import Block, Layout
+from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simulation_model, skeleton
 from nlp_gait.gaits.stairs.ideal_model import AXES, IdealModel
 from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import (
-    ANGLE_LIMITS,
-    COLUMNS,
-    GRAVITY,
-    LEAST_STANCE_FORCE,
-    PAPER_TIMES,
-    STAIR_PARAMETERS,
-    joint_signals,
-)
 from nlp_gait.symbolic.nonsmooth import Exact
 
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
@@ -58,21 +50,21 @@ PLAN = {
     "sole_angle": np.pi / 6,
     "toe_angle": np.pi / 6,
     "catch_angle": 0.01,
-    **dict(zip(("t1", "t2", "t_bc", "t3"), PAPER_TIMES, strict=True)),
+    **dict(zip(("t1", "t2", "t_bc", "t3"), stair.PAPER_TIMES, strict=True)),
 }
 HIP_BEHIND = 0.08  # of the hip at the start, from the middle of the rear tread [m]
 REACH_MARGIN = 0.02  # on the cosine of a knee: avoids stretched legs at the start
 FINE_INTERVALS = 1000  # of a simulated gait
 
 PARAMETERS = (
-    *STAIR_PARAMETERS,
+    *stair.STAIR_PARAMETERS,
     *parameters(
         ("step_time_s", "s", 3.5, "t3, time of the step", 0.1, inf),
         ("torque_weight", "1/(N m)^2/s", 0.01, "cost of squared torque", 0.0, inf),
         ("acceleration_weight", "s^3/rad^2", 1e-3, "cost of squared link acceleration", 0.0, inf),
         ("friction", "1", 0.6, "mu below the rear foot", 0.0, inf),
         ("stance_friction", "1", 10.0, "mu below the stance foot; the default does not bind", 0.0, inf),
-        LEAST_STANCE_FORCE,
+        stair.LEAST_STANCE_FORCE,
         ("zmp_margin_m", "m", 0.0, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
         ("clearance_m", "m", -0.002, "least height of foot points above the smoothed stair", -inf, inf),
     ),
@@ -111,12 +103,12 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
             joints=JOINTS,
             arrays={
                 "t": np.linspace(0.0, step_time, intervals + 1),
-                **joint_signals(values["angle"].T, values["rate"].T, repeat_last(values["acceleration"])),
+                **stair.joint_signals(values["angle"].T, values["rate"].T, repeat_last(values["acceleration"])),
                 "tau": repeat_last(loads.torque),
                 "stance_force": repeat_last(loads.stance_force),
                 "zmp": repeat_last(loads.stance_pressure)[:, 0],
             },
-            columns=COLUMNS,
+            columns=stair.COLUMNS,
         )
 
     def step_motion(at: NumericPoint) -> StepMotion:
@@ -159,7 +151,7 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
 
 def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
     """Return the layout: angles and rates at all instants; accelerations and ground forces constant during an interval."""
-    angles = tuple(ANGLE_LIMITS[link] for link in MOVING)
+    angles = tuple(stair.ANGLE_LIMITS[link] for link in MOVING)
     rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
     accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
     table = (
@@ -198,7 +190,7 @@ def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.
 
 def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
     """Return link angles (7, intervals + 1) of a plausible step at equidistant times [rad]."""
-    ends = np.array([0.0, *PAPER_TIMES])
+    ends = np.array([0.0, *stair.PAPER_TIMES])
     times = np.linspace(0.0, ends[-1], intervals + 1)
     fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
     return np.array(_angles().map(intervals + 1)(np.tile([[tread], [rise]], intervals + 1), fractions))
@@ -210,6 +202,6 @@ def _angles() -> ca.Function:
     size, s = SX.sym("size", 2), SX.sym("s", 4)
     plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
     found = posture(
-        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), stair.GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
     )
     return ca.Function("angles", [size, s], [found.q.position])

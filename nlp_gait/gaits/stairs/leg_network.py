@@ -1,4 +1,8 @@
-"""The paper's inverse kinematics: a small network trained online, pose after pose, on the error of its own ankle."""
+"""The paper's inverse kinematics: a small network trained online, pose after pose, on the error of its own ankle.
+
+Source:
+    Bhardwaj et al., section VI, Algorithm 1 and eqs. (27)-(30).
+"""
 
 from __future__ import annotations
 
@@ -20,24 +24,15 @@ LEAST_KNEE_SINE = 1e-3
 
 
 def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
-    """Return (2,) from hip to ankle, forward and up [m]; angles (2,) of thigh and shank are clockwise from forward [rad].
-
-    Source:
-        Bhardwaj et al., eqs. (27), (28).
-    """
-    return ca.vertcat(
-        thigh * ca.cos(angles[0]) + shank * ca.cos(angles[1]),
-        -thigh * ca.sin(angles[0]) - shank * ca.sin(angles[1]),
-    )
+    """Return (2,) from hip to ankle, forward and up [m]; angles (2,) of thigh and shank are clockwise from forward [rad]."""
+    forward = thigh * ca.cos(angles[0]) + shank * ca.cos(angles[1])  # (eq. 27)
+    return ca.vertcat(forward, -thigh * ca.sin(angles[0]) - shank * ca.sin(angles[1]))  # (eq. 28)
 
 
 def leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
     """Return (2,) rates of thigh and shank [rad/s] at which the ankle has a velocity (2,) from the hip [m/s].
 
     Damped where the knee is straight or folded within a thousandth of a radian, so that they are always finite.
-
-    Source:
-        Bhardwaj et al., eqs. (27), (28), differentiated by time.
     """
     (a, b), (c, d) = (
         ca.vertsplit(row) for row in ca.horzsplit(ca.jacobian(leg_vector(angles, thigh, shank), angles).T)
@@ -51,9 +46,6 @@ def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[
     """Return angles (2,) of thigh and shank [rad] by one hidden layer, and the ankle's squared distance from a target (2,).
 
     The weights (4 h,) of h hidden nodes are those of the inputs (h, 2), then those of the outputs (2, h), by columns.
-
-    Source:
-        Bhardwaj et al., section VI and eqs. (27)-(29).
     """
     nodes = weights.shape[0] // 4
     inner, outer = ca.reshape(weights[: 2 * nodes], nodes, 2), ca.reshape(weights[2 * nodes :], 2, nodes)
@@ -68,10 +60,7 @@ def make_training_path(
     """Return the function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
 
     Each pose starts from the weights of the last one and is trained by gradient steps, at most ``iterations``, until the squared
-    distance of the ankle is within the tolerance [m^2].
-
-    Source:
-        Bhardwaj et al., Algorithm 1 and eq. (30).
+    distance of the ankle is within the tolerance [m^2] (Algorithm 1).
     """
     weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
     angles, error = network_error(weights, target, thigh, shank)
@@ -108,7 +97,6 @@ class NetworkSettings:
     seed: int = 0  # of the first weights
 
     def __post_init__(self) -> None:
-        """Validate the settings."""
         if self.rule not in get_args(Rule):
             raise InputError(f"rule must be one of {', '.join(get_args(Rule))}, got {self.rule!r}")
         if self.hidden < 1 or self.iterations < 1:
@@ -142,11 +130,7 @@ class NetworkPath(NamedTuple):
 def network_angles(
     hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings | None = None
 ) -> NetworkPath:
-    """Return leg angles along a path (m, 2) from hip to ankle [m]; each pose starts from the weights of the previous one.
-
-    Source:
-        Bhardwaj et al., Algorithm 1 and eqs. (27)-(30).
-    """
+    """Return leg angles along a path (m, 2) from hip to ankle [m] (Algorithm 1); each pose starts from the last one's weights."""
     settings = settings or NetworkSettings()
     training = _training(settings.hidden, thigh, shank)
     weights = settings.first_weights

@@ -29,6 +29,7 @@ from nlp_gait.formulation import (
     maker,
     parameters,
 )
+from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import (
     StepMotion,
     compute_ground_force,
@@ -40,39 +41,15 @@ from nlp_gait.gaits.stairs.plan_samples import GROUND_SHARE, PlannedStep, PlanSa
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
 from nlp_gait.gaits.stairs.planned_motion import PHASES
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import (
-    ANGLE_LIMITS,
-    COLUMNS,
-    GIVEN_PARAMETERS,
-    GOVERNING,
-    GOVERNING_VARIABLES,
-    LEAST_STANCE_FORCE,
-    REACH_MARGIN,
-    STAIR_PARAMETERS,
-    grip,
-    joint_signals,
-    knee_limits,
-    rows,
-    stance_load,
-    stance_zmp,
-)
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk"]
-OBJECTIVES = {
-    "energy": Objective(name="energy", unit="J"),
-    "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3"),
-}
+OBJECTIVES = {"energy": Objective(name="energy", unit="J"), "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3")}
 
+REAR_SHARE = "share of the ground force below the rear toe at the start"
 VARIABLES = (
-    *GOVERNING_VARIABLES,
-    Variable(
-        name="rear_share",
-        unit="1",
-        lower=0.0,
-        upper=0.95,
-        description="share of the ground force below the rear toe at the start",
-    ),
+    *stair.GOVERNING_VARIABLES,
+    Variable(name="rear_share", unit="1", lower=0.0, upper=0.95, description=REAR_SHARE),
 )
 # Start points are normally distributed around a plausible plan for common stairs, in units of the ranges: from uniform points
 # half of all runs of IPOPT end at unreachable poses. Of two optima, the better one catches the cycloid early (t_bc at 1.0 to
@@ -90,12 +67,12 @@ PHASE_ENDS = ("", "t1_s", "t2_s", "t_bc_s", "t3_s")  # the step begins at zero
 FINE_INTERVALS = 250  # of each phase of a simulated gait
 
 PARAMETERS = (
-    *STAIR_PARAMETERS,
-    *GIVEN_PARAMETERS,
+    *stair.STAIR_PARAMETERS,
+    *stair.GIVEN_PARAMETERS,
     *parameters(
-        REACH_MARGIN,
+        stair.REACH_MARGIN,
         ("zmp_margin_m", "m", 0.01, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
-        LEAST_STANCE_FORCE,
+        stair.LEAST_STANCE_FORCE,
         ("friction", "1", 0.6, "mu below both feet", 0.0, inf),
         ("clearance_m", "m", 0.002, "least height of the swing foot above the stair", -inf, inf),
         ("acceleration_limit_rad_s2", "rad/s^2", 80.0, "largest acceleration of a link", 0.0, inf),
@@ -127,9 +104,9 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
     def motion(at: NumericPoint) -> Signals:
         samples = step.samples(at, Exact())
         arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
-        moving = joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
+        moving = stair.joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
-        return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=COLUMNS)
+        return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
 
     def step_motion(at: NumericPoint) -> StepMotion:
         fine = PlannedStep(per_phase=FINE_INTERVALS).samples(at, Exact())
@@ -153,10 +130,7 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
         hints=SolverHints(start=_start),
         rows_over_time=tuple(
             RowsOverTime(
-                name=name,
-                assemble=partial(_at_phases, step, i),
-                times=partial(_phase_times, i),
-                means=("energy_J",),
+                name=name, assemble=partial(_at_phases, step, i), times=partial(_phase_times, i), means=("energy_J",)
             )
             for i, name in enumerate(PHASES)
         ),
@@ -187,22 +161,22 @@ def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: 
 
 
 def _clearance(heights: MX, least: MX) -> Constraint:
-    return rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
+    return stair.rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
 
 
 def _rows_at(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
     """Return rows of reach, link angles, knees, accelerations and ground at every sample."""
     m = samples.q.shape[1]
-    lower, upper = (MX(DM([ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
+    lower, upper = (MX(DM([stair.ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
     most = point["acceleration_limit_rad_s2"]
     return (
-        rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
-        rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
-        knee_limits("knee_angle", samples.q),
-        rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
-        stance_load(point, samples.stance_force),
-        grip("friction", samples.stance_force, point["friction"]),
-        stance_zmp(point, samples.stance_pressure),
+        stair.rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
+        stair.rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
+        stair.knee_limits("knee_angle", samples.q),
+        stair.rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
+        stair.stance_load(point, samples.stance_force),
+        stair.grip("friction", samples.stance_force, point["friction"]),
+        stair.stance_zmp(point, samples.stance_pressure),
     )
 
 
@@ -235,14 +209,14 @@ def _start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
     """Draw a point around the plausible plan, again until every phase has a duration and the legs reach."""
     ranges = np.array([variable.upper - variable.lower for variable in VARIABLES])
     tread = parameters["stair_length_m"] / 2
-    size, margin = [tread, parameters["rise_run_ratio"] * tread], parameters[REACH_MARGIN[0]]
-    given = [parameters[parameter.name] for parameter in GIVEN_PARAMETERS]
+    size, margin = [tread, parameters["rise_run_ratio"] * tread], parameters[stair.REACH_MARGIN[0]]
+    given = [parameters[parameter.name] for parameter in stair.GIVEN_PARAMETERS]
     lower, upper = (np.array([parameters[f"{v.name}.{end}"] for v in VARIABLES]) for end in ("lower", "upper"))
     best, least = np.empty(0), inf
     for _ in range(DRAWS):
         x = np.clip(np.array(PLAUSIBLE) + SCATTER * ranges * rng.standard_normal(len(VARIABLES)), lower, upper)
-        plan = np.concatenate([x[: len(GOVERNING_VARIABLES)], given])
-        named = dict(zip(GOVERNING, plan, strict=True))
+        plan = np.concatenate([x[: len(stair.GOVERNING_VARIABLES)], given])
+        named = dict(zip(stair.GOVERNING, plan, strict=True))
         durations = np.diff([0.0, *(named[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))])
         out_of_reach = np.array(reach_function(PARTS_AT_START)(plan, size, margin)) - (1 - margin)
         too_short = parameters["least_phase_s"] - durations

@@ -1,4 +1,4 @@
-"""Planar biped with toes: points, dynamics and loads from absolute link angles.
+"""Planar biped with toes: points, dynamics and loads from absolute link angles (Bhardwaj et al., eqs. 35-42).
 
 All angles are absolute. Those of legs and feet turn clockwise from the forward axis x (a leg that hangs down has pi / 2), that of
 the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is the base.
@@ -78,19 +78,14 @@ def centres(found: Mapping[str, SX]) -> dict[str, SX]:
 
 
 def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angles: SX) -> EquationsOfMotion:
-    """Return the equations of motion about a fixed stance ankle, with link angles (9,) [rad] as a function of q (n,).
-
-    Source:
-        Bhardwaj et al., eqs. (36)-(42).
-    """
+    """Return the equations of motion about a fixed stance ankle, with link angles (9,) [rad] as a function of q (n,)."""
     spins = ca.jtimes(angles, q, qd)
     velocities = [ca.jtimes(direction(link, angles[i]), q, qd) for i, link in enumerate(LINKS)]
     middles = centres(points(rods, angles, SX(2, 1)))
     kinetic, potential, couplings = SX(0), SX(0), _couplings(rods)
     for i, link in enumerate(LINKS):
-        kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + 0.5 * couplings[i, i] * ca.sumsqr(
-            velocities[i]
-        )  # (eqs. 36, 37)
+        moving = 0.5 * couplings[i, i] * ca.sumsqr(velocities[i])
+        kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + moving  # (eqs. 36, 37)
         for j in range(i):
             if couplings[i, j] != 0.0:
                 kinetic += couplings[i, j] * ca.dot(velocities[i], velocities[j])
@@ -137,10 +132,8 @@ def link_angles(q: SX) -> SX:
 def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
     """Return the inverse dynamics of the moving links, q (7,) [rad], with given forces (2,) [N] on points of the rear foot.
 
-    Derivatives are taken with respect to q and qd, which are symbols.
-
-    Source:
-        Bhardwaj et al., eqs. (35), (42); the centre of pressure from the moment balance of the flat stance foot.
+    Derivatives are taken with respect to q and qd, which are symbols. The centre of pressure follows from the moment balance of
+    the flat stance foot.
     """
     motion = biped_dynamics(rods, gravity, q, qd, link_angles(q))
     found = points(rods, link_angles(q), SX(2, 1))

@@ -95,11 +95,7 @@ def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
 
 
 def ankle_on_toe(foot: ToeFoot, sole: SX, toe: SX) -> SX:
-    """Return the ankle (2,) relative to its position with a flat foot [m], while the tip of the toe stands still.
-
-    Source:
-        Bhardwaj et al., eqs. (1), (2).
-    """
+    """Return the ankle (2,) relative to its position with a flat foot [m], while the tip of the toe stands still."""
     return ca.vertcat(
         foot.sole * (1 - ca.cos(sole)) + foot.toe * (1 - ca.cos(toe)),  # (eq. 1)
         foot.sole * ca.sin(sole) + foot.toe * ca.sin(toe),  # (eq. 2)

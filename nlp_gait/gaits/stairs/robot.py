@@ -25,7 +25,6 @@ class PlanarLink:
     mass_kg: float  # uniformly distributed
 
     def __post_init__(self) -> None:
-        """Check that length and mass are positive."""
         check_numbers(f"link {self.name!r}", self, positive=("length_m", "mass_kg"))
 
 
@@ -43,7 +42,6 @@ class ToeFootBiped:
     links: tuple[PlanarLink, ...]  # in the order of ``planar_biped.LINKS``; both legs are equal
 
     def __post_init__(self) -> None:
-        """Reject missing links and legs that differ."""
         names = tuple(link.name for link in self.links)
         if names != LINKS:
             raise RobotDataError(f"robot {self.name!r}: links must be {', '.join(LINKS)}, got {', '.join(names)}")
@@ -53,12 +51,10 @@ class ToeFootBiped:
                 raise RobotDataError(f"robot {self.name!r}: links {swing} and {stance} must be equal")
 
     def link(self, name: str) -> PlanarLink:
-        """Link by name."""
         return self.links[LINKS.index(name)]
 
     @property
     def mass_kg(self) -> float:
-        """Mass of the whole robot."""
         return math.fsum(link.mass_kg for link in self.links)
 
     @property

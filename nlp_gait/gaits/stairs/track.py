@@ -26,19 +26,11 @@ from nlp_gait.formulation import (
     maker,
     parameters,
 )
+from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import (
-    COLUMNS,
-    GIVEN_PARAMETERS,
-    GOVERNING_VARIABLES,
-    REACH_MARGIN,
-    STAIR_PARAMETERS,
-    clip_to_range,
-    rows,
-)
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]
@@ -63,17 +55,17 @@ SCATTER = 0.05
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PARAMETERS = (
-    *STAIR_PARAMETERS,
+    *stair.STAIR_PARAMETERS,
     *parameters(
         *(
             (v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum)
-            for v in GOVERNING_VARIABLES
+            for v in stair.GOVERNING_VARIABLES
             if v.name != TORSO_PITCH
         )
     ),
-    *GIVEN_PARAMETERS,
+    *stair.GIVEN_PARAMETERS,
     *parameters(
-        REACH_MARGIN,
+        stair.REACH_MARGIN,
         ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
         ("zmp_weight", "1/m", 100.0, "cost of the mean distance of the ZMP from the supporting polygon", 0.0, inf),
         ("gravity_compensation", "1", 1.0, "share of gravity that the controller compensates; 0 as printed", 0.0, 1.0),
@@ -110,20 +102,20 @@ def stairs_track(
     if not QUANTUM <= duration_s <= 60.0:
         raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
     suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
-    loop = ClosedLoop(
-        quanta=round(duration_s / QUANTUM),
-        scheme=scheme,
-        gains=len(suffixes),
-        inverse_kinematics=inverse_kinematics,
-    )
+    quanta = round(duration_s / QUANTUM)
+    loop = ClosedLoop(quanta=quanta, scheme=scheme, gains=len(suffixes), inverse_kinematics=inverse_kinematics)
+    limits = {"lower": 0.0, "upper": 100.0, "minimum": 0.0, "maximum": 1e4}
     variables = (
-        *_gain_variables("kp", "N m/rad", "K_p", suffixes),
-        *_gain_variables("kd", "N m s/rad", "K_d", suffixes),
-        *(v for v in GOVERNING_VARIABLES if v.name == TORSO_PITCH),
+        *(
+            Variable(name=name + suffix, unit=unit, description=f"{symbol} of {suffix[1:] or 'all links'}", **limits)
+            for name, unit, symbol in (("kp", "N m/rad", "K_p"), ("kd", "N m s/rad", "K_d"))
+            for suffix in suffixes
+        ),
+        *(v for v in stair.GOVERNING_VARIABLES if v.name == TORSO_PITCH),
     )
 
     def rollout(point: Point, ops: Nonsmooth) -> Rollout:
-        return loop.rollout(point, ca.vertcat(*(clip_to_range(point, variable) for variable in variables)), ops)
+        return loop.rollout(point, ca.vertcat(*(stair.clip_to_range(point, variable) for variable in variables)), ops)
 
     def start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
         gains_about = np.full(2 * len(suffixes), PLAUSIBLE_GAIN)
@@ -144,7 +136,7 @@ def stairs_track(
                 "zmp": zmp[:, 0],
             },
             columns={
-                "zmp": COLUMNS["zmp"],
+                "zmp": stair.COLUMNS["zmp"],
                 "q_desired": Columns(unit="rad", labels=LINKS),
                 "qd_desired": Columns(unit="rad/s", labels=LINKS),
             },
@@ -173,25 +165,15 @@ def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
     errors = loop.state - loop.desired
     power = loop.torque * loop.state[N:, :]
     below, above = _zmp_violations(point, loop.zmp)
-    tolerance = point["tracking_tolerance_rad"]
+    most, instants = point["tracking_tolerance_rad"], range(1, quanta + 1)
+    tracked = stair.rows("tracking", errors[:N, :], LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
     outside = ca.sum1(_positive(below, ops) + _positive(above, ops)) / quanta
     finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
     return Assembly(
         objective=tracking + effort + point["zmp_weight"] * outside,
-        constraints=(
-            rows(
-                "tracking",
-                errors[:N, :],
-                LINKS,
-                "rad",
-                0.1,
-                lower=-tolerance,
-                upper=tolerance,
-                columns=range(1, quanta + 1),
-            ),
-        ),
+        constraints=(tracked,),
         indexes={
             "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
             "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
@@ -217,18 +199,3 @@ def _zmp_violations(point: Point, zmp: MX) -> tuple[MX, MX]:
 def _positive(v: MX, ops: Nonsmooth) -> MX:
     """Elementwise max(v, 0)."""
     return (v + ops.abs(v)) / 2
-
-
-def _gain_variables(name: str, unit: str, symbol: str, suffixes: list[str]) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(
-            name=f"{name}{suffix}",
-            unit=unit,
-            lower=0.0,
-            upper=100.0,
-            description=f"{symbol} of {suffix.removeprefix('_') or 'all links'}",
-            minimum=0.0,
-            maximum=1e4,
-        )
-        for suffix in suffixes
-    )

@@ -40,7 +40,6 @@ class PointMassBiped:
     foot_width_m: float  # Fy; the ankle is in the middle
 
     def __post_init__(self) -> None:
-        """Check that every mass and every length is positive."""
         numbers = [field.name for field in fields(self) if field.name.endswith(("_kg", "_m"))]
         check_numbers(f"robot {self.name!r}", self, positive=numbers)
 

@@ -49,9 +49,6 @@ def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBi
     """Return positions (3,) of the swing ankle P12 and of the stance hip P6 [m] over the first step of T [s].
 
     The variables x (4,) are step length s, frontal shift n, foot lift H and bending height h [m].
-
-    Source:
-        Eqs. (4), (6).
     """
     s, n, lift, bend = ca.vertsplit(x)
 
