@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from compare.drawing.animation import plot_poses
 from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.gait_figure import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points
-from compare.papers.nao.nao_paper import SWING_HEIGHT, SWING_POWER_W
+from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT
 from compare.papers.nao.nao_runs import ALGORITHMS
 from compare.papers.paper_runs import get_point
 from nlp_gait.formulation import Array, Result
@@ -32,9 +33,9 @@ def draw_figures(findings: NaoFindings) -> dict[str, Figure]:
     """Return the figures by name."""
     figures = {"swing-height": _draw_swing(findings)}
     for letter, phase in zip("ab", findings.phases, strict=True):
-        figures[f"fig{phase.paper.convergence_figure:02d}"] = _draw_convergence(phase)
-        for number, positions in phase.paper.scatter_figures.items():
-            figures[f"fig{number}"] = _draw_scatter(phase, positions)
+        figures[phase.paper.convergence_figure] = _draw_convergence(phase)
+        for name, positions in phase.paper.scatter_figures.items():
+            figures[name] = _draw_scatter(phase, positions)
         figures[f"fig20{letter}"] = _draw_gait(phase)
     return figures
 
@@ -107,44 +108,30 @@ def _plot_optima(axes: Axes, phase: PhaseFindings, position: int) -> None:
 def _draw_swing(findings: NaoFindings) -> Figure:
     """Price of a higher swing foot: the true sweep, and what the search histories of the paper and ours show."""
     phase = findings.ssp
+    heights = [held.at for held in findings.swing]
     figure = new_figure(5.2, 3.2)
     axes = figure.subplots()
-    heights = [held.at for held in findings.swing]
-    axes.plot(
-        heights,
-        _divide_by_first([held.power_W for held in findings.swing]),
-        "o-",
-        color=COLOURS["ipopt"],
-        label="IPOPT",
-    )
+
+    def plot(power: Sequence[float], line: str, colour: str, label: str) -> None:
+        axes.plot(heights, np.array(power) / power[0], line, color=colour, label=label)
+
+    plot([held.power_W for held in findings.swing], "o-", COLOURS["ipopt"], "IPOPT")
     for name, marker in zip(ALGORITHMS, "sv", strict=True):
-        printed = SWING_POWER_W[name]
-        label = f"paper, {NAMES[name]}"
-        axes.plot(
-            list(printed), _divide_by_first(list(printed.values())), f"{marker}--", color=PAPER_COLOUR, label=label
-        )
+        plot(PAPER.swing_power_W[name], f"{marker}--", PAPER_COLOUR, f"paper, {NAMES[name]}")
         read = read_swing_powers(phase, name, phase.median_run(name))
-        label = f"ours, read off the {NAMES[name]} run of median power"
-        axes.plot(heights, _divide_by_first(read), f"{marker}:", color=COLOURS[name], label=label)
+        plot(read, f"{marker}:", COLOURS[name], f"ours, read off the {NAMES[name]} run of median power")
     axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / power at 0.015 m [1]")
     axes.legend()
     return figure
 
 
 def read_swing_powers(phase: PhaseFindings, algorithm: str, run: int | None) -> list[float]:
-    """Return the least power found within 0.5 mm of each of the paper's swing heights [W], as read off a search history.
+    """Return the least power of single support within 0.5 mm of each of the paper's swing heights [W].
 
-    Args:
-        phase: single support.
-        algorithm: whose history.
-        run: one run; None for all.
+    It is read off the history of one run of a search, or of all runs for None.
     """
-    heights = SWING_POWER_W[algorithm]
-    return [phase.points[algorithm].cheapest_near(SWING_HEIGHT, height, READING_TOLERANCE_M, run) for height in heights]
-
-
-def _divide_by_first(values: list[float]) -> Array:
-    return np.array(values) / values[0]
+    points = phase.points[algorithm]
+    return [points.cheapest_near(SWING_HEIGHT, at, READING_TOLERANCE_M, run) for at in PAPER.swing_heights_m]
 
 
 def _draw_gait(phase: PhaseFindings) -> Figure:

@@ -139,6 +139,10 @@ class NaoFindings:
         """Single and double support."""
         return self.ssp, self.dsp
 
+    def swing_power(self, height_m: float) -> float:
+        """Return the least power at one of the paper's swing heights [W]."""
+        return next(point.power_W for point in self.swing if point.at == height_m)
+
 
 def choose_sweep_values(
     points: Mapping[str, Points], position: int, optimum: float, counts: tuple[int, int]

@@ -11,7 +11,7 @@ import numpy as np
 
 from compare.analysis.statistics.inference import a12
 from compare.papers.nao import nao_runs
-from compare.papers.nao.nao_claims import check_claims
+from compare.papers.nao.nao_claims import CHECKS
 from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import PHASES, SWING_POWER_W, PrintedPhase
@@ -229,14 +229,11 @@ def _list_gaps(phase: PhaseFindings) -> Rows:
 
 
 REPRODUCTION = Reproduction(
-    template="nao/nao_report.md",
+    name="nao",
     full=NaoEffort(),
-    quick=NaoEffort(
-        runs=3, evaluations=1000, starts=1, lever_starts=1, intervals=4, sweep_starts=1, sweep_points=(0, 0)
-    ),
     run=run_nao,
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    claims=check_claims,
+    checks=CHECKS,
 )

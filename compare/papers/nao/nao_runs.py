@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.nao.nao_paper import DURATIONS_S, PHASES, SSP, SWING_HEIGHT, SWING_POWER_W
+from compare.papers.nao.nao_paper import PAPER, PHASES, SSP, SWING_HEIGHT
 from compare.papers.paper_runs import Effort, make_computation
 from compare.study.record import RunRecord
 from compare.study.run_task import run_task
@@ -102,17 +102,19 @@ def _name_points(task: Task) -> str:
 
 def make_special_sweeps(effort: NaoEffort) -> list[Computation]:
     """Return IPOPT over the paper's swing heights, and over durations of single support."""
-    values = {SWING_SWEEP: (SWING_HEIGHT, SWING_POWER_W["pso"]), DURATION_SWEEP: (SSP.duration, DURATIONS_S)}
+    spec, starts = make_spec(SSP.problem, effort), effort.sweep_starts
     return [
-        make_sweep(name, make_spec(SSP.problem, effort), position, list(at), effort.sweep_starts)
-        for name, (position, at) in values.items()
+        make_sweep(SWING_SWEEP, spec, SWING_HEIGHT, PAPER.swing_heights_m, starts),
+        make_sweep(DURATION_SWEEP, spec, SSP.duration, PAPER.durations_s, starts),
     ]
 
 
 def make_sweep(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Computation:
     """Return a sweep over a variable: its optima lead to each other, so they are not runs by themselves."""
     variable = spec.load().names[position]
-    return make_computation(name, spec, partial(solve_sweep, spec), variable=variable, values=values, starts=starts)
+    return make_computation(
+        name, spec, partial(solve_sweep, spec), variable=variable, values=list(values), starts=starts
+    )
 
 
 def solve_sweep(

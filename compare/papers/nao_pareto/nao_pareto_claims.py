@@ -1,15 +1,16 @@
-"""Claims of the abstract, each checked in both phases with every budget."""
+"""Checks of the abstract's claims in both phases with every budget, by id in ``nao_pareto_claims.toml``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 
 from compare.analysis.statistics.inference import rank_sum
+from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
 from compare.papers.nao_pareto.nao_pareto_findings import NAMES, Measures, ParetoFindings, PhaseFindings
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS
-from compare.papers.reproduction import SIGNIFICANT, Claim, Verdict
 from metaheuristics.array import Array
 
 EARLY = 0.1  # share of the budget that counts as the beginning
@@ -21,77 +22,32 @@ Case = tuple[bool, str]
 """Whether a claim holds in one phase with one budget, and the numbers."""
 
 
-def check_claims(findings: ParetoFindings) -> list[Claim]:
-    """Return all claims, in the order of the abstract."""
-    searches = (
-        (
-            "NSGA-II converges best and gives the best solutions",
-            "it has the least median inverted generational distance and the greatest median hypervolume of the four",
-            _is_best,
-        ),
-        (
-            "CMOPSO is faster at first",
-            f"after {100 * EARLY:.0f} % of the budget its median hypervolume is the greatest",
-            _is_faster,
-        ),
-        (
-            "CMOPSO is competitive",
-            f"its median hypervolume in the end is at most {100 * COMPETITIVE:.0f} % of the front's behind the best",
-            _is_competitive,
-        ),
-        (
-            "DCNSGA-III performs moderately",
-            "in the end it is neither first nor last of the four, by both medians",
-            _is_moderate,
-        ),
-        (
-            "DCNSGA-III has difficulties with the constraints",
-            "the median share of feasible points is the least of the four, significantly below the next",
-            _is_least_feasible,
-        ),
-        (
-            "CMOEA/D converges poorly",
-            "it has the greatest median inverted generational distance and the least median hypervolume of the four",
-            _is_poor,
-        ),
-        (
-            "CMOEA/D needs significantly more computation",
-            "its median processor time is the greatest of the four, significantly above the next",
-            _is_costly,
-        ),
-    )
-    claims = [_make_claim(text, criterion, _check_cases(findings, check)) for text, criterion, check in searches]
-    knees = [(phase.problem.name, _has_two_knees(phase)) for phase in findings.phases]
-    return [
-        *claims,
-        _make_claim(
-            "Two distinct knee regions emerge in single and in double support",
-            "the true front of each phase has two knees: turns of at least 15 degrees within a tenth of its length",
-            knees,
-        ),
-    ]
-
-
-def _make_claim(text: str, criterion: str, cases: Sequence[tuple[str, Case]]) -> Claim:
-    held = sum(holds for _, (holds, _) in cases)
-    verdict, detail = (Verdict.HOLDS if held else Verdict.FAILS), ""
-    if 0 < held < len(cases):
-        verdict, detail = Verdict.HOLDS_IN_PART, f"({held} of {len(cases)} cases)"
-    found = "; ".join(
-        f"{case}: {numbers}: {Verdict.HOLDS if holds else Verdict.FAILS}" for case, (holds, numbers) in cases
-    )
-    return Claim(where="abstract", text=text, criterion=criterion, found=found, verdict=verdict, detail=detail)
-
-
-def _check_cases(findings: ParetoFindings, check: Callable[[dict[str, Measures]], Case]) -> list[tuple[str, Case]]:
-    return [
+def _check(is_true: Callable[[dict[str, Measures]], Case], findings: ParetoFindings) -> Check:
+    """Check a claim about the searches in each phase with each budget."""
+    return _decide(
         (
             f"{phase.problem.name}, {budget:,} evaluations",
-            check({name: phase.measures[name, budget] for name in ALGORITHMS}),
+            is_true({name: phase.measures[name, budget] for name in ALGORITHMS}),
         )
         for phase in findings.phases
         for budget in phase.budgets
-    ]
+    )
+
+
+def _check_knees(findings: ParetoFindings) -> Check:
+    return _decide((phase.problem.name, _has_two_knees(phase)) for phase in findings.phases)
+
+
+def _decide(named_cases: Iterable[tuple[str, Case]]) -> Check:
+    cases = dict(named_cases)
+    held, verdict, detail = sum(holds for holds, _ in cases.values()), Verdict.FAILS, ""
+    if held:
+        verdict = Verdict.HOLDS
+    if 0 < held < len(cases):
+        verdict, detail = Verdict.HOLDS_IN_PART, f"({held} of {len(cases)} cases)"
+    verdicts = {True: Verdict.HOLDS, False: Verdict.FAILS}
+    found = "; ".join(f"{case}: {numbers}: {verdicts[holds]}" for case, (holds, numbers) in cases.items())
+    return decide(verdict, found=found, detail=detail, early=100 * EARLY, competitive=100 * COMPETITIVE)
 
 
 def _is_best(runs: dict[str, Measures]) -> Case:
@@ -174,3 +130,15 @@ def _format_count(value: float) -> str:
 
 def _first(values: dict[str, float], best: Callable[..., str]) -> str:
     return best(values, key=lambda name: values[name])
+
+
+CHECKS: dict[str, Callable[[ParetoFindings], Check]] = {
+    "best": partial(_check, _is_best),
+    "faster": partial(_check, _is_faster),
+    "competitive": partial(_check, _is_competitive),
+    "moderate": partial(_check, _is_moderate),
+    "constrained": partial(_check, _is_least_feasible),
+    "poor": partial(_check, _is_poor),
+    "costly": partial(_check, _is_costly),
+    "knees": _check_knees,
+}

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.units import join_words
+from compare.papers.claims import Verdict
 from compare.papers.nao_pareto import nao_pareto_runs
-from compare.papers.nao_pareto.nao_pareto_claims import NEAR, check_claims
+from compare.papers.nao_pareto.nao_pareto_claims import CHECKS, NEAR
 from compare.papers.nao_pareto.nao_pareto_figures import draw_figures
 from compare.papers.nao_pareto.nao_pareto_findings import (
     EVEN_POINTS,
@@ -28,7 +29,7 @@ from compare.papers.nao_pareto.nao_pareto_runs import (
     make_spec,
 )
 from compare.papers.paper_runs import Runner
-from compare.papers.reproduction import Reproduction, Verdict
+from compare.papers.reproduction import Reproduction
 from compare.questions.pareto.pareto_front import ParetoFront
 from compare.questions.pareto.searches import REFERENCE, Challenge, challenge_front
 from compare.questions.question import Work, find
@@ -79,7 +80,7 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFinding
 def compute_values(findings: ParetoFindings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
     ssp, dsp = findings.phases
-    effort, verdicts = findings.effort, [claim.verdict for claim in check_claims(findings)]
+    effort, verdicts = findings.effort, [claim.verdict for claim in REPRODUCTION.check_claims(findings).values()]
     return {
         "runs": effort.runs,
         "budgets": join_words(f"{budget:,}" for budget in effort.budgets),
@@ -143,12 +144,11 @@ def _make_running(phase: PhaseFindings) -> Rows:
 
 
 REPRODUCTION = Reproduction(
-    template="nao_pareto/nao_pareto_report.md",
+    name="nao_pareto",
     full=ParetoEffort(),
-    quick=ParetoEffort(runs=1, budgets=(200,), points=5, starts=1, intervals=4),
     run=run_pareto,
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    claims=check_claims,
+    checks=CHECKS,
 )

@@ -1,41 +1,75 @@
-"""Claims of others about NAO's walk, each checked against our numbers."""
+"""Findings about NAO's walk, and checks of the claims of others against them, by id in ``nao_walk_claims.toml``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from scipy.stats import fisher_exact
 
-from compare.papers.nao_walk.nao_walk_findings import KNEE, SAGITTAL, NaoWalkFindings
-from compare.papers.nao_walk.nao_walk_runs import KINDS, SPECS
-from compare.papers.nao_walk.nao_walk_sources import (
+from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
+from compare.papers.nao_walk.nao_walk_runs import (
     ACTIVE_MIN,
     BATTERY_WH,
-    DATA_SHEET,
-    DEFAULT_SPEED,
-    KNEES,
-    LOW_POWER,
+    FEED_FORWARD,
+    KINDS,
+    SPECS,
     SPEED_M_S,
-    STRAIGHT,
     TORSO_M,
+    NaoWalkEffort,
+    sum_energy,
 )
-from compare.papers.reproduction import SIGNIFICANT, Claim, Verdict, check_claim
 
+Point = Mapping[str, Any]
+KNEE = "KneePitch"
+SAGITTAL = (KNEE, "HipPitch", "AnklePitch")  # kinds of joints that turn in the plane of the walk
 HEATS = {"sheet": "data sheet", "paper": "paper"}
 
 
-def check_claims(findings: NaoWalkFindings) -> list[Claim]:
-    """Return all claims, in the order of the report."""
-    return [
-        _check_knees(findings),
-        _check_straight(findings),
-        _check_heat(findings),
-        _check_efficient(findings),
-        _check_robust(findings),
-        _check_fast(findings),
-        _check_speed(findings),
-        _check_battery(findings),
-    ]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NaoWalkFindings:
+    """All results."""
+
+    effort: NaoWalkEffort  # what was computed
+    # Cheapest gaits in the order of their speeds, by source of the heat constant.
+    speeds: Mapping[str, Sequence[Point]]
+    torsos: Sequence[Point]  # the robot's own walk in the order of its heights
+    straighter: Mapping[str, Point]  # by heat constant, cheapest gaits at the default speed
+    joints: Mapping[str, Point]  # by gait, energy of its joints
+    drives: Mapping[str, Sequence[Point]]  # by feed-forward, the robot's own walk from full stiffness downwards
+
+    def curve(self, heat: str) -> list[Point]:
+        """Return the feasible gaits over speed."""
+        return [point for point in self.speeds[heat] if point["feasible"]]
+
+    def cheapest(self, heat: str) -> Point:
+        """Return the gait of least cost of transport."""
+        return min(self.curve(heat), key=lambda point: float(point["cost_of_transport"]))
+
+    def at_default(self, heat: str) -> Point:
+        """Return the gait at the default speed."""
+        return next(point for point in self.curve(heat) if point["speed_m_s"] == SPEED_M_S)
+
+    def share(self, gait: str, where: str, heat: str, kind: str = KNEE) -> float:
+        """Return the share of a kind of joint in mechanical energy and heat; ``where`` is ``model`` or ``engine``."""
+        kinds = self.joints[gait][where]
+        return float((kinds[kind]["mechanical"] + kinds[kind][heat]) / sum_energy(kinds.values(), heat))
+
+    def largest(self, gait: str, where: str, heat: str, kinds: Iterable[str] = KINDS) -> str:
+        """Return the kind of joint that draws most."""
+        return max(kinds, key=lambda kind: self.share(gait, where, heat, kind))
+
+    def engine_W(self, gait: str, heat: str) -> float | None:
+        """Return the mean power in the engine [W]; None after a fall."""
+        found = self.joints[gait]
+        energy_J = sum_energy(found["engine"].values(), heat) * found["walked_m"]
+        return None if found["fell_at_s"] is not None else energy_J / found["duration_s"]
+
+    def over_stiffness(self, key: str) -> list[list[Any]]:
+        """Return a result of the robot's own walk from full stiffness downwards, without and with torques fed forward."""
+        return [[point[key] for point in self.drives[name]] for name in FEED_FORWARD]
 
 
 def _judge(holds: Iterable[bool], in_part: Iterable[bool]) -> Verdict:
@@ -44,7 +78,7 @@ def _judge(holds: Iterable[bool], in_part: Iterable[bool]) -> Verdict:
     return Verdict.HOLDS_IN_PART if any(in_part) else Verdict.FAILS
 
 
-def _check_knees(findings: NaoWalkFindings) -> Claim:
+def _check_knees(findings: NaoWalkFindings) -> Check:
     places = [(where, heat) for heat in HEATS for where in ("model", "engine")]
     shares = {place: findings.share("own", *place) for place in places}
     most = {place: findings.largest("own", *place) for place in places}
@@ -55,119 +89,104 @@ def _check_knees(findings: NaoWalkFindings) -> Claim:
         for heat, name in HEATS.items()
     ]
     optimum = [findings.share("optimum-sheet", where, "sheet") for where in ("model", "engine")]
-    return Claim(
-        where=str(KNEES),
-        text="The torque on the knee makes the main contribution to the energy that a gait of NAO consumes (measured on the "
-        "robot)",
-        found=f"share of the knees in the robot's own walk: {'; '.join(found)}. In the optimum at that speed, with K of the "
-        f"data sheet, {optimum[0]:.0%} and {optimum[1]:.0%}",
-        verdict=_judge(
-            [kind == KNEE for kind in most.values()], [kind == KNEE for kind in (*most.values(), *forward.values())]
-        ),
-    )
+    main = [kind == KNEE for kind in most.values()]
+    verdict = _judge(main, [*main, *(kind == KNEE for kind in forward.values())])
+    return decide(verdict, found="; ".join(found), optimum=optimum)
 
 
-def _check_straight(findings: NaoWalkFindings) -> Claim:
+def _check_straight(findings: NaoWalkFindings) -> Check:
     heights = findings.torsos
     own, tallest = next(point for point in heights if point["torso_m"] == TORSO_M), heights[-1]
     best = {heat: min(heights, key=lambda point: float(point[f"{heat}_J_per_m"])) for heat in HEATS}
-    found = []
+    tallest_mm, found = 1000 * tallest["torso_m"], []
     for heat, name in HEATS.items():
-        at_best, at_tallest = (
-            100 * (point[f"{heat}_J_per_m"] / own[f"{heat}_J_per_m"] - 1) for point in (best[heat], tallest)
-        )
+        key = f"{heat}_J_per_m"
+        at_best, at_tallest = (100 * (point[key] / own[key] - 1) for point in (best[heat], tallest))
         found.append(
             f"with K of the {name} least energy at {1000 * best[heat]['torso_m']:.0f} mm, {at_best:+z.1f} %, "
-            f"at {1000 * tallest['torso_m']:.0f} mm {at_tallest:+z.1f} %"
+            f"at {tallest_mm:.0f} mm {at_tallest:+z.1f} %"
         )
     optimum = findings.straighter["sheet"]["free"]
-    gain = 100.0 * (1.0 - optimum["power_W"] / SPEED_M_S / own["sheet_J_per_m"])
-    return Claim(
-        where=str(STRAIGHT),
-        text="A gait that bends the knees least is the most efficient one, better than the maker's",
-        found=f"the robot's own walk with its torso higher than the documented {1000 * TORSO_M:.0f} mm, up to "
-        f"{1000 * tallest['torso_m']:.0f} mm, where legs still reach (knees bent by {tallest['knee_deg']:.0f} instead of "
-        f"{own['knee_deg']:.0f} degrees): {'; '.join(found)}. The optimum with K of the data sheet has "
-        f"{optimum['knee_deg']:.0f} degrees and needs {gain:.0f} % less than that walk",
-        verdict=_judge(
-            [point is tallest for point in best.values()], [point["torso_m"] > TORSO_M for point in best.values()]
-        ),
+    return decide(
+        _judge([point is tallest for point in best.values()], [point["torso_m"] > TORSO_M for point in best.values()]),
+        torso_mm=1000 * TORSO_M,
+        tallest_mm=tallest_mm,
+        tallest=tallest,
+        own=own,
+        found="; ".join(found),
+        optimum=optimum,
+        gain=100.0 * (1.0 - optimum["power_W"] / SPEED_M_S / own["sheet_J_per_m"]),
     )
 
 
-def _check_heat(findings: NaoWalkFindings) -> Claim:
+def _check_heat(findings: NaoWalkFindings) -> Check:
     *heats, _ = findings.straighter
-    least = heats[0]
     free, bounded = ({heat: at[bound] for heat, at in findings.straighter.items()} for bound in ("free", "paper"))
-    rise = 1000.0 * (free["sheet"]["hip_m"] - free[least]["hip_m"])
-    angles = ", ".join(f"{free[heat]['knee_deg']:.1f}" for heat in heats)
-    straighter = free[least]["knee_deg"] - free["sheet"]["knee_deg"]
-    return check_claim(
+    least, sheet = free[heats[0]], free["sheet"]
+    straighter = least["knee_deg"] - sheet["knee_deg"]
+    return decide(
         straighter > 0,
-        where=str(STRAIGHT),
-        text="Torque is what costs: a larger heat constant turns the optimum towards straighter knees",
-        found=f"mean angle of the knees in the optimum at {SPEED_M_S:g} m/s, legs free to stretch, for K = "
-        f"{', '.join(heats)} W/(Nm)^2: {angles} degrees; "
-        f"K of the data sheet: {free['sheet']['knee_deg']:.1f} degrees, the hip {rise:+z.1f} mm against K = {least}. "
-        f"Within the paper's bound on the hip: {bounded[least]['knee_deg']:.1f} and "
-        f"{bounded['sheet']['knee_deg']:.1f} degrees",
-        detail=f"by {straighter:.1f} degrees",
+        speed=SPEED_M_S,
+        heats=", ".join(heats),
+        angles=", ".join(f"{free[heat]['knee_deg']:.1f}" for heat in heats),
+        free=sheet,
+        rise=1000.0 * (sheet["hip_m"] - least["hip_m"]),
+        least=heats[0],
+        bounded=[bounded[heat]["knee_deg"] for heat in (heats[0], "sheet")],
+        straighter=straighter,
     )
 
 
-def _check_efficient(findings: NaoWalkFindings) -> Claim:
-    plain, fed = ([point["sheet_J_per_m"] for point in findings.drives[name]] for name in ("none", "torque"))
-    gain, share = _find_saving(findings, plain)
+def _check_efficient(findings: NaoWalkFindings) -> Check:
+    plain, fed = findings.over_stiffness("sheet_J_per_m")
+    gain, stiffness = _find_saving(findings, plain)
     others, _ = _find_saving(findings, fed)
-    return check_claim(
+    return decide(
         gain > 0.0,
-        where=str(LOW_POWER),
-        text="Limiting each motor's power makes the walk more efficient",
-        found=f"{_list_energies(findings, plain)} on position drives without feed-forward; with torques fed forward "
-        f"{_list_energies(findings, fed)}. The best softer drives change it by {-100 * gain:+z.1f} % (stiffness "
-        f"{share:g}) and {-100 * others:+z.1f} %",
-        detail=f"by {100 * gain:.1f} %",
+        plain=_list_energies(findings, plain),
+        fed=_list_energies(findings, fed),
+        change=-100 * gain,
+        stiffness=stiffness,
+        change_fed=-100 * others,
+        gain=100 * gain,
     )
 
 
-def _check_robust(findings: NaoWalkFindings) -> Claim:
-    plain, fed = ([point["falls"] for point in findings.drives[name]] for name in ("none", "torque"))
-    count = findings.drives["none"][0]["disturbances"]
-    fewest = min(plain[1:])
-    verdict, detail = Verdict.FAILS, ""
-    if fewest < plain[0]:
-        p = fisher_exact([[fewest, count - fewest], [plain[0], count - plain[0]]], alternative="less").pvalue
-        verdict, detail = Verdict.HOLDS, f"({fewest} falls instead of {plain[0]})"
+def _check_robust(findings: NaoWalkFindings) -> Check:
+    plain, fed = findings.over_stiffness("falls")
+    count, full, fewest = findings.drives["none"][0]["disturbances"], plain[0], min(plain[1:])
+    verdict, chance = Verdict.FAILS, ""
+    if fewest < full:
+        p = fisher_exact([[fewest, count - fewest], [full, count - full]], alternative="less").pvalue
+        verdict = Verdict.HOLDS
         if p >= SIGNIFICANT:
-            detail = f"({fewest} falls instead of {plain[0]} may be chance, Fisher: p = {p:.2g})"
-            verdict = Verdict.NOT_SHOWN
-    return Claim(
-        where=str(LOW_POWER),
-        text="Limiting each motor's power makes the walk more robust",
-        found=f"falls in {count} disturbed walks, at stiffness {_list_stiffnesses(findings)}: {', '.join(map(str, plain))} "
-        f"without feed-forward, {', '.join(map(str, fed))} with it",
-        verdict=verdict,
-        detail=detail,
+            verdict, chance = Verdict.NOT_SHOWN, f" may be chance, Fisher: p = {p:.2g}"
+    return decide(
+        verdict,
+        count=count,
+        stiffnesses=_list_stiffnesses(findings),
+        plain=", ".join(map(str, plain)),
+        fed=", ".join(map(str, fed)),
+        fewest=fewest,
+        full=full,
+        chance=chance,
     )
 
 
-def _check_fast(findings: NaoWalkFindings) -> Claim:
-    plain, fed = ([100.0 * point["fastest_m_s"] for point in findings.drives[name]] for name in ("none", "torque"))
+def _check_fast(findings: NaoWalkFindings) -> Check:
+    plain, fed = ([100.0 * speed for speed in speeds] for speeds in findings.over_stiffness("fastest_m_s"))
     full, best = plain[0], max(plain[1:])
-    return check_claim(
+    return decide(
         best > full,
-        where=str(LOW_POWER),
-        text="Limiting each motor's power makes the walk faster",
-        found=f"fastest walk without a fall, by longer steps, at stiffness {_list_stiffnesses(findings)}: "
-        f"{', '.join(f'{speed:.1f}' for speed in plain)} cm/s without feed-forward, "
-        f"{', '.join(f'{speed:.1f}' for speed in fed)} cm/s with it",
-        detail=f"by {100 * (best / full - 1):.0f} %" if full else "",
+        stiffnesses=_list_stiffnesses(findings),
+        plain=", ".join(f"{speed:.1f}" for speed in plain),
+        fed=", ".join(f"{speed:.1f}" for speed in fed),
+        gain=100 * (best / full - 1) if full else math.inf,
     )
 
 
-def _check_speed(findings: NaoWalkFindings) -> Claim:
-    above: list[float] = []
-    found: list[str] = []
+def _check_speed(findings: NaoWalkFindings) -> Check:
+    above, found = [], []
     for heat in SPECS:
         cheapest, default = findings.cheapest(heat), findings.at_default(heat)
         above.append(100.0 * (default["cost_of_transport"] / cheapest["cost_of_transport"] - 1.0))
@@ -176,34 +195,20 @@ def _check_speed(findings: NaoWalkFindings) -> Claim:
             f"with K of the {HEATS[heat]} {default['cost_of_transport']:.3f} there against "
             f"{cheapest['cost_of_transport']:.3f} at {100 * cheapest['speed_m_s']:.1f} cm/s{edge}"
         )
-    return Claim(
-        where=str(DEFAULT_SPEED),
-        text=f"The default walking speed is {100 * SPEED_M_S:.2f} cm/s",
-        found=f"least cost of transport of optimal gaits: {'; '.join(found)}",
-        verdict=Verdict.UNTESTABLE,
-        detail=f"(dearer than the cheapest speed by {above[0]:.1f} % with K of the paper and {above[1]:.1f} % "
-        "with that of the data sheet)",
-    )
+    return decide(Verdict.UNTESTABLE, speed=100 * SPEED_M_S, found="; ".join(found), above=above)
 
 
-def _check_battery(findings: NaoWalkFindings) -> Claim:
+def _check_battery(findings: NaoWalkFindings) -> Check:
     drained = 60.0 * BATTERY_WH / ACTIVE_MIN
-    energies = {name: findings.engine_J_per_m(name, "sheet") for name in ("own-plain", "own")}
-    powers = {
-        name: None if energy is None else energy * walk["walked_m"] / walk["duration_s"]
-        for name, energy in energies.items()
-        for walk in [findings.joints[name]]
-    }
-    found = " and ".join("a fall" if power is None else f"{power:.1f} W" for power in powers.values())
-    share = max((power for power in powers.values() if power is not None), default=0.0) / drained
-    possible = 0.0 < share < 1.0
-    return Claim(
-        where=str(DATA_SHEET),
-        text=f"In active use the battery of {BATTERY_WH:g} Wh lasts {ACTIVE_MIN:.0f} min: {drained:.1f} W",
-        found=f"the motors of the robot's own walk draw, with K of the data sheet, {found} in the engine (without and with "
-        "feed-forward); computer, boards, friction and gears are not modelled",
-        verdict=Verdict.UNTESTABLE if possible else Verdict.FAILS,
-        detail=f"(no contradiction: at most {share:.0%} of it)" if possible else "",
+    powers = [findings.engine_W(name, "sheet") for name in ("own-plain", "own")]
+    share = max((power for power in powers if power is not None), default=0.0) / drained
+    return decide(
+        Verdict.UNTESTABLE if 0.0 < share < 1.0 else Verdict.FAILS,
+        battery_Wh=BATTERY_WH,
+        active_min=ACTIVE_MIN,
+        drained=drained,
+        found=" and ".join("a fall" if power is None else f"{power:.1f} W" for power in powers),
+        share=share,
     )
 
 
@@ -225,3 +230,15 @@ def _list_energies(findings: NaoWalkFindings, energies: Sequence[float | None]) 
 
 def _list_stiffnesses(findings: NaoWalkFindings) -> str:
     return ", ".join(f"{share:g}" for share in findings.effort.stiffnesses)
+
+
+CHECKS = {
+    "knees": _check_knees,
+    "straight": _check_straight,
+    "heat": _check_heat,
+    "efficient": _check_efficient,
+    "robust": _check_robust,
+    "fast": _check_fast,
+    "speed": _check_speed,
+    "battery": _check_battery,
+}

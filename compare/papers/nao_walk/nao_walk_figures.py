@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from compare.drawing.figures import COLOURS, new_figure
-from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
-from compare.papers.nao_walk.nao_walk_runs import KINDS
-from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S
+from compare.papers.nao_walk.nao_walk_claims import NaoWalkFindings
+from compare.papers.nao_walk.nao_walk_runs import KINDS, SPEED_M_S
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,14 +51,8 @@ def _draw_speeds(findings: NaoWalkFindings) -> Figure:
     axes = figure.subplots()
     for heat, name, colour in (("paper", "paper", COLOURS["pso"]), ("sheet", "data sheet", COLOURS["ga"])):
         curve = findings.curve(heat)
-        speeds = [100.0 * point["speed_m_s"] for point in curve]
-        axes.plot(
-            speeds,
-            [point["cost_of_transport"] for point in curve],
-            "o-",
-            color=colour,
-            label=f"optimum, K of the {name}",
-        )
+        speeds, costs = [100.0 * at["speed_m_s"] for at in curve], [at["cost_of_transport"] for at in curve]
+        axes.plot(speeds, costs, "o-", color=colour, label=f"optimum, K of the {name}")
     axes.axvline(100.0 * SPEED_M_S, color="#808080", ls="--", label="default speed")
     axes.set(xlabel="speed [cm/s]", ylabel="cost of transport P / (m g v)")
     axes.set_ylim(bottom=0.0)

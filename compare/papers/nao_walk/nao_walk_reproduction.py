@@ -5,24 +5,28 @@ from __future__ import annotations
 from typing import Any
 
 from compare.analysis.units import join_words
-from compare.papers.nao_walk import nao_walk_runs, nao_walk_sources
-from compare.papers.nao_walk.nao_walk_claims import HEATS, check_claims
+from compare.papers.nao_walk import nao_walk_runs
+from compare.papers.nao_walk.nao_walk_claims import CHECKS, HEATS, NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_figures import draw_figures
-from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_runs import (
     FEED_FORWARD,
     FRICTIONS,
     KINDS,
+    LIFT_M,
     MASS_FACTORS,
     PUSHES_NS,
     SLOPES_DEG,
     SPECS,
+    SPEED_M_S,
+    STEP_M,
+    STRETCHED_M,
+    TORSO_M,
     NaoWalkEffort,
+    make_footsteps,
     make_gait_computations,
     make_walk_computations,
     sum_energy,
 )
-from compare.papers.nao_walk.nao_walk_sources import LIFT_M, SPEED_M_S, STEP_M, STRETCHED_M, TORSO_M, make_footsteps
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
 from compare.report.document import Rows
@@ -41,7 +45,7 @@ def run_nao_walk(runner: Runner, effort: NaoWalkEffort) -> NaoWalkFindings:
         InputError: no optimal gait was found at the default speed.
     """
     load_mujoco()  # fail before the work if it is missing
-    code = (nao_walk_runs, nao_walk_sources, cart_table, recorded_cycle, drive, simulate)
+    code = (nao_walk_runs, cart_table, recorded_cycle, drive, simulate)
     gaits = runner.compute(make_gait_computations(effort), code)
     speeds = {heat: gaits[f"speeds-{heat}"] for heat in SPECS}
     optima = {}
@@ -148,20 +152,11 @@ def _make_joints(findings: NaoWalkFindings) -> Rows:
 
 
 REPRODUCTION = Reproduction(
-    template="nao_walk/nao_walk_report.md",
+    name="nao_walk",
     full=NaoWalkEffort(),
-    quick=NaoWalkEffort(
-        starts=1,
-        speeds_m_s=(0.08, SPEED_M_S),
-        torsos_m=(TORSO_M, 0.32),
-        heats=(0.025,),
-        stiffnesses=(1.0, 0.5),
-        steps_m=(STEP_M,),
-        walked=2,
-    ),
     run=run_nao_walk,
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    claims=check_claims,
+    checks=CHECKS,
 )

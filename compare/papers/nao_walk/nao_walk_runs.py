@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from scipy.integrate import trapezoid
 
-from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, STRETCHED_M, make_footsteps
 from compare.papers.paper_runs import Effort, make_computation
 from compare.questions.question import find
 from compare.questions.sweep import Axis
@@ -29,6 +28,16 @@ from nlp_gait.simulation.measurements import planned_distance, walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
 
+# The walk that the maker documents, by the sources of ``nao_walk_claims.toml``; without another source, by Aldebaran's
+# documentation of NAOqi: omni-directional walk, locomotion control (read: beginnings of the pages of several versions; the
+# default height of a step only in programs that set it).
+SPEED_M_S = 0.0952  # the source of ``speed``
+STEP_M = 0.040
+DOUBLE_SHARE = 1.0 / 3.0  # of a step's time
+TORSO_M = 0.315
+LIFT_M = 0.020
+BATTERY_WH, ACTIVE_MIN = 62.5, 60.0  # the source of ``battery``
+STRETCHED_M = 0.334  # greatest height of the hip, with stretched legs: Gupta, Pratihar, Deb (2023), section 4.1
 CYCLE = "nao-cycle"
 SPECS = {  # by source of the heat constant K
     "paper": ProblemSpec(name=CYCLE, options={"objective": "power"}),
@@ -216,6 +225,18 @@ def simulate_drives(
         "disturbances": len(disturbances),
         "fastest_m_s": fastest,
     }
+
+
+def make_footsteps(step_m: float = STEP_M, torso_m: float = TORSO_M) -> Footsteps:
+    """Return the footsteps of the robot's own walk, which plans the ZMP of an inverted pendulum."""
+    period_s = STEP_M / SPEED_M_S
+    return Footsteps(
+        step_m=step_m,
+        single_s=(1.0 - DOUBLE_SHARE) * period_s,
+        double_s=DOUBLE_SHARE * period_s,
+        hip_height_m=torso_m,
+        lift_m=LIFT_M,
+    )
 
 
 @cache

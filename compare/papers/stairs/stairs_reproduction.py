@@ -137,7 +137,7 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
         "jerk": [_list_jerk(findings, case) for case in findings.cases],
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
-        "differences": [_list_differences(findings, case) for case in findings.cases],
+        "angle-differences": [_list_differences(findings, case) for case in findings.cases],
         **{name: _list_results(findings, *picked) for name, picked in PICKED.items()},
     }
 
@@ -258,24 +258,8 @@ def _list_network(network: Mapping[str, Any]) -> Rows:
 
 
 REPRODUCTION = Reproduction(
-    template="stairs/stairs_report.md",
+    name="stairs",
     full=StairsEffort(),
-    quick=StairsEffort(
-        cases=(2,),  # the one that the paper draws where it draws one only
-        plan_starts=1,
-        jerk_starts=1,
-        hip_starts=1,
-        ideal_starts=1,
-        runs=2,
-        plan_evaluations=200,
-        track_evaluations=60,
-        track_settings={"iterations": 1, "hessian": "limited-memory", "compiled": False},
-        other_stairs=((0.30, 0.10),),
-        other_starts=1,
-        poses=3,
-        plan_intervals=16,
-        ideal_intervals=10,
-    ),
     run=run_stairs,
     values=compute_values,
     tables=make_tables,

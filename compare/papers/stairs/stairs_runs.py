@@ -65,7 +65,7 @@ class StairsEffort(Effort):
     plan_evaluations: int = 10_000
     track_evaluations: int = ANTS * ITERATIONS  # as in the paper
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
-    track_settings: Mapping[str, float | str] = field(default_factory=lambda: {"time_limit_s": 1200.0})
+    track_settings: Mapping[str, Any] = field(default_factory=lambda: {"time_limit_s": 1200.0})
     # Tread and rise of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
     other_stairs: tuple[tuple[float, float], ...] = (
         (0.30, 0.10),

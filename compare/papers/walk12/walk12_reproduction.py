@@ -252,9 +252,8 @@ def _list_table_4(findings: Walk12Findings) -> Rows:
 
 
 REPRODUCTION = Reproduction(
-    template="walk12/walk12_report.md",
+    name="walk12",
     full=Walk12Effort(),
-    quick=Walk12Effort(starts=2, runs=2, pso_evaluations=500, weights=(0.2, 0.7, 1.0), lengths_m=(0.05, 0.09, 0.13)),
     run=run_walk12,
     values=compute_values,
     tables=make_tables,

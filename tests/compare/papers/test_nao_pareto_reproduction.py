@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.papers.nao_pareto.nao_pareto_claims import check_claims
+from compare.papers.claims import Verdict
 from compare.papers.nao_pareto.nao_pareto_findings import Measures, ParetoFindings, spread_evenly
+from compare.papers.nao_pareto.nao_pareto_reproduction import REPRODUCTION
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, choose_looks
-from compare.papers.reproduction import Verdict
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
 
@@ -29,7 +29,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
         "running-nao-ssp fronts-nao-ssp running-nao-dsp fronts-nao-dsp",
         " ".join(["claims", "fronts", *tables]),
     )
-    assert all(claim.text in finished.report for claim in check_claims(finished.findings))
+    assert all(claim.text in finished.report for claim in REPRODUCTION.check_claims(finished.findings).values())
     assert all(
         len(phase.runs) == len(ALGORITHMS) and all(map(len, phase.runs.values())) for phase in finished.findings.phases
     )
@@ -55,6 +55,10 @@ def test_a_second_call_computes_only_what_is_missing(finished: Finished) -> None
     assert recompute(finished) == ["nao-dsp-cmoead-200-00", "figures, tables and report"]
     again, before = (re.sub(r'"(objective_)?time_s": [\d.e-]+', "", text) for text in (path.read_text(), stored))
     assert again.partition('"result_sha256"')[0] == before.partition('"result_sha256"')[0]
+
+
+def list_verdicts(findings: ParetoFindings) -> list[str]:
+    return [claim.verdict for claim in REPRODUCTION.check_claims(findings).values()]
 
 
 @pytest.mark.slow
@@ -84,9 +88,9 @@ def test_verdicts_follow_from_the_numbers(finished: Finished) -> None:
         return replace(findings, phases=tuple(phases))
 
     right = made(("NSGA2", "CMOPSO", "DCNSGA3", "CMOEAD"), "CMOEAD", "DCNSGA3", "CMOPSO")
-    assert [claim.verdict for claim in check_claims(right)][:-1] == [Verdict.HOLDS] * 7
+    assert list_verdicts(right)[:-1] == [Verdict.HOLDS] * 7
     wrong = made(("DCNSGA3", "CMOEAD", "NSGA2", "CMOPSO"), "NSGA2", "CMOPSO", "NSGA2")
-    assert [claim.verdict for claim in check_claims(wrong)][:-1] == [Verdict.FAILS] * 7
+    assert list_verdicts(wrong)[:-1] == [Verdict.FAILS] * 7
 
 
 def test_distances_are_measured_from_points_evenly_along_the_front() -> None:

@@ -10,7 +10,6 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.papers.nao.nao_claims import check_claims
 from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import DSP, PHASES, SSP
 from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12
@@ -75,7 +74,7 @@ def test_the_full_effort_counts_all_its_steps() -> None:
 
 
 def verdict(findings: NaoFindings, start: str) -> str:
-    (claim,) = [claim for claim in check_claims(findings) if claim.text.startswith(start)]
+    (claim,) = [claim for claim in REPRODUCTION.check_claims(findings).values() if claim.text.startswith(start)]
     return f"{claim.verdict} {claim.detail}".rstrip()
 
 

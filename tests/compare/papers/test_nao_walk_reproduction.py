@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
+from compare.papers.claims import Verdict
 from compare.papers.nao_walk import nao_walk_runs
-from compare.papers.nao_walk.nao_walk_claims import check_claims
-from compare.papers.nao_walk.nao_walk_findings import NaoWalkFindings
+from compare.papers.nao_walk.nao_walk_claims import NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_reproduction import REPRODUCTION
 from compare.papers.nao_walk.nao_walk_runs import (
     KINDS,
+    SPEED_M_S,
+    make_footsteps,
     plan_own_walk,
     simulate_joints,
     sum_energy,
 )
-from compare.papers.nao_walk.nao_walk_sources import SPEED_M_S, make_footsteps
-from compare.papers.reproduction import Verdict
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.simulation.measurements import predict_power
 from nlp_gait.simulation.plan import make_plan
@@ -66,8 +66,8 @@ def make_findings(**changes: Any) -> NaoWalkFindings:
 
 
 def test_verdicts_follow_the_numbers() -> None:
-    holding = [claim.verdict for claim in check_claims(make_findings())]
-    assert [str(verdict) for verdict in holding] == ["holds"] * 6 + ["cannot be tested here"] * 2
+    holding = [claim.verdict for claim in REPRODUCTION.check_claims(make_findings()).values()]
+    assert holding == ["holds"] * 6 + ["cannot be tested here"] * 2
     turned = make_findings(
         torsos=[
             {**at, "paper_J_per_m": 100 * at["torso_m"], "sheet_J_per_m": 100 * at["torso_m"]}
@@ -77,12 +77,14 @@ def test_verdicts_follow_the_numbers() -> None:
         joints={name: drawn(0.5, 100.0) for name in make_findings().joints},
         drives={name: [drive(100.0, 5, 0.12), drive(None, 9, 0.1)] for name in ("none", "torque")},
     )
-    verdicts = [claim.verdict for claim in check_claims(turned)]
+    claims = REPRODUCTION.check_claims(turned)
+    verdicts = [claim.verdict for claim in claims.values()]
     assert verdicts[:6] == ["does not hold"] * 6 and verdicts[-1] == "does not hold"
-    assert "100.0, falls J/m" in check_claims(turned)[3].found
+    assert "100.0, falls J/m" in claims["efficient"].found
     close = make_findings(drives={name: [drive(100.0, 1, 0.1), drive(90.0, 0, 0.12)] for name in ("none", "torque")})
-    assert check_claims(close)[4].verdict == Verdict.NOT_SHOWN
-    assert check_claims(close)[4].detail == "(0 falls instead of 1 may be chance, Fisher: p = 0.5)"
+    robust = REPRODUCTION.check_claims(close)["robust"]
+    assert robust.verdict == Verdict.NOT_SHOWN
+    assert robust.detail == "(0 falls instead of 1 may be chance, Fisher: p = 0.5)"
 
 
 def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_joint() -> None:

@@ -23,7 +23,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "tradeoff fig08 fig09 fig10 fig12-13 fig14-15 fig16-17 circle",
-        "table3-paper table3-model table4 gaits walk-straight walk-circle",
+        "table3-paper table3-model table4 gaits differences walk-straight walk-circle",
     )
 
 
