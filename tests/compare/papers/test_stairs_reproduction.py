@@ -20,7 +20,8 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "fig03 fig06-07 fig08-09 fig10-11 fig12 fig13 fig14-20 fig21-27 fig28 fig29",
-        "table3 table4 plans fixed-hip tracks printed-scheme ideal replay jerk other-stairs network learned differences angle-differences",
+        "table3 table4 plans fixed-hip tracks printed-scheme ideal replay jerk other-stairs network learned differences "
+        "angle-differences",
     )
 
 
