@@ -14,7 +14,7 @@ from compare.questions.pareto.front import solve_front
 
 problem = nlp_gait.load("nao-dsp")
 margin = make_competing_objective("dbm_y_mean", problem)
-front = solve_front(problem, margin, points=7, starts=1)
+front = solve_front(problem, margin, points=5, starts=1)
 for point in front:
     print(f"{1000 * point.value:6.2f} mm: {point.power_W:.4f} W, the next millimetre for {point.price / 1000:.4f} W")
 

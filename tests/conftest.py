@@ -1,5 +1,6 @@
 """Settings of every test."""
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
@@ -13,11 +14,15 @@ from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
+from tests.compare.pictures import save_coarsely
 from tests.extras import skip_without_extra
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
 settings.load_profile("reproducible")
+
+# Else each worker and each process that a test starts compiles every module again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # A shell ignores Ctrl-C for what it runs in the background, and so would all that the tests of it start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -57,6 +62,12 @@ def pytest_fixture_setup() -> Iterator[Any]:
     except Exception as error:
         skip_without_extra(error)
         raise
+
+
+@pytest.fixture
+def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw each picture of a page once and small, for tests that write many pages and do not measure their pictures."""
+    monkeypatch.setattr("compare.report.writing.save", save_coarsely)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-from scipy.stats import spearmanr
 
 import nlp_gait
 from benchmarks.engine.gaits import PAPER, optimal_cycles, phase_gaits, random_gaits
@@ -137,6 +136,8 @@ def ranking() -> Iterator[str]:
 
     The papers have no torque limits, and a random gait may need more than a drive's limit: "beyond limit".
     """
+    from scipy.stats import spearmanr  # costs a second to import
+
     yield header(
         "problem", "drive", "beyond limit", "fall", "Spearman", "error, mean", "largest", "model W, least to most"
     )

@@ -18,6 +18,7 @@ from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_f
 from tests.faults.processes import ROOT
 
 RUN = CliRunner()
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 STUDY = (
     "compare",
     "walk12",
@@ -105,7 +106,7 @@ def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
     )
     kept = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME", FOLDER_VARIABLE)}
     done = subprocess.run(
-        [sys.executable, "-m", "nlp_gait", *STUDY, "--out", str(tmp_path / "study")],
+        [sys.executable, "-m", "nlp_gait", *STUDY, "--runs", "1", "--algorithms", "pso", "--out", str(tmp_path / "study")],
         cwd=ROOT,
         env={**kept, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
         capture_output=True,
