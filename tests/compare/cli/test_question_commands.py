@@ -19,7 +19,7 @@ from tests.compare.cli.calls import nlp_gait, one_sentence
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 # Three free variables, so that both the front and a search of one generation take no time.
-SMALL = ["nao-ssp", "--intervals", "2", "--starts", "1", "--seed", "0"]
+SMALL = ["nao-ssp", "--intervals", "4", "--starts", "1", "--seed", "0"]
 FIXED = {
     "hip_height_m": 0.31,
     "hip_vz_start_m_s": -0.00122,

@@ -138,7 +138,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def small() -> GaitProblem:
     """Three free variables, so that a search of some hundred evaluations comes near the front."""
-    problem = nlp_gait.load("nao-ssp", intervals=2)
+    problem = nlp_gait.load("nao-ssp", intervals=4)
     fixed = dict(zip(problem.names, X, strict=True))
     free = ("hip_vy_start_m_s", "hip_vy_end_m_s", "single_support_time_s")
     return problem.fix(**{name: value for name, value in fixed.items() if name not in free})
