@@ -106,7 +106,18 @@ def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
     )
     kept = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME", FOLDER_VARIABLE)}
     done = subprocess.run(
-        [sys.executable, "-m", "nlp_gait", *STUDY, "--runs", "1", "--algorithms", "pso", "--out", str(tmp_path / "study")],
+        [
+            sys.executable,
+            "-m",
+            "nlp_gait",
+            *STUDY,
+            "--runs",
+            "1",
+            "--algorithms",
+            "pso",
+            "--out",
+            str(tmp_path / "study"),
+        ],
         cwd=ROOT,
         env={**kept, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
         capture_output=True,

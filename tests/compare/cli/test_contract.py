@@ -61,7 +61,9 @@ def test_solve_search_and_compare(tmp_path):
     assert [run["seed"] for run in runs] == [3, 4]
     assert all({"claimed_objective", "claimed_violation", "evaluations", "time_s", "x"} <= set(run) for run in runs)
     out = tmp_path / "study"
-    nlp_gait("compare", "nao-ssp", "--runs", "2", "--starts", "1", "--evaluations", "500", "--jobs", "1", "--out", str(out))
+    nlp_gait(
+        "compare", "nao-ssp", "--runs", "2", "--starts", "1", "--evaluations", "500", "--jobs", "1", "--out", str(out)
+    )
     assert (out / "report.md").read_text().count("| pso | 2 |") == 1
     assert "<svg" in (out / "report.html").read_text()
     assert (out / "nao-ssp-convergence.png").stat().st_size > 10_000
