@@ -54,7 +54,7 @@ def make_traces(solver: SolverRuns) -> Iterator[Trace]:
     for record, curve in zip(solver.records, solver.curves, strict=True):
         best = {1: NOTHING_FEASIBLE}
         for evaluations, gap in zip(curve.evaluations.tolist(), curve.gap.tolist(), strict=True):
-            if max(gap, SMALLEST) < min(best.values()):
+            if max(gap, SMALLEST) < next(reversed(best.values())):
                 best[max(1, math.ceil(evaluations))] = max(gap, SMALLEST)
         total = max(1, math.ceil(curve.total_cost()))
         yield Trace(run=record.run, x=tuple(record.x.values()), lines=tuple(best.items()), total=total)

@@ -8,7 +8,7 @@ from compare.analysis.comparison import Comparison
 from compare.analysis.solver_table import count, percent
 from compare.analysis.statistics.run_length import TARGETS
 from compare.bench.baseline import EVALUATIONS, RUNS
-from compare.bench.leaderboard import Leaderboard, Standing
+from compare.bench.leaderboard import Leaderboard
 from compare.drawing.distributions import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, text_table
 from nlp_gait import gaitbench
@@ -51,7 +51,8 @@ def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) ->
 
 def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
     """Return the result of a solver in sentences."""
-    place, standing = board.place(solver), _standing(board, solver)
+    place = board.place(solver)
+    standing = board.standings[place - 1]
     duels = board.duels(solver)
     won = sum(duel.better > duel.worse for duel in duels)
     lost = sum(duel.worse > duel.better for duel in duels)
@@ -119,7 +120,3 @@ def _make_duels(board: Leaderboard, solver: str) -> Section:
             text_table(header, rows),
         ),
     )
-
-
-def _standing(board: Leaderboard, solver: str) -> Standing:
-    return next(standing for standing in board.standings if standing.solver == solver)

@@ -66,7 +66,7 @@ class StudySettings:
                     seed=self.seed,
                     label=solver.label,
                 )
-                runs = range(self._runs(solver))
+                runs = range(solver.runs or (self.starts if solver.name in GRADIENT_SOLVERS else self.runs))
                 tasks += [replace(task, run=run) for run in runs]
                 if solver.polish:
                     polish = replace(
@@ -89,11 +89,6 @@ class StudySettings:
             "seed": self.seed,
             **{key: value for key, value in asdict(self.stop).items() if value is not None},
         }
-
-    def _runs(self, solver: SolverSpec) -> int:
-        if solver.runs is not None:
-            return solver.runs
-        return self.starts if solver.name in GRADIENT_SOLVERS else self.runs
 
 
 def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:

@@ -189,12 +189,10 @@ class Task:
             SearchError: it is not an algorithm, or does not take the settings.
             UserCodeError: user code cannot be found or fails.
         """
-        if not isinstance(self.solver, str):
-            return as_algorithm(self.solver, self.title, self.settings)
-        if self.is_user_code:
-            own = load_object(self.solver, "algorithm")
-            return as_algorithm(own, self.title, self.settings)
-        return algorithm(self.solver, **self.settings)
+        own = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
+        if isinstance(own, str):
+            return algorithm(own, **self.settings)
+        return as_algorithm(own, self.title, self.settings)
 
     def make_solver(self) -> Solver:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""

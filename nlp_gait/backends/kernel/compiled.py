@@ -35,16 +35,6 @@ class CompiledObjective:
 
     Several threads and forked processes may call it. It can be pickled if its problem can be: it is compiled, or loaded from the
     cache folder, where it is unpickled.
-
-    Attributes:
-        problem: with the parameter values to use.
-        names: (n,) variables.
-        lower: (n,) current lower bounds.
-        upper: (n,) current upper bounds.
-        row_names: (m,) constraint rows, in the order of ``constraints``.
-        groups: (m - n,) what each row of ``inequalities`` belongs to: its name without the place.
-        backend: ``"compiled"`` or ``"interpreted"``.
-        description: backend, compiler and lane count, in words.
     """
 
     def __init__(
@@ -56,18 +46,19 @@ class CompiledObjective:
     ) -> None:
         """Use ``compile_objective`` instead; ``rebuild`` makes this objective from its problem."""
         kernel = build_kernel(problem)
-        self.problem = problem
-        self.names = problem.names
-        self.lower = problem.lower
-        self.upper = problem.upper
-        self.row_names = kernel.model.row_names
+        self.problem = problem  #: with the parameter values to use
+        self.names = problem.names  #: (n,) variables
+        self.lower = problem.lower  #: (n,) current lower bounds
+        self.upper = problem.upper  #: (n,) current upper bounds
+        self.row_names = kernel.model.row_names  #: (m,) constraint rows, in the order of ``constraints``
         self.backend: Literal["compiled", "interpreted"] = (
             "compiled" if isinstance(evaluator, NativeKernel) else "interpreted"
         )
-        self.description = evaluator.description
+        self.description = evaluator.description  #: backend, compiler and lane count, in words
         self._evaluator = evaluator
         self._lower, self._upper = kernel.row_bounds(problem)
         self._weights = kernel.weights
+        #: (m - n,) what each row of ``inequalities`` belongs to: its name without the place
         self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
         self._p = np.array(problem.p)
         self._threads = threads
