@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -79,18 +78,18 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
         return Guarantee(satisfied=None, reason=str(error))
     results = [_search_phase(problem, phase, np.asarray(x, dtype=float)) for phase in phases]
     means: dict[str, tuple[float, float]] = {}
-    for result in results:
-        for name, (low, high) in result.means.items():
+    for _, phase_means, _ in results:
+        for name, (low, high) in phase_means.items():
             before = means.get(name, (0.0, 0.0))
             means[name] = (before[0] + low, before[1] + high)
-    violations = tuple(sorted((v for result in results for v in result.violations), key=lambda v: v.from_s))
+    violations = tuple(sorted((v for found, _, _ in results for v in found), key=lambda v: v.from_s))
     proven = any(v.least > FEASIBILITY_TOLERANCE for v in violations)
     return Guarantee(
         satisfied=False if proven else None if violations else True,
         violations=violations,
         sampled=tuple(dict.fromkeys(name for phase in phases for name in phase.sampled)),
         means=means,
-        pieces=sum(result.pieces for result in results),
+        pieces=sum(pieces for _, _, pieces in results),
     )
 
 
@@ -98,41 +97,40 @@ def _build_time_functions(problem: GaitProblem) -> list[TimeFunctions]:
     return [make_time_functions(problem, rows) for rows in problem.rows_over_time]
 
 
-class _PhaseResult(NamedTuple):
-    violations: list[RowViolation]
-    means: dict[str, tuple[float, float]]
-    pieces: int
-
-
-def _search_phase(problem: GaitProblem, phase: TimeFunctions, x: Array) -> _PhaseResult:
+def _search_phase(
+    problem: GaitProblem, phase: TimeFunctions, x: Array
+) -> tuple[list[RowViolation], dict[str, tuple[float, float]], int]:
+    """Return violations, bounds of means by name, and the number of pieces."""
     start, end = phase.source.times({**problem.by_name(x), **problem.parameter_values})
     step = round(1.0 / phase.source.intervals / GRAIN) * GRAIN
     given = np.concatenate([x, problem.p])
-    result = _PhaseResult([], {}, 0)
-    for rows, plain, shift in ((phase.instants, phase.plain, None), (phase.changes, len(phase.changes.names), step)):
-        if rows.values is None:
+    violations: list[RowViolation] = []
+    means: dict[str, tuple[float, float]] = {}
+    pieces = 0
+    for rows, shift in ((phase.instants, None), (phase.changes, step)):
+        if rows is None:
             continue
-        lower, upper = rows.bound(problem.p)
-        search = TimeSearch(rows.values, given, shift, lower[:plain], upper[:plain])
+        plain, (lower, upper) = rows.plain, rows.bound(problem.p)
+        search = TimeSearch(rows, given, shift, lower[:plain], upper[:plain])
         search.run(make_pieces(phase.source.kinks, shift))
         limits = np.stack([lower[plain:], upper[plain:]], axis=-1)
         limits[[k - plain for k in phase.squares if shift is None]] **= 2
         search.sharpen_integrals(limits)
-        result = result._replace(pieces=result.pieces + search.count)
+        pieces += search.count
         for k, (a, b) in sorted(search.first.items()):
             piece = start + a * (end - start), start + b * (end - start)
-            result.violations.append(_violation(rows, k, piece, float(search.least[k]), float(search.most[k])))
+            violations.append(_violation(rows, k, piece, float(search.least[k]), float(search.most[k])))
         for k, (low, high) in enumerate(zip(*search.integrals(), strict=True), start=plain):
             if k in phase.squares:
                 low, high = np.sqrt(max(low, 0.0)) * (1 - ROUNDING), np.sqrt(max(high, 0.0)) * (1 + ROUNDING)
             if not rows.units[k]:
                 if np.isfinite(low) and np.isfinite(high):
-                    result.means[rows.names[k]] = (float(low), float(high))
+                    means[rows.names[k]] = (float(low), float(high))
                 continue
             most, least = (float(v) for v in bound_violation(lower[k], upper[k], low, high))
             if not most <= FEASIBILITY_TOLERANCE:
-                result.violations.append(_violation(rows, k, (start, end), least, most))
-    return result
+                violations.append(_violation(rows, k, (start, end), least, most))
+    return violations, means, pieces
 
 
 def _violation(rows: TimeRows, k: int, piece: tuple[float, float], least: float, most: float) -> RowViolation:

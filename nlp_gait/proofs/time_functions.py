@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -16,24 +16,50 @@ from nlp_gait.proofs.boxes import Numbers
 from nlp_gait.symbolic.nonsmooth import Exact
 
 
-class Enclosed:
-    """Enclosed function of several values, and of groups of them where that is far less work."""
+class EnclosedPart(NamedTuple):
+    """Group of values."""
 
-    def __init__(self, function: ca.Function, half_open: Collection[int], groups: Sequence[Sequence[int]]) -> None:
-        """Read the instructions of a function of SX expressions with one result.
+    function: AffineFunction  # computes them, and possibly others
+    columns: Numbers  # indices of the group in the function's results
+    work: float  # of an evaluation, relative to that of all values
+
+
+class TimeRows:
+    """Enclosed functions of time of one kind: rows of every time, and other values whose time means are bounded."""
+
+    def __init__(
+        self, plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], kinks: bool
+    ) -> None:
+        """Read the instructions of a function of (x, p, phase) or (x, p, phase, phase an interval later).
 
         Raises:
             InputError: an operation that cannot be enclosed.
             CompilerError: there is no compiler, or it fails.
         """
-        self.whole = AffineFunction(function, half_open)
-        self.groups = [np.array(group) for group in groups]  # indices of the values of each
-        self._function, self._half_open = function, half_open
+        names, units, values, lower, upper = zip(*plain, *others, strict=True)
+        self.names, self.units, self.plain = names, units, len(plain)  # no unit: an index, which has no bounds
+        self._bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
+        function = ca.Function("rows", list(inputs), [ca.vertcat(*values)])
+        arguments = function.sx_in()
+        self._function = ca.Function("rows", arguments, ca.cse([ca.densify(v) for v in function.call(arguments)]))
+        first = int(inputs[0].numel() + inputs[1].numel())
+        self._half_open = range(first, first + len(inputs) - 2) if kinks else ()
+        self.whole = AffineFunction(self._function, self._half_open)
+        groups: dict[str, list[int]] = {}
+        for k, (name, *_) in enumerate(plain):
+            groups.setdefault(name.partition("[")[0], []).append(k)
+        self.groups = [np.array(group) for group in groups.values()]  # indices of the rows with one name
         self._parts: dict[int, EnclosedPart] = {}
 
     @lock_casadi
+    def bound(self, p: Array) -> tuple[Array, Array]:
+        """Return lower and upper bounds (m,) for parameter values."""
+        lower, upper = (np.array(bound, dtype=float).ravel() for bound in self._bounds(p))
+        return lower, upper
+
+    @lock_casadi
     def part(self, group: int) -> EnclosedPart:
-        """Return a group of values: a function of its own if that takes less than half of all instructions."""
+        """Return a group of rows: a function of its own if that takes less than half of all instructions."""
         if group not in self._parts:
             rows, arguments = self.groups[group], self._function.sx_in()
             (values,) = self._function.call(arguments)
@@ -46,37 +72,13 @@ class Enclosed:
         return self._parts[group]
 
 
-class EnclosedPart(NamedTuple):
-    """Group of values."""
-
-    function: AffineFunction  # computes them, and possibly others
-    columns: Numbers  # indices of the group in the function's results
-    work: float  # of an evaluation, relative to that of all values
-
-
-class TimeRows(NamedTuple):
-    """Functions of time of one kind: (x, p, phase) or (x, p, phase, phase an interval later) to values."""
-
-    names: tuple[str, ...]  # of the values
-    units: tuple[str, ...]  # of the values; empty for indexes, which have no bounds
-    values: Enclosed | None  # enclosed; rows of every time with one name are a group. None if there are none
-    bounds: ca.Function  # p to lower and upper bounds
-
-    @lock_casadi
-    def bound(self, p: Array) -> tuple[Array, Array]:
-        """Return lower and upper bounds (m,) for parameter values."""
-        lower, upper = (np.array(bound, dtype=float).ravel() for bound in self.bounds(p))
-        return lower, upper
-
-
 class TimeFunctions(NamedTuple):
     """Rows over time of one phase as enclosed functions."""
 
     source: RowsOverTime  # the rows over time
-    instants: TimeRows  # rows of each instant, followed by those values whose time means are rows or indexes
-    plain: int  # number of the rows of instants
+    instants: TimeRows | None  # rows of each instant, and values whose time means are rows or indexes
     squares: frozenset[int]  # indices of squares whose mean limits a root mean square
-    changes: TimeRows  # rows of each interval
+    changes: TimeRows | None  # rows of each interval
     sampled: tuple[str, ...]  # rows that are defined on samples only
 
 
@@ -97,7 +99,7 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
         by_kind.setdefault(constraint.over, []).append(constraint)
     wanted = {constraint.name for constraint in by_kind.get("interval", [])}
     instants = [row for constraint in by_kind.get("instant", []) for row in _at_one_sample(constraint)]
-    means = [(name, *rest) for c in by_kind.get("mean", []) for name, *rest in _split(c)]
+    means = [row for c in by_kind.get("mean", []) for row in _split(c)]
     squares = [
         (name, unit, value**2, lower, upper)
         for c in by_kind.get("root-mean-square", [])
@@ -106,14 +108,14 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     indexes = [
         (name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in source.means if name in still.indexes
     ]
+    others, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
     return TimeFunctions(
         source=source,
-        instants=_rows(instants, [*means, *squares, *indexes], [point.x, point.p, now], source),
-        plain=len(instants),
+        instants=TimeRows(instants, others, [point.x, point.p, now], kinks) if instants or others else None,
         squares=frozenset(range(first, first + len(squares))),
-        changes=_rows(changes, [], [point.x, point.p, now, later], source),
+        changes=TimeRows(changes, [], [point.x, point.p, now, later], kinks) if changes else None,
         sampled=tuple(c.name for kind in (None, "samples") for c in by_kind.get(kind, [])),
     )
 
@@ -132,23 +134,3 @@ def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
         stem = label.rpartition(",")[0]
         found.setdefault(f"{constraint.name}[{stem}]" if stem else constraint.name, tuple(rest))
     return [(name, *rest) for name, rest in found.items()]
-
-
-def _rows(
-    plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], source: RowsOverTime
-) -> TimeRows:
-    """Return rows of every time, and others whose means are bounded."""
-    rows = [*plain, *others]
-    names, units, values, lower, upper = zip(*rows, strict=True) if rows else ((),) * 5
-    bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
-    if not rows:
-        return TimeRows((), (), None, bounds)
-    function = ca.Function("rows", list(inputs), [ca.vertcat(*values)])
-    arguments = function.sx_in()
-    scalar = ca.Function("rows", arguments, ca.cse([ca.densify(v) for v in function.call(arguments)]))
-    first = int(inputs[0].numel() + inputs[1].numel())
-    half_open = range(first, first + len(inputs) - 2) if source.kinks else ()
-    groups: dict[str, list[int]] = {}
-    for k, (name, *_) in enumerate(plain):
-        groups.setdefault(name.partition("[")[0], []).append(k)
-    return TimeRows(names, units, Enclosed(scalar, half_open, list(groups.values())), bounds)

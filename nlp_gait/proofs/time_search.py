@@ -10,7 +10,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.boxes import Flags, Numbers
-from nlp_gait.proofs.time_functions import Enclosed
+from nlp_gait.proofs.time_functions import TimeRows
 
 # Phases are multiples of this, so that they and their sums are exact; an interval of a phase is rounded to one.
 GRAIN = 2.0**-40
@@ -61,8 +61,8 @@ def bound_violation(lower: Array, upper: Array, low: Array, high: Array) -> tupl
 class TimeSearch:
     """Halving of pieces until every row is proven to be satisfied, or its violation is known well enough."""
 
-    def __init__(self, values: Enclosed, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
-        self._values, self._given, self._shift = values, given, shift
+    def __init__(self, rows: TimeRows, given: Array, shift: float | None, lower: Array, upper: Array) -> None:
+        self._rows, self._given, self._shift = rows, given, shift
         self._lower, self._upper = lower, upper
         self.count = 0  # of pieces that were enclosed
         self.least = np.full(len(lower), -np.inf)  # bounds of the largest violation of each row
@@ -73,9 +73,9 @@ class TimeSearch:
 
     def run(self, pieces: Array) -> None:
         """Halve the open pieces, separately for the rows of each name, until few are open, or they are too many or too small."""
-        forms = self._enclose(self._values.whole, pieces)
+        forms = self._enclose(self._rows.whole, pieces)
         self._settled = pieces, self._integrate(pieces, forms)
-        for number, rows in enumerate(self._values.groups):
+        for number, rows in enumerate(self._rows.groups):
             self._halve(number, rows, pieces, forms.lower[:, rows], forms.upper[:, rows])
 
     def _halve(self, number: int, rows: Numbers, pieces: Array, low: Array, high: Array) -> None:
@@ -94,7 +94,7 @@ class TimeSearch:
             self._settle(rows, pieces[stays], most[stays], satisfied[stays])
             if not again.any():
                 return
-            pieces, part = halve_pieces(pieces[again]), self._values.part(number)
+            pieces, part = halve_pieces(pieces[again]), self._rows.part(number)
             forms = self._enclose(part.function, pieces)
             low, high = forms.lower[:, part.columns], forms.upper[:, part.columns]
             work += part.work * len(pieces)
@@ -120,7 +120,7 @@ class TimeSearch:
             if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
                 break
             finer = halve_pieces(pieces[again])
-            forms = self._enclose(self._values.whole, finer)
+            forms = self._enclose(self._rows.whole, finer)
             pieces = np.concatenate([pieces[~again], finer])
             parts = np.concatenate([parts[~again], self._integrate(finer, forms)])
         self._settled = pieces, parts

@@ -121,17 +121,17 @@ def test_a_mean_is_that_over_time() -> None:
 def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
     problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
     rows = make_time_functions(problem, problem.rows_over_time[0]).instants
-    assert rows.values is not None
-    groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.values.groups)}
+    assert rows is not None
+    groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.groups)}
     assert set(groups) == {"joint_angle", "reach", "dbm_x", "dbm_y"}
-    part = rows.values.part(groups["reach"])
+    part = rows.part(groups["reach"])
     assert part.work < 0.1
     given = np.concatenate([x, problem.p, [0.0]])
     boxes = np.stack([given, given], axis=-1)[None]
     boxes[:, -1] = 0.3, 0.31
     symbols = np.where(np.arange(len(given)) == len(given) - 1, 0, -1)
-    alone, whole = (function(boxes, symbols) for function in (part.function, rows.values.whole))
-    columns = rows.values.groups[groups["reach"]]
+    alone, whole = (function(boxes, symbols) for function in (part.function, rows.whole))
+    columns = rows.groups[groups["reach"]]
     for ends, all_ends in ((alone.lower, whole.lower), (alone.upper, whole.upper)):
         np.testing.assert_allclose(ends[:, part.columns], all_ends[:, columns], rtol=1e-9)
 
