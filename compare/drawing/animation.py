@@ -11,7 +11,7 @@ import numpy as np
 from compare.drawing.figures import new_figure, style
 from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array
-from nlp_gait.formulation.stick_figure import LEFT, RIGHT, TRUNK, Skeleton, Sole
+from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Skeleton, Sole
 from nlp_gait.interrupts import delay_interrupts
 from nlp_gait.simulation.film.video import Frame
 

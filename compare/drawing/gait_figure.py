@@ -12,9 +12,9 @@ from compare.drawing.animation import COLOURS, GROUND, MARGIN
 from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, new_figure, style
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
+from nlp_gait.formulation.display import TRUNK, Skeleton
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.signals import JOINT_UNITS
-from nlp_gait.formulation.stick_figure import TRUNK, Skeleton
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

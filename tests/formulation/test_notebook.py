@@ -15,7 +15,7 @@ from compare.study.run_study import Study
 from compare.study.task import ProblemSpec, Task
 from nlp_gait.errors import InputError, MissingExtraError, UnknownNameError
 from nlp_gait.formulation import Columns, Signals
-from nlp_gait.formulation.stick_figure import Skeleton, Sole, make_rectangle
+from nlp_gait.formulation.display import Skeleton, Sole, make_rectangle
 from tests.compare.records import record
 
 T = np.array([0.0, 0.5, 1.0])

@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 from casadi import MX, SX
 
 from nlp_gait.formulation import InstantPoint, Parameter, Signals, Variable
-from nlp_gait.formulation.stick_figure import Skeleton
+from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Limit, Margins
 from nlp_gait.gaits.biped.motors import Motors

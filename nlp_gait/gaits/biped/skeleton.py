@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.stick_figure import (
+from nlp_gait.formulation.display import (
     LEFT,
     RIGHT,
     TRUNK,

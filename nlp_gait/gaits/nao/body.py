@@ -9,7 +9,7 @@ from casadi import DM, MX, SX, cos, vertcat
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point, Signals
-from nlp_gait.formulation.stick_figure import Skeleton
+from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins
 from nlp_gait.gaits.biped.samples import Instant

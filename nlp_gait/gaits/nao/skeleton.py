@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from nlp_gait.formulation import Signals
-from nlp_gait.formulation.stick_figure import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
+from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped import skeleton
 from nlp_gait.robots import Robot
 

@@ -11,8 +11,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
-from nlp_gait.formulation.display import SIMULATED, Tread
-from nlp_gait.formulation.stick_figure import LEFT, RIGHT, TRUNK, Limb, Skeleton
+from nlp_gait.formulation.display import LEFT, RIGHT, SIMULATED, TRUNK, Limb, Skeleton, Tread
 from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.gaits.stairs.bodies import JOINTS, joint_angles, joint_torques, rigid_bodies, torso_lean
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, LINKS, MOVING, link_angles, loads, points

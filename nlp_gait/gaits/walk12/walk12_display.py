@@ -16,8 +16,16 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
-from nlp_gait.formulation.display import SIMULATED
-from nlp_gait.formulation.stick_figure import LEFT, RIGHT, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
+from nlp_gait.formulation.display import (
+    LEFT,
+    RIGHT,
+    SIMULATED,
+    Limb,
+    Skeleton,
+    Sole,
+    make_flat_skeleton,
+    make_rectangle,
+)
 from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
