@@ -44,7 +44,7 @@ class Drive:
     def __post_init__(self) -> None:
         for name in ("full_error_rad", "time_constant_s", "period_s"):
             value = getattr(self, name)
-            if not (value > 0.0 and math.isfinite(value)):
+            if not 0.0 < value < math.inf:
                 raise InputError(f"{name} of a drive must be > 0, got {value!r}")
         check_period("drive", self.period_s)
         allowed = {"interpolation": INTERPOLATIONS, "feed_forward": FEED_FORWARD, "torque_limits": TORQUE_LIMITS}

@@ -156,13 +156,12 @@ def _solve_cheapest(plan: Plan, support: Support, instants: Instants, sharing: S
     linear = np.concatenate([-(gain.T @ (heat @ torque)), weight])
     bound, power = sparse.identity(len(weight)), speed @ torque
     limits = [
-        (sparse.hstack([-(speed @ gain), -bound]), -power),
-        (sparse.hstack([speed @ gain, -bound]), power),
-        *_limit_soles(plan, instants, sharing, wrenches, len(weight)),
-        *_limit_rates(plan, support, instants, sharing, t, knots, place, len(weight)),
+        *_limit_soles(plan, instants, sharing, wrenches),
+        *_limit_rates(plan, support, instants, sharing, t, knots, place),
     ]
-    matrix = sparse.vstack([left for left, _ in limits], format="csc")
-    right = np.concatenate([limit for _, limit in limits])
+    rows = sparse.vstack([left for left, _ in limits])
+    matrix = sparse.bmat([[-(speed @ gain), -bound], [speed @ gain, -bound], [rows, None]], format="csc")
+    right = np.concatenate([-power, power, *(limit for _, limit in limits)])
     solution = _solve_qp(quadratic, linear, matrix, right)
     if solution is None:
         raise InputError(
@@ -173,17 +172,17 @@ def _solve_cheapest(plan: Plan, support: Support, instants: Instants, sharing: S
     return np.asarray((wrenches @ solution[: knots * WRENCH]).reshape(n, WRENCH))
 
 
-Limit = tuple[Any, Array]  # rows of a sparse matrix and their upper bounds
+Limit = tuple[Any, Array]  # rows of a sparse matrix, to be multiplied with all knots, and their upper bounds
 
 
-def _limit_soles(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any, powers: int) -> Iterator[Limit]:
+def _limit_soles(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any) -> Iterator[Limit]:
     """Yield the limits of both soles at every sample."""
     rows = make_sole_rows(plan.robot, sharing.friction)
     n = len(instants.left)
     left = sparse.block_diag(list(rows["left"] @ instants.carried), format="csr") @ wrenches
     right = sparse.kron(sparse.identity(n), rows["right"], format="csr") @ wrenches
-    for matrix, most in ((left, (instants.left @ rows["left"].T).ravel()), (-right, np.zeros(n * len(rows["right"])))):
-        yield sparse.hstack([matrix, sparse.csr_matrix((matrix.shape[0], powers))]), most
+    yield left, (instants.left @ rows["left"].T).ravel()
+    yield -right, np.zeros(n * len(rows["right"]))
 
 
 def _limit_rates(
@@ -194,7 +193,6 @@ def _limit_rates(
     t: Array,
     knots: int,
     place: Array,
-    powers: int,
 ) -> Iterator[Limit]:
     """Yield the limits of the change of each foot's load between knots, and from zero at landing and to zero at lifting."""
     if not math.isfinite(sharing.load_rate_1_s):
@@ -209,23 +207,15 @@ def _limit_rates(
     for matrix, rest in loads.values():
         change, own = steps @ matrix, steps @ rest
         for sign in (1.0, -1.0):
-            yield _wide(sign * change, powers), most - sign * own
+            yield sign * change, most - sign * own
     for side, knot in ((support.landed, 0), (support.lifting, knots - 1)):
         if side is not None:
             matrix, rest = loads[side]
-            yield _wide(matrix[knot], powers), np.array([most - rest[knot]])
-
-
-def _wide(matrix: Any, powers: int) -> Any:
-    return sparse.hstack([matrix, sparse.csr_matrix((matrix.shape[0], powers))])
+            yield matrix[knot], np.array([most - rest[knot]])
 
 
 def _solve_qp(quadratic: Any, linear: Array, matrix: Any, most: Array) -> Array | None:
-    """Minimise x'Qx/2 + c'x subject to matrix x <= most; None if that is infeasible.
-
-    Raises:
-        MissingExtraError: Clarabel is not installed.
-    """
+    """Minimise x'Qx/2 + c'x subject to matrix x <= most; None if that is infeasible. Raises MissingExtraError."""
     try:
         import clarabel
     except ImportError as error:

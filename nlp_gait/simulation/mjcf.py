@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from typing import Literal
 from xml.etree import ElementTree as Xml
 
@@ -19,18 +20,15 @@ from nlp_gait.simulation.shapes import Prism, Shape
 # Compared with 0.1 ms, power is 1 % higher in single support; in double support it is 12 % higher with set-points held for 40 ms
 # and equal with smooth ones. At 1 ms the light feet chatter.
 TIME_STEP = 0.0005  # [s]
-CONTACT_TIME_CONSTANT = 0.004  # [s]; a hard floor: a fifth of MuJoCo's default
 FRICTION = 0.7  # rubber-like soles on a hard floor
 TURNING_FRICTION, ROLLING_FRICTION = 0.005, 0.0001  # MuJoCo's defaults; with condim 3 neither acts
 LEAST_MOMENT = 1e-12  # of inertia that MuJoCo accepts [kg m^2]
 BALL_RADIUS = 1e-3  # [m]
 LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
-FLOOR = "floor"  # name of the floor and of its material
 LEFT, RIGHT, TRUNK = "0.00 0.45 0.70 1", "0.84 0.37 0.00 1", "0.80 0.81 0.84 1"  # blue and orange of Okabe and Ito
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT}
 LIMBS = "1"  # group of the geometries that a view from above hides; soles and floor are in group 0
-LINES_PER_M = 10  # of the floor's grid
 # Joints of a root in the sagittal plane, in the order of the engine's coordinates.
 PLANAR_JOINTS = {"root x": ("slide", "1 0 0"), "root z": ("slide", "0 0 1"), "root pitch": ("hinge", "0 1 0")}
 
@@ -58,20 +56,12 @@ def make_model(
 
     Gravity is along -z [m/s^2]. The ground adds stairs; if planar, the robot's root stays in the plane y = 0.
     """
-    root, option = make_document(robot.name, gravity)
-    Xml.SubElement(option, "flag", autoreset="disable")  # otherwise a divergence is hidden
-    Xml.SubElement(
-        Xml.SubElement(root, "default"),
-        "geom",
-        contype="0",
-        conaffinity="1",
-        condim="3",
-        solref=_numbers(CONTACT_TIME_CONSTANT, 1.0),
-        friction=_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION),
-    )
-    _add_hulls(_add_look(root), shapes)
-    world = Xml.SubElement(root, "worldbody")
-    Xml.SubElement(world, "geom", name=FLOOR, type="plane", size="3 3 0.1", contype="1", material=FLOOR)
+    root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
+    _, option, default, _, assets, world, actuators = root
+    root.set("model", robot.name)
+    option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(0.0, 0.0, -gravity)}
+    default[0].set("friction", _numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
+    _add_hulls(assets, shapes)
     _add_stairs(world, ground)
     bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if planar else "free")
     _paint(bodies, robot)
@@ -79,27 +69,12 @@ def make_model(
     light.attrib |= {"dir": "-0.6 0.8 -1.5", "diffuse": "0.5 0.5 0.5", "specular": "0.1 0.1 0.1"}
     for side, foot in robot.feet.items():
         Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
-    actuators = Xml.SubElement(root, "actuator")
     for name, joint in robot.joints.items():
         limit = drive.torque_limit(joint)
         actuator = Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit))
         actuator.attrib |= {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
-    return format_xml(root)
-
-
-def make_document(name: str, gravity: float) -> tuple[Xml.Element, Xml.Element]:
-    """Return root and options of an empty model."""
-    root = Xml.Element("mujoco", model=name)
-    Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
-    option = Xml.SubElement(
-        root,
-        "option",
-        timestep=_numbers(TIME_STEP),
-        gravity=_numbers(0.0, 0.0, -gravity),
-        integrator="implicitfast",
-        cone="elliptic",
-    )
-    return root, option
+    Xml.indent(root)
+    return Xml.tostring(root, encoding="unicode") + "\n"
 
 
 def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
@@ -178,12 +153,6 @@ def _numbers(*values: float) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def format_xml(root: Xml.Element) -> str:
-    """Return a model as text."""
-    Xml.indent(root)
-    return Xml.tostring(root, encoding="unicode") + "\n"
-
-
 def _paint(bodies: Mapping[str, Xml.Element], robot: Robot) -> None:
     """Colour the shapes of the legs by their side, all others grey."""
     above = {link: {link, *(joint.child for joint in robot.path_to_root(link))} for link in bodies}
@@ -194,21 +163,3 @@ def _paint(bodies: Mapping[str, Xml.Element], robot: Robot) -> None:
             geom.set("rgba", SIDE_COLOURS[sides[0]] if len(sides) == 1 else TRUNK)
             if geom.get("type") != "mesh":
                 geom.set("group", LIMBS)
-
-
-def _add_look(root: Xml.Element) -> Xml.Element:
-    """Add light, sky and the floor's material, a grid with a line every 10 cm; return the element of assets."""
-    visual = Xml.SubElement(root, "visual")
-    Xml.SubElement(visual, "global", fovy="30")
-    Xml.SubElement(visual, "headlight", ambient="0.42 0.42 0.42", diffuse="0.3 0.3 0.3", specular="0 0 0")
-    Xml.SubElement(visual, "quality", shadowsize="4096")
-    Xml.SubElement(visual, "map", shadowclip="2")
-    assets = Xml.SubElement(root, "asset")
-    sky = Xml.SubElement(assets, "texture", type="skybox", builtin="gradient", width="64", height="384")
-    sky.attrib |= {"rgb1": "1 1 1", "rgb2": "0.80 0.87 0.93"}
-    tiles = Xml.SubElement(assets, "texture", name=FLOOR, type="2d", builtin="checker", mark="edge")
-    tiles.attrib |= {"width": "128", "height": "128"}
-    tiles.attrib |= {"rgb1": "0.93 0.94 0.95", "rgb2": "0.87 0.89 0.91", "markrgb": "0.55 0.58 0.62"}
-    repeat = f"{LINES_PER_M / 2:g} {LINES_PER_M / 2:g}"  # one texture shows two cells in each direction
-    Xml.SubElement(assets, "material", name=FLOOR, texture=FLOOR, texuniform="true", texrepeat=repeat)
-    return assets

@@ -31,28 +31,22 @@ class Robustness:
 
 
 def measure_robustness(plan: Plan, drive: Drive | None = None) -> Robustness:
-    """Increase each disturbance alone until the robot falls.
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed.
-    """
+    """Increase each disturbance alone until the robot falls; raises MissingExtraError without MuJoCo."""
 
     def survives(conditions: Conditions) -> bool:
         return simulate_plan(plan, conditions, drive).fell_at_s is None
 
-    def push(direction: str, impulse: float) -> Conditions:
-        x, y = DIRECTIONS[direction]
-        return Conditions(push=Push(impulse_Ns=(x * impulse, y * impulse)))
+    def push(x: float, y: float) -> Conditions:
+        return Conditions(push=Push(impulse_Ns=(x, y)))
 
-    def slope(direction: str, degrees: float) -> Conditions:
-        x, y = DIRECTIONS[direction]
-        return Conditions(slope_rad=(math.radians(x * degrees), math.radians(y * degrees)))
+    def slope(x: float, y: float) -> Conditions:
+        return Conditions(slope_rad=(math.radians(x), math.radians(y)))
 
-    def find_largest(make: Callable[[str, float], Conditions], step: float, most: float) -> dict[str, float]:
+    def find_largest(make: Callable[[float, float], Conditions], step: float, most: float) -> dict[str, float]:
         found = {}
-        for direction in DIRECTIONS:
+        for direction, (x, y) in DIRECTIONS.items():
             steps = 1
-            while steps * step <= most and survives(make(direction, steps * step)):
+            while steps * step <= most and survives(make(x * steps * step, y * steps * step)):
                 steps += 1
             found[direction] = round((steps - 1) * step, 9)
         return found

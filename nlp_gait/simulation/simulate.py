@@ -18,9 +18,7 @@ from nlp_gait.simulation.plan import SIDES, Plan
 
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
-FALLEN_HEIGHT = (
-    0.6  # of the torso's planned height at the start; a robot has fallen if it sinks by the rest below its plan
-)
+FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start; sinking by the rest below the plan is a fall
 COLUMNS = {
     "torso": vector_columns("m"),
     "tilt": Columns(unit="rad"),
@@ -62,7 +60,7 @@ class Conditions:
     def __post_init__(self) -> None:
         for name in ("friction", "mass_factor", "stiffness_factor"):
             value = getattr(self, name)
-            if not (value > 0.0 and math.isfinite(value)):
+            if not 0.0 < value < math.inf:
                 raise InputError(f"{name} must be > 0, got {value!r}")
         if not all(abs(slope) < math.pi / 4 for slope in self.slope_rad):
             raise InputError(f"slope_rad must be within +-pi/4, got {self.slope_rad}")
@@ -108,10 +106,7 @@ def simulate_plan(
 ) -> Simulation:
     """Simulate a gait from its planned state at time zero until it has settled or the robot has fallen.
 
-    Deterministic: the same arguments give the same numbers.
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed.
+    Deterministic: the same arguments give the same numbers. Raises MissingExtraError without MuJoCo.
     """
     engine = load_mujoco()
     drive, conditions = drive or Drive(), conditions or Conditions()

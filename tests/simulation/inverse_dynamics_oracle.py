@@ -16,7 +16,7 @@ from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.engine import load_mujoco
-from nlp_gait.simulation.mjcf import add_bodies, format_xml, make_document
+from nlp_gait.simulation.mjcf import add_bodies
 
 
 def engine_torques(result: Result, signals: Signals) -> Array:
@@ -100,7 +100,9 @@ def standing_on(
 
 def fixed_model(tree: Sequence[Body], gravity: float = GRAVITY) -> str:
     """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to."""
-    root, option = make_document("fixed", gravity)
-    Xml.SubElement(option, "flag", constraint="disable")
-    add_bodies(Xml.SubElement(root, "worldbody"), tree, {}, root="fixed")
-    return format_xml(root)
+    root = Xml.fromstring(
+        '<mujoco><compiler angle="radian"/><option><flag constraint="disable"/></option><worldbody/></mujoco>'
+    )
+    root[1].set("gravity", f"0 0 {-gravity!r}")
+    add_bodies(root[2], tree, {}, root="fixed")
+    return Xml.tostring(root, encoding="unicode")
