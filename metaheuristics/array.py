@@ -11,7 +11,7 @@ Array: TypeAlias = NDArray[np.float64]
 
 
 def real_array(values: object) -> Array:
-    """Give values as doubles, copied only if they are not that already.
+    """Return values as doubles, copied only if they are not that already.
 
     Raises:
         TypeError: They are complex, masked, texts or dates, of which NumPy would make doubles in silence.

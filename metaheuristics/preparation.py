@@ -36,11 +36,7 @@ def prepare_start(
 
 
 def read_bounds(objective: Bounded) -> tuple[Array, Array]:
-    """Return read-only copies of the lower and upper bounds, (n,) each.
-
-    Raises:
-        SearchError: Shapes differ from (n,), or a pair of bounds is inverted, NaN or infinite.
-    """
+    """Return read-only copies of the lower and upper bounds (n,); SearchError unless they are finite and not inverted."""
     if not callable(objective) or not all(hasattr(objective, part) for part in ("names", "lower", "upper")):
         raise SearchError(f"objective must be a function of X with names, lower and upper, got {abbreviate(objective)}")
     try:
@@ -104,11 +100,7 @@ def check_limits(
     stagnation: int | None,
     time_limit_s: float | None,
 ) -> None:
-    """Check the stopping criteria of `minimize`.
-
-    Raises:
-        SearchError: One of them is not allowed; the budget must hold at least the starting points.
-    """
+    """Raise SearchError unless the stopping criteria of `minimize` are allowed; the budget must hold the starting points."""
     if isinstance(algorithm, type) or not (
         hasattr(algorithm, "population") and callable(getattr(algorithm, "start", None))
     ):
@@ -176,11 +168,7 @@ def name_of(algorithm: Algorithm) -> str:
 
 
 def check_points(asked: object, lower: Array, upper: Array) -> Array:
-    """Return the points (P, n) of an `ask`.
-
-    Raises:
-        SearchError: another shape, no point, NaN, or a point outside the bounds.
-    """
+    """Return the points (P, n) of an `ask`; SearchError for another shape, no point, NaN, or a point outside the bounds."""
     try:
         points = real_array(asked)
     except (TypeError, ValueError) as error:
@@ -209,11 +197,7 @@ def _find_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int] 
 
 
 def seed_sequence(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
-    """Return a seed as a SeedSequence.
-
-    Raises:
-        SearchError: The seed is neither a whole number >= 0 nor a SeedSequence.
-    """
+    """Return a seed as a SeedSequence; SearchError unless it is one or a whole number >= 0."""
     if isinstance(seed, np.random.SeedSequence):
         return seed
     if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:

@@ -55,11 +55,7 @@ def as_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None
 
 
 def check_algorithm(candidate: Any, name: str) -> Algorithm:
-    """Return the algorithm if the loop can run it.
-
-    Raises:
-        SearchError: it has no `start`, or its population is not a whole number >= 1.
-    """
+    """Return the algorithm; SearchError if it has no `start`, or its population is not a whole number >= 1."""
     if not callable(getattr(candidate, "start", None)):
         raise SearchError(
             f"{name!r} must be an algorithm with `population` and `start`, or a plain function of ({', '.join(ARGUMENTS)}); "

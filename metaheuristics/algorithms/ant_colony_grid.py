@@ -56,11 +56,8 @@ class AntColonyGrid:
 def renew(pheromone: Array, chosen: NDArray[np.intp], weights: Array, evaporation: float) -> Array:
     """Return pheromone (n, L) after evaporation and deposits; each row remains a probability over L levels.
 
-    Args:
-        pheromone: (n, L).
-        chosen: (D, n) levels chosen by the points that deposit.
-        weights: (D,) their weights, >= 0 and not all zero.
-        evaporation: Share lost, which the deposits replace.
+    Deposits on the levels (D, n) that some points chose, by weights (D,) >= 0 that are not all zero, replace the share that
+    evaporates.
 
     Source:
         Blum, Dorigo (2004), update rule of the hyper-cube framework.

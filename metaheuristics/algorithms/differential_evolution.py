@@ -69,14 +69,10 @@ class DifferentialEvolution:
 def cross_over(
     members: Array, mutants: Array, first: NDArray[np.int64], draws: NDArray[np.bool_], exponential: bool
 ) -> Array:
-    """Return trials (P, n) that take the variable `first` from their mutant, and others at random.
+    """Return trials (P, n) that take the variables `first` (P,) from their mutants (P, n), and others of their members at random.
 
-    Args:
-        members: (P, n).
-        mutants: (P, n).
-        first: (P,) positions of variables.
-        draws: (P, n) True where a variable is to be crossed.
-        exponential: Take variables in a row, cyclically from the first one, until one is not to be crossed.
+    Draws (P, n) are True where a variable is to be crossed. An exponential crossover takes variables in a row, cyclically from
+    the first one, until one is not to be crossed.
     """
     taken = draws.copy()
     if exponential:

@@ -84,13 +84,8 @@ class GeneticAlgorithm:
 def tournaments(places: int, population: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Return the winners (places,) of tournaments among parents sorted best first, so that the lowest index wins.
 
-    Competitors are drawn by shuffling all parents repeatedly: each competes equally often, except for a remainder.
-
-    Args:
-        places: Number of tournaments.
-        population: Number of parents.
-        size: Competitors in each tournament.
-        rng: Source of randomness.
+    Competitors, `size` in each, are drawn by shuffling all parents repeatedly: each competes equally often, except for a
+    remainder.
     """
     shuffles = -(-places * size // population)
     competitors = rng.random((shuffles, population)).argsort(axis=1).ravel()[: places * size]

@@ -35,15 +35,8 @@ class Mutation(Protocol):
 def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array) -> tuple[Array, Array]:
     """Return the lower and the upper child (M, n) in each variable of parents A and B (M, n), within the bounds (n,).
 
-    Where the parents are equal, so are the children.
-
-    Args:
-        A: (M, n) first parents.
-        B: (M, n) second parents.
-        lower: (n,).
-        upper: (n,).
-        index: Distribution index; larger keeps children nearer to the parents.
-        u: (M, n) random numbers in [0, 1).
+    Where the parents are equal, so are the children. A larger distribution index keeps children nearer to the parents. Random
+    numbers u (M, n) are in [0, 1).
 
     Source:
         Deb, Agrawal (1995), Simulated binary crossover; bounded form as in Deb's NSGA-II code (crossover.c).

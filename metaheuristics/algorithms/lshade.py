@@ -65,14 +65,9 @@ def lehmer_mean(values: Array, weights: Array) -> float:
 
 
 def gains(before: tuple[Array, Array], after: tuple[Array, Array]) -> Array:
-    """By how much points are better, as weights in 0..1.
+    """Return by how much points (k,) are better after than before, as weights in 0..1, from violations and objectives (k,).
 
-    Args:
-        before: violation and objective (k,) as the rule sees them.
-        after: likewise, better.
-
-    Returns:
-        (k,) the fall of the violation, or where that is equal of the objective, each kind in units of its greatest one.
+    That is the fall of the violation, or where it is equal of the objective, each kind in units of its greatest one.
     """
     decided = after[0] < before[0]
     found = np.zeros(len(decided))

@@ -55,13 +55,7 @@ class ParticleSwarm:
 def move(X: Array, V: Array, to_own: Array, to_swarm: Array, inertia: float, limit: Array) -> tuple[Array, Array]:
     """Return new positions and velocities (P, n) after one iteration, regardless of the bounds.
 
-    Args:
-        X: (P, n) positions.
-        V: (P, n) velocities, per iteration.
-        to_own: (P, n) random weight times the distance to the particle's best.
-        to_swarm: (P, n) random weight times the distance to the swarm's best.
-        inertia: Share of the velocity kept.
-        limit: (n,) largest speed.
+    Pulls to a particle's and to the swarm's best (P, n) are random weights times distances; the limit (n,) is the largest speed.
 
     Source:
         Kennedy, Eberhart (1995), with the inertia weight of Shi, Eberhart (1998).

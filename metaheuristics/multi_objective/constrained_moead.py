@@ -64,15 +64,9 @@ class ConstrainedMoead:
 def places_to_take(
     old: Array, new: Array, violation: Array, child_violation: float, places: NDArray[np.intp], most: int
 ) -> NDArray[np.intp]:
-    """Return the places that a child takes.
+    """Return the places that a child takes, at most so many, in the order in which they are offered (P,).
 
-    Args:
-        old: (P,) values of the members at some places, each for its own scalar problem.
-        new: (P,) values of the child for these problems.
-        violation: (P,) of the members.
-        child_violation: of the child.
-        places: (P,) in the order in which they are offered.
-        most: that it may take.
+    The members there have old values (P,), each for its own scalar problem, and violations (P,); the child has new values (P,).
 
     Source:
         Jain, Deb (2014), C-MOEA/D, as in PlatEMO.

@@ -54,16 +54,9 @@ class DynamicConstrainedNsga3:
 
 
 def compute_boundary(first: Array, generation: int, generations: int, decrease: float) -> Array:
-    """Return the violation allowed for each constraint.
+    """Return the violation (c,) allowed for each constraint, from `first` (c,) > 0 at generation 0 to 0 at the last one.
 
-    Args:
-        first: (c,) in the beginning, > 0.
-        generation: from 0 on.
-        generations: at the last of which nothing is left.
-        decrease: cp.
-
-    Returns:
-        (c,) epsilon, from `first` to 0.
+    The larger `decrease` (cp), the later it falls.
 
     Source:
         Jiao et al. (2021): E exp(-(k / B)^cp) - z with B = K / ln((E + z) / z)^(1 / cp), as their code has it.

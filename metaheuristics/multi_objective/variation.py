@@ -28,16 +28,7 @@ class Variation:
         self._cross, self._mutate = SBX(prob=1.0, eta=crossover_index), PM(prob=1.0, eta=mutation_index)
 
     def __call__(self, first: Array, second: Array, one_child: bool = False) -> Array:
-        """Children of pairs.
-
-        Args:
-            first: (P, n) parents.
-            second: (P, n) parents.
-            one_child: Keep the first child of each pair only.
-
-        Returns:
-            (2 P, n) children, the first ones before the second ones; or (P, n).
-        """
+        """Return the children (2 P, n) of pairs (P, n), first children before second ones; or the first ones alone (P, n)."""
         from pymoo.core.population import Population
 
         parents = Population.new("X", np.concatenate([first, second])[:, self._free])

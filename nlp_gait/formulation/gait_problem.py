@@ -226,9 +226,9 @@ class GaitProblem:
             base = (
                 self.hints.start(parameters, rng)
                 if self.hints.start is not None
-                else _uniform(self.names, parameters, rng)
+                else draw_uniform(self.names, parameters, rng)
             )
-            return np.concatenate([base, _uniform([variable.name for variable in variables], parameters, rng)])
+            return np.concatenate([base, draw_uniform([variable.name for variable in variables], parameters, rng)])
 
         def refine(factor: int) -> GaitProblem:
             finer = self.dense(factor)
@@ -408,7 +408,8 @@ def _make_again(make: Callable[..., GaitProblem], options: tuple[tuple[str, Any]
     return problem
 
 
-def _uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+def draw_uniform(names: Sequence[str], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+    """Draw values (n,) of variables uniformly within the bounds that the parameters have."""
     return rng.uniform(*(np.array([parameters[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
 
 

@@ -7,14 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from casadi import MX, SX
+from casadi import MX, SX, fmax
 
 from nlp_gait.formulation import InstantPoint, Parameter, Signals, Variable
 from nlp_gait.formulation.display import Skeleton
+from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Limit, Margins
 from nlp_gait.gaits.biped.motors import Motors
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
+from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import make_skeleton
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -23,6 +24,13 @@ from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion,
 PhaseName: TypeAlias = Literal["ssp", "dsp"]
 TIMES: dict[PhaseName, str] = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
 LIFT = "swing_height_m"
+
+
+def read_duration(at: InstantPoint, phase: PhaseName) -> SX:
+    """Return the duration of a phase [s], never zero."""
+    return fmax(at[TIMES[phase]], LEAST_DURATION)
+
+
 # Angles that are planned besides the hip, by name [rad]: of swinging arms, or of a leaning torso.
 Angles: TypeAlias = Mapping[str, Motion]
 # What is planned of an instant, and what the joints follow from: motions of the hip, of these angles, and of both ankles by side.
@@ -128,6 +136,13 @@ class Body(ABC):
         """Height of the swing."""
         lower, upper = self.scale_length(0.015), self.scale_length(0.03)
         return Variable(name=LIFT, unit="m", lower=lower, upper=upper, description="highest point of the swing foot")
+
+    def make_splines(self, phase: PhaseName, trajectory: Trajectory) -> Splines:
+        """Return the splines of a phase; a swing foot stays on its line across the walking direction."""
+        units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(self.angle_names(phase), "rad")
+        if phase == "ssp":
+            units |= {"foot_x": "m", "foot_z": "m"}
+        return Splines(trajectory=trajectory, units=units, length_scale=self.length_scale)
 
     def make_time_variable(self, phase: PhaseName) -> Variable:
         """Return the duration of a phase."""

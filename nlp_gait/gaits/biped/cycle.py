@@ -29,8 +29,8 @@ from nlp_gait.formulation import (
     Variable,
 )
 from nlp_gait.formulation.assembly import parameters
+from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
-from nlp_gait.gaits.biped.curves import make_grid
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
 from nlp_gait.gaits.biped.double_support import (
     Box,
@@ -41,7 +41,7 @@ from nlp_gait.gaits.biped.double_support import (
 )
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, Margins, make_rows
-from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
+from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
@@ -251,18 +251,9 @@ def make_cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
     }
 
 
-def plan_cycle(
-    body: Body,
-    *,
-    objective: CycleObjective,
-    intervals: int,
-    samples_per_interval: int,
-    torso_share: TorsoShare,
-    load_degree: int,
-) -> GaitProblem:
+def plan_cycle(body: Body, grid: Grid, objective: CycleObjective, sharing: LoadSharing) -> GaitProblem:
     """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
-    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
-    sharing, at_given_speed = share_load(body, torso_share, load_degree), objective != "energy-per-metre"
+    at_given_speed = objective != "energy-per-metre"
     goal = make_goal(body, "torque" if objective == "torque" else "power")
     cycle = make_walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed)
     names = tuple(variable.name for variable in cycle.decisions)
@@ -270,10 +261,7 @@ def plan_cycle(
     def reach(at: Point) -> MX:
         return ca.horzcat(*(phase.sample(cycle.add_step(at), Exact()).reach for phase in cycle.phases.values()))
 
-    def start_with_step(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        return draw_start(names, parameters, rng)
-
-    start = sharing.start(names, start_with_step if at_given_speed else None)
+    start = sharing.start(names, partial(draw_start, names) if at_given_speed else None)
     if not body.closed_form:
         start = make_start_within_reach(names, (SPEED,) if at_given_speed else (), reach, start)
     return make_cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
@@ -304,7 +292,7 @@ def make_cycle_problem(
 
 def draw_start(names: Sequence[str], values: Mapping[str, float], rng: np.random.Generator) -> Array:
     """Draw a start point within the bounds whose times give a step within its bounds, as far as their own bounds allow."""
-    x = rng.uniform(*(np.array([values[f"{name}.{end}"] for name in names]) for end in ("lower", "upper")))
+    x = draw_uniform(names, values, rng)
     times = [names.index(time) for time in TIMES.values()]
     step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
     x[times] *= step / (values[SPEED] * x[times].sum())

@@ -13,9 +13,9 @@ from typing import NamedTuple
 from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Coordinate, PhaseName
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Coordinate, PhaseName, read_duration
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
+from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, stack
@@ -130,7 +130,7 @@ def read_cycle(at: InstantPoint, coordinates: Sequence[Coordinate]) -> Cycle:
         )
         for switch in SWITCHES
     )
-    single, double = (fmax(at[time], LEAST_DURATION) for time in TIMES.values())
+    single, double = (read_duration(at, phase) for phase in TIMES)
     images = DM([c.image for c in coordinates])
     return Cycle(lift_off, touch_down, at[LIFT], single, double, fmax(at[STEP], LEAST_STEP), images)
 

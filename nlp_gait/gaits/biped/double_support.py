@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
-from casadi import MX, SX, fmax
+from casadi import MX, SX
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
-from nlp_gait.gaits.biped.body import TIMES, Body, State
-from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, hip_on_spline, make_grid
+from nlp_gait.gaits.biped.body import TIMES, Body, State, read_duration
+from nlp_gait.gaits.biped.curves import Splines, Trajectory, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Margins
-from nlp_gait.gaits.biped.load_sharing import LoadSharing, TorsoShare, share_load
+from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
-from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_limits, make_phase_problem
-from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
+from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import resting_point
@@ -85,28 +85,18 @@ def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
     return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)
 
 
-def make_double_support_splines(body: Body, trajectory: Trajectory) -> Splines:
-    """Return the splines of the phase."""
-    units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(body.angle_names("dsp"), "rad")
-    return Splines(trajectory=trajectory, units=units, length_scale=body.length_scale)
-
-
 def plan_double_support(
     body: Body,
-    *,
     step_m: float,
-    intervals: int,
-    samples_per_interval: int,
+    grid: Grid,
     trajectory: Trajectory,
-    objective: Criterion,
-    torso_share: TorsoShare,
-    load_degree: int,
+    goal: Goal,
+    sharing: LoadSharing,
     derivatives: Derivatives = "analytic",
 ) -> GaitProblem:
     """Return the problem of double support; for the options see ``gaits.nao``."""
-    splines, sharing = make_double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
-    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
-    phase = make_double_support_phase(body, step_m, splines, sharing, grid, make_goal(body, objective), derivatives)
+    splines = body.make_splines("dsp", trajectory)
+    phase = make_double_support_phase(body, step_m, splines, sharing, grid, goal, derivatives)
     start = sharing.start(phase.names, splines.start_of(phase.names))
     return make_phase_problem("dsp", "double support: least mean power", phase, start=start)
 
@@ -126,9 +116,9 @@ def make_double_support_phase(
     ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
 
     def state(at: InstantPoint, s: SX) -> State:
-        more = splines.motions(at, double_support_duration(at), s)
-        hip = hip_on_spline(at, more, *ends, double_support_duration(at), s)
-        return hip, body.angles("dsp", at, more, double_support_duration(at), s), ankles
+        more = splines.motions(at, read_duration(at, "dsp"), s)
+        hip = hip_on_spline(at, more, *ends, read_duration(at, "dsp"), s)
+        return hip, body.angles("dsp", at, more, read_duration(at, "dsp"), s), ankles
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
@@ -156,8 +146,3 @@ def make_double_support_phase(
         goal=goal,
         kinks=splines.kinks,
     )
-
-
-def double_support_duration(at: InstantPoint) -> SX:
-    """Return the time of the phase [s], never zero."""
-    return fmax(at[TIMES["dsp"]], LEAST_DURATION)

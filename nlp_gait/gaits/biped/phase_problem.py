@@ -13,6 +13,7 @@ from casadi import MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Point, SimulationModel, SolverHints, Start
+from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.limits import (
@@ -125,11 +126,7 @@ def make_start_within_reach(
         return ca.Function("farthest", [x, p], [ca.mmax(ca.fabs(reach(Point.of(x, p, variables, read))))])
 
     def draw(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        if start is not None:
-            return start(parameters, rng)
-        return rng.uniform(
-            *(np.array([parameters[f"{name}.{end}"] for name in variables]) for end in ("lower", "upper"))
-        )
+        return draw_uniform(variables, parameters, rng) if start is None else start(parameters, rng)
 
     def choose(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         best, least = np.zeros(0), np.inf

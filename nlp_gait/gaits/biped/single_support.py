@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from casadi import MX, SX, fmax
+from casadi import MX, SX
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Point
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State
-from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory, hip_on_spline, make_grid
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State, read_duration
+from nlp_gait.gaits.biped.curves import Splines, Trajectory, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
-from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_limits, make_phase_problem
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader
+from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
+from nlp_gait.gaits.biped.samples import Instant, Loader
 from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
@@ -42,26 +42,12 @@ def place_stance(body: Body, step_m: float) -> Stance:
     return Stance((step_m, left), (0.0, 2 * step_m), right, (step_m / 2, 1.5 * step_m), (left / 2, left / 2))
 
 
-def make_single_support_splines(body: Body, trajectory: Trajectory) -> Splines:
-    """Return the splines of the phase; the swing foot stays on its line across the walking direction."""
-    units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(body.angle_names("ssp"), "rad")
-    return Splines(trajectory=trajectory, units=units | {"foot_x": "m", "foot_z": "m"}, length_scale=body.length_scale)
-
-
 def plan_single_support(
-    body: Body,
-    *,
-    step_m: float,
-    intervals: int,
-    samples_per_interval: int,
-    trajectory: Trajectory,
-    objective: Criterion,
-    derivatives: Derivatives = "analytic",
+    body: Body, step_m: float, grid: Grid, trajectory: Trajectory, goal: Goal, derivatives: Derivatives = "analytic"
 ) -> GaitProblem:
     """Return the problem of single support; for the options see ``gaits.nao``."""
-    splines = make_single_support_splines(body, trajectory)
-    grid = make_grid(trajectory, intervals, samples_per_interval)
-    phase = make_single_support_phase(body, step_m, splines, grid, make_goal(body, objective), derivatives)
+    splines = body.make_splines("ssp", trajectory)
+    phase = make_single_support_phase(body, step_m, splines, grid, goal, derivatives)
     return make_phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
 
 
@@ -79,12 +65,12 @@ def make_single_support_phase(
 
     def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
         """The paper's motion of the right foot at a height, and what its curves add."""
-        time, (begin, end) = single_support_duration(at), stance.swing_x
+        time, (begin, end) = read_duration(at, "ssp"), stance.swing_x
         paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
         return add_motions(paper, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
 
     def state(at: InstantPoint, s: SX) -> State:
-        time = single_support_duration(at)
+        time = read_duration(at, "ssp")
         more = splines.motions(at, time, s)
         hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, time, s)
         return hip, body.angles("ssp", at, more, time, s), {"L": left, "R": swing(at, more, right_height, s)}
@@ -93,7 +79,7 @@ def make_single_support_phase(
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
 
     def sole(at: InstantPoint, s: SX) -> SX:
-        return swing(at, splines.motions(at, single_support_duration(at), s), 0.0, s).position
+        return swing(at, splines.motions(at, read_duration(at, "ssp"), s), 0.0, s).position
 
     return Phase(
         body=body,
@@ -120,11 +106,6 @@ def make_single_support_phase(
         goal=goal,
         kinks=splines.kinks,
     )
-
-
-def single_support_duration(at: InstantPoint) -> SX:
-    """Return the time of the phase [s], never zero."""
-    return fmax(at[TIMES["ssp"]], LEAST_DURATION)
 
 
 def compute_single_support_mean_margins(foot: Foot) -> tuple[float, float]:

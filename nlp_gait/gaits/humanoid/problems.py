@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Literal
 
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.gaits.biped.curves import Trajectory
+from nlp_gait.gaits.biped.curves import Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import plan_double_support
-from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE
-from nlp_gait.gaits.biped.phase_problem import Criterion
+from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
+from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.single_support import plan_single_support
 from nlp_gait.gaits.humanoid.body import make_humanoid
@@ -35,14 +35,9 @@ def humanoid_ssp(
         Phase of Gupta, Pratihar, Deb (2023), section 4.1; general legs and the free lean of the torso are this package's own.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
-    return plan_single_support(
-        body,
-        step_m=body.check_step_length(step_length_m),
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        trajectory=trajectory,
-        objective=objective,
-    )
+    step_m = body.check_step_length(step_length_m)
+    grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
+    return plan_single_support(body, step_m, grid, trajectory, goal)
 
 
 @maker
@@ -65,16 +60,10 @@ def humanoid_dsp(
         Phase of Gupta, Pratihar, Deb (2023), section 4.2; general legs and the free lean of the torso are this package's own.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
-    return plan_double_support(
-        body,
-        step_m=body.check_step_length(step_length_m),
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        trajectory=trajectory,
-        objective=objective,
-        torso_share=torso_share,
-        load_degree=load_degree,
-    )
+    step_m = body.check_step_length(step_length_m)
+    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
+    goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
+    return plan_double_support(body, step_m, grid, trajectory, goal, sharing)
 
 
 @maker
@@ -98,14 +87,9 @@ def humanoid_cycle(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
         cycle are this package's own.
     """
-    return plan_cycle(
-        make_humanoid(robot, drive_limits=drive_limits, motors=motors),
-        objective=objective,
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        torso_share=torso_share,
-        load_degree=load_degree,
-    )
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
 
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:

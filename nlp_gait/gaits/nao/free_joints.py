@@ -17,7 +17,7 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, Signals
-from nlp_gait.gaits.biped.body import LIFT
+from nlp_gait.gaits.biped.body import LIFT, read_duration
 from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import (
@@ -31,11 +31,7 @@ from nlp_gait.gaits.biped.limits import (
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.recorded_motion import FreeParts, locate_free_parts
 from nlp_gait.gaits.biped.samples import Instant, Samples
-from nlp_gait.gaits.biped.single_support import (
-    make_single_support_phase,
-    make_single_support_splines,
-    single_support_duration,
-)
+from nlp_gait.gaits.biped.single_support import make_single_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
 from nlp_gait.robots import Robot
@@ -62,7 +58,7 @@ class FreeMotion:
 
     def joints(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
         """Return the motion of every joint [rad]."""
-        duration = single_support_duration(at)
+        duration = read_duration(at, "ssp")
         start, end = (self.paper.plan(at, SX(instant), ops).joints for instant in (0, 1))
         more = self.splines.motions(at, duration, phase)
         moved: dict[str, Motion] = {}
@@ -180,7 +176,7 @@ class FreeLimits(Limit):
 def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
     """Return single support with free joints between the ends of the paper's; one sample of the grid is the middle."""
     body = replace(body, upright=frozenset())
-    paper = make_single_support_phase(body, step_m, make_single_support_splines(body, "cubic"), grid, Goal())
+    paper = make_single_support_phase(body, step_m, body.make_splines("ssp", "cubic"), grid, Goal())
     splines = Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
     _, left_y, _ = support = (step_m, *body.ankle("L"))
     motion = FreeMotion(paper=paper, splines=splines, support=support)

@@ -10,19 +10,19 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, maker
-from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory
+from nlp_gait.formulation.gait_problem import draw_uniform
+from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import (
     hip_ends,
     make_double_support_phase,
-    make_double_support_splines,
     place_soles,
     plan_double_support,
 )
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.phase_problem import Criterion, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.single_support import place_stance, plan_single_support
 from nlp_gait.gaits.nao.body import ARM_SWING, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
@@ -58,15 +58,8 @@ def nao_ssp(
         power_form = power_form_maker(
             body.robot, partial(single_support_instants, body.robot, *stance, ARM_SWING["ssp"])
         )
-    problem = plan_single_support(
-        body,
-        step_m=step_length_m,
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        trajectory=trajectory,
-        objective=objective,
-        derivatives=derivatives,
-    )
+    grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
+    problem = plan_single_support(body, step_length_m, grid, trajectory, goal, derivatives)
     return replace(problem, power_form=power_form)
 
 
@@ -101,17 +94,9 @@ def nao_dsp(
         soles = place_soles(body, step_length_m)
         places = (soles, hip_ends(body, soles), ARM_SWING["dsp"])
         power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))
-    problem = plan_double_support(
-        body,
-        step_m=step_length_m,
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        trajectory=trajectory,
-        objective=objective,
-        torso_share=torso_share,
-        load_degree=load_degree,
-        derivatives=derivatives,
-    )
+    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
+    goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
+    problem = plan_double_support(body, step_length_m, grid, trajectory, goal, sharing, derivatives)
     return replace(problem, power_form=power_form)
 
 
@@ -150,14 +135,8 @@ def nao_cycle(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
-    return plan_cycle(
-        body,
-        objective=objective,
-        intervals=intervals,
-        samples_per_interval=samples_per_interval,
-        torso_share=torso_share,
-        load_degree=load_degree,
-    )
+    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
 
 
 @maker
@@ -188,9 +167,7 @@ def nao_ssp_free(
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         """Start from the paper's motion, for random values of its variables."""
-        own = phase.free.paper.variables
-        lower, upper = (np.array([parameters[f"{v.name}.{end}"] for v in own]) for end in ("lower", "upper"))
-        return fit_joints(trajectory, planned(), rng.uniform(lower, upper))
+        return fit_joints(trajectory, planned(), draw_uniform(phase.free.paper.names, parameters, rng))
 
     title = "single support with free joints: least mean power"
     return make_phase_problem("ssp-free", title, phase, start=start, searchable=False)
@@ -218,7 +195,7 @@ def nao_dsp_free(
     """
     check_step_length(step_length_m)
     body = make_leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia))
-    splines, sharing = make_double_support_splines(body, trajectory), share_load(body, torso_share, load_degree)
+    splines, sharing = body.make_splines("dsp", trajectory), share_load(body, torso_share, load_degree)
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
     phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, Goal())
     title, start = "double support with a leaning torso: least mean power", splines.start_of(phase.names)

@@ -6,7 +6,7 @@ summed link by link in the world. The torques equal those of the recursion up to
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -46,15 +46,23 @@ class PowerPhase(NamedTuple):
     margins: Mapping[str, Callable[[SX], SX]]  # balance margins from the ZMP, by axis [m]
 
 
-class LegParts(NamedTuple):
-    """Wrenches of a leg's links, see ``link_wrench``, and positions of its joints."""
+class LegJoint(NamedTuple):
+    """A joint of a leg: its axis and its place (3,) in the world [m]."""
 
-    # Of the pelvis about the hip's yaw-pitch joint; of hip link and thigh about the hip; of tibia, the link above the sole and
-    # sole about the ankle. No wrench needs the knee, whose bounds are widest where the leg is almost straight
-    links: tuple[SX, ...]
-    joints: tuple[SX, SX, SX, SX]  # (3,) yaw-pitch joint, hip, knee and ankle [m]
-    yaw_axis: DM  # (3,) axis of the yaw-pitch joint
-    across: SX  # (3,) axis of the pitching joints
+    name: str
+    axis: SX | DM
+    place: SX
+
+
+class LegParts(NamedTuple):
+    """A leg from the hip down: the wrench of each link (see ``link_wrench``) with its point (3,) of reference, and the joints.
+
+    Points are the hip's yaw-pitch joint for the pelvis, the hip for hip link and thigh, and the ankle for the others. None is the
+    knee, whose bounds are widest where the leg is almost straight.
+    """
+
+    links: tuple[tuple[SX, SX], ...]
+    joints: tuple[LegJoint, ...]
 
 
 @dataclass(kw_only=True)
@@ -98,45 +106,26 @@ class PowerInstant:
     def add_stance_leg(self, side: str, hip: Motion, ankle: Motion, upper: SX) -> Wrench:
         """Add the torques of a leg that carries ``upper`` (about the torso's origin); returns the wrench at its ankle."""
         leg = self._split_leg(side, hip, ankle)
-        yaw, at_hip, at_knee, at_ankle = leg.joints
-        pelvis, hip_link, thigh, tibia, above, sole = leg.links
-        carried = move_wrench(upper, hip.position - yaw)
-        self._add_torque(f"{side}HipYawPitch", leg.yaw_axis, carried, -1)
-        carried = move_wrench(carried + pelvis, yaw - at_hip)
-        self._add_torque(f"{side}HipRoll", FORWARD, carried, -1)
-        carried = carried + hip_link
-        self._add_torque(f"{side}HipPitch", leg.across, carried, -1)
-        carried = carried + thigh
-        self._add_torque(f"{side}KneePitch", leg.across, move_wrench(carried, at_hip - at_knee), -1)
-        carried = move_wrench(carried, at_hip - at_ankle) + tibia
-        self._add_torque(f"{side}AnklePitch", leg.across, carried, -1)
-        carried = carried + above
-        self._add_torque(f"{side}AnkleRoll", FORWARD, carried, -1)
-        ground = carried + sole
+        ground = self._add_torques(upper, hip.position, leg.joints, leg.links, -1)
         total = ground[:, 0] + self.rate_squared * ground[:, 1]
         return Wrench(total[:3], total[3:])
 
     def add_swing_leg(self, side: str, hip: Motion, ankle: Motion) -> SX:
         """Add the torques of a hanging leg; returns its wrench (6, 2) about the torso's origin."""
         leg = self._split_leg(side, hip, ankle)
-        yaw, at_hip, at_knee, at_ankle = leg.joints
-        pelvis, hip_link, thigh, tibia, above, carried = leg.links
-        self._add_torque(f"{side}AnkleRoll", FORWARD, carried, 1)
-        carried = carried + above
-        self._add_torque(f"{side}AnklePitch", leg.across, carried, 1)
-        carried = carried + tibia
-        self._add_torque(f"{side}KneePitch", leg.across, move_wrench(carried, at_ankle - at_knee), 1)
-        carried = move_wrench(carried, at_ankle - at_hip) + thigh
-        self._add_torque(f"{side}HipPitch", leg.across, carried, 1)
-        carried = carried + hip_link
-        self._add_torque(f"{side}HipRoll", FORWARD, carried, 1)
-        carried = move_wrench(carried, at_hip - yaw) + pelvis
-        self._add_torque(f"{side}HipYawPitch", leg.yaw_axis, carried, 1)
-        return move_wrench(carried, yaw - hip.position)
+        *above, sole = leg.links
+        return self._add_torques(*sole, leg.joints[::-1], [*above[::-1], (SX(6, 2), hip.position)], 1)
 
-    def _add_torque(self, name: str, axis: SX | DM, carried: SX, direction: int) -> None:
-        gravity, inertia = (ca.dot(axis, part) for part in ca.horzsplit(carried[3:, :]))
-        self.torques[name] = direction * (gravity + self.rate_squared * inertia)
+    def _add_torques(
+        self, carried: SX, at: SX, joints: Sequence[LegJoint], links: Sequence[tuple[SX, SX]], direction: int
+    ) -> SX:
+        """Add the torques of a chain from a wrench about a point on; returns the wrench about the last link's point."""
+        for joint, (wrench, point) in zip(joints, links, strict=True):
+            moment = move_wrench(carried, at - joint.place)[3:, :]
+            gravity, inertia = (ca.dot(joint.axis, part) for part in ca.horzsplit(moment))
+            self.torques[joint.name] = direction * (gravity + self.rate_squared * inertia)
+            carried, at = move_wrench(carried, at - point) + wrench, point
+        return carried
 
     def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> LegParts:
         geometry, yaw = measure_leg(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
@@ -156,13 +145,16 @@ class PowerInstant:
         x, y, z = tibia.com_m
         from_ankle = replace(tibia, com_m=(x, y, z + geometry.tibia_m))
         wrenches[3] = link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
-        joints = (
-            hip.position + DM(yaw.origin_m),
-            at_hip.position,
-            frames.tibia.origin.position,
-            ankle.position,
+        yaw_place, knee = hip.position + DM(yaw.origin_m), frames.tibia.origin.position
+        across, hip_place, ankle_place = frames.hip.axes.position[:, 1], at_hip.position, ankle.position
+        axes: tuple[SX | DM, ...] = (DM(yaw.axis), FORWARD, across, across, across, FORWARD)
+        places = (yaw_place, hip_place, hip_place, knee, ankle_place, ankle_place)
+        about = (yaw_place, hip_place, hip_place, ankle_place, ankle_place, ankle_place)
+        joints = tuple(
+            LegJoint(f"{side}{name}", axis, place)
+            for name, axis, place in zip(("HipYawPitch", *LEG_JOINTS), axes, places, strict=True)
         )
-        return LegParts(tuple(wrenches), joints, DM(yaw.axis), frames.hip.axes.position[:, 1])
+        return LegParts(tuple(zip(wrenches, about, strict=True)), joints)
 
 
 def double_support_instants(
