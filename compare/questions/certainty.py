@@ -38,22 +38,22 @@ DRAWN, LISTED = 20, 10  # best distinct optima
 class LongSearch:
     """One long run of CMA-ES with restarts, which shares only the exact functions with IPOPT."""
 
-    objective: float | None  # best feasible one, in the problem's sense; None if there was none
-    evaluations: int  # used
-    gap: float | None  # relative distance to the best optimum; negative if it is better
+    objective: float | None  #: best feasible one, in the problem's sense; None if there was none
+    evaluations: int  #: used
+    gap: float | None  #: relative distance to the best optimum; negative if it is better
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
     """Evidence that the best known optimum is the global one."""
 
-    problem: GaitProblem  # with its parameter values
-    starts: int  # of IPOPT
-    statuses: dict[str, int]  # number of starts by their status
-    optima: tuple[LocalOptimum, ...]  # distinct local optima, best first
-    unseen: UnseenOptima  # estimates of others
-    search: LongSearch | None  # None if it was not requested
-    certificate: Certificate | None  # None if it was not requested, or branch and bound is not possible
+    problem: GaitProblem  #: with its parameter values
+    starts: int  #: of IPOPT
+    statuses: dict[str, int]  #: number of starts by their status
+    optima: tuple[LocalOptimum, ...]  #: distinct local optima, best first
+    unseen: UnseenOptima  #: estimates of others
+    search: LongSearch | None  #: None if it was not requested
+    certificate: Certificate | None  #: None if it was not requested, or branch and bound is not possible
 
     @property
     def proven(self) -> str:
@@ -107,11 +107,11 @@ class Certainty(Question[Evidence]):
 
     name: ClassVar[str] = "certainty"
 
-    starts: int  # of IPOPT
-    evaluations: int  # of CMA-ES; 0 for none
-    tolerance: float = 0.01  # of the proof, relative
-    time_limit_s: float = 1800.0  # of the proof [s]; 0 for none
-    seed: int = 0  # of starts and search
+    starts: int  #: of IPOPT
+    evaluations: int  #: of CMA-ES; 0 for none
+    tolerance: float = 0.01  #: of the proof, relative
+    time_limit_s: float = 1800.0  #: of the proof [s]; 0 for none
+    seed: int = 0  #: of starts and search
 
     def __post_init__(self) -> None:
         """Validate the limits of the proof.

@@ -31,20 +31,20 @@ CONFIDENCE = 0.95
 class Ends:
     """Ends of all starts."""
 
-    x: Array  # (N, n) end points
-    objective: Array  # (N,) exact values, in the problem's sense
-    feasible: np.ndarray[Any, np.dtype[np.bool_]]  # (N,) converged, and feasible for the exact functions
-    status: tuple[str, ...]  # (N,) in words
+    x: Array  #: (N, n) end points
+    objective: Array  #: (N,) exact values, in the problem's sense
+    feasible: np.ndarray[Any, np.dtype[np.bool_]]  #: (N,) converged, and feasible for the exact functions
+    status: tuple[str, ...]  #: (N,) in words
 
 
 @dataclass(frozen=True, kw_only=True)
 class LocalOptimum:
     """Distinct local optimum."""
 
-    objective: float  # of its best end, in the problem's sense
-    count: int  # number of starts that reached it
-    share: float  # of the starts that converged
-    x: tuple[float, ...]  # of its best end
+    objective: float  #: of its best end, in the problem's sense
+    count: int  #: number of starts that reached it
+    share: float  #: of the starts that converged
+    x: tuple[float, ...]  #: of its best end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +56,11 @@ class UnseenOptima:
         (1987), Bayesian stopping rules for multistart global optimization methods, Mathematical Programming 37.
     """
 
-    good_turing: float  # share of starts that would reach an unseen optimum: the optima reached once, divided by N
-    # Expected number of all local optima, for a uniform prior on their number and shares; None if the sample is too small
+    good_turing: float  #: share of starts that would reach an unseen optimum: the optima reached once, divided by N
+    #: Expected number of all local optima, for a uniform prior on their number and shares; None if the sample is too small
     expected_optima: float | None
-    expected_covered: float | None  # expected share of starts that reach seen optima, for the same prior; None likewise
-    largest_missed: float  # upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
+    expected_covered: float | None  #: expected share of starts that reach seen optima, for the same prior; None likewise
+    largest_missed: float  #: upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
 
 
 def run_starts(

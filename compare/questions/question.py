@@ -28,15 +28,10 @@ F = TypeVar("F")
 
 @dataclass(frozen=True, kw_only=True)
 class Work:
-    """How a question stores its results and reports its progress; by default it does neither.
+    """How a question stores its results and reports its progress; by default it does neither."""
 
-    Attributes:
-        store: of finished results.
-        progress: receives a note after each step.
-    """
-
-    store: Store = field(default_factory=Store)
-    progress: Progress = ignore_progress
+    store: Store = field(default_factory=Store)  #: of finished results
+    progress: Progress = ignore_progress  #: receives a note after each step
 
     def solver(self, solver: Solver | None = None) -> Solver:
         """Return a solver that stores its finished runs; None for IPOPT with its defaults."""
@@ -60,18 +55,12 @@ class Work:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question(ABC, Generic[F]):
-    """A question about a problem, whose findings are of type F; its fields are its inputs.
+    """A question about a problem, whose findings are of type F; its fields are its inputs."""
 
-    Attributes:
-        problem: with its current parameter values.
-        name: of the question and its command.
-        counts: what the progress counts.
-    """
+    name: ClassVar[str]  #: of the question and its command
+    counts: ClassVar[str] = "steps"  #: what the progress counts
 
-    name: ClassVar[str]
-    counts: ClassVar[str] = "steps"
-
-    problem: GaitProblem
+    problem: GaitProblem  #: with its current parameter values
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -109,16 +98,11 @@ def find(question: Question[F], work: Work | None = None) -> F:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer(Document):
-    """A report with its data. Named tables are written as CSV files and are not printed.
+    """A report with its data. Named tables are written as CSV files and are not printed."""
 
-    Attributes:
-        stem: file name of the report and the data, without suffix.
-        data: the whole answer as plain data.
-        results: gaits or certificates for other commands, by file name without suffix.
-    """
-
-    stem: str
-    data: Mapping[str, Any]
+    stem: str  #: file name of the report and the data, without suffix
+    data: Mapping[str, Any]  #: the whole answer as plain data
+    #: gaits or certificates for other commands, by file name without suffix
     results: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def write(self, folder: Path) -> list[Path]:

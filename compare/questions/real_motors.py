@@ -51,49 +51,31 @@ class Use:
 
 @dataclass(frozen=True, kw_only=True)
 class Variant:
-    """The optimum with some features of the motors.
+    """The optimum with some features of the motors."""
 
-    Attributes:
-        name: in words.
-        features: as in the option ``motors``.
-        feasible: IPOPT converged to a feasible point.
-        status: in words.
-        power_W: at the optimum, as this variant computes it.
-        unchanged_power_W: at the published optimum, as this variant computes it.
-        unchanged_violation: of the published optimum with this variant's limits.
-        published_power_W: at this variant's optimum, as the paper computes it.
-        x: by variable name.
-        moved: largest distance of a variable from the published optimum, in units of its range, and the variable's name.
-        uses: by kind of limit, at this optimum, also without the limits.
-    """
-
-    name: str
-    features: str
-    feasible: bool
-    status: str
-    power_W: float
-    unchanged_power_W: float
-    unchanged_violation: float
-    published_power_W: float
-    x: Mapping[str, float]
+    name: str  #: in words
+    features: str  #: as in the option ``motors``
+    feasible: bool  #: IPOPT converged to a feasible point
+    status: str  #: in words
+    power_W: float  #: at the optimum, as this variant computes it
+    unchanged_power_W: float  #: at the published optimum, as this variant computes it
+    unchanged_violation: float  #: of the published optimum with this variant's limits
+    published_power_W: float  #: at this variant's optimum, as the paper computes it
+    x: Mapping[str, float]  #: by variable name
+    #: largest distance of a variable from the published optimum, in units of its range, and the variable's name
     moved: tuple[float, str]
-    uses: Mapping[str, Use]
+    uses: Mapping[str, Use]  #: by kind of limit, at this optimum, also without the limits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motors(Question[tuple[Variant, ...]]):
-    """What do the real motors change in a NAO phase (without the option ``motors``)?
-
-    Attributes:
-        starts: random starts of IPOPT for each variant.
-        seed: of the starts.
-    """
+    """What do the real motors change in a NAO phase (without the option ``motors``)?"""
 
     name: ClassVar[str] = "motors"
     counts: ClassVar[str] = "variants"
 
-    starts: int = 10
-    seed: int = 0
+    starts: int = 10  #: random starts of IPOPT for each variant
+    seed: int = 0  #: of the starts
 
     def __post_init__(self) -> None:
         """Require a problem with motors, and without the option."""

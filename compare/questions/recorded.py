@@ -25,21 +25,13 @@ LARGEST_LEAN_DEG = 1.0  # the engine starts a gait with an upright torso
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JudgedGait:
-    """A recorded gait next to the optimum.
+    """A recorded gait next to the optimum."""
 
-    Attributes:
-        recorded: the gait.
-        evaluation: of the gait, on the samples of the planned problem and between them.
-        optimum: evaluation of the optimum of the same step and durations; None if there is none.
-        engine: measurements in the engine; None without a simulation.
-        notes: joints that were left out, exchanged sides, reasons for missing results.
-    """
-
-    recorded: RecordedGait
-    evaluation: Evaluation
-    optimum: Evaluation | None
-    engine: Measurements | None
-    notes: tuple[str, ...]
+    recorded: RecordedGait  #: the gait
+    evaluation: Evaluation  #: of the gait, on the samples of the planned problem and between them
+    optimum: Evaluation | None  #: evaluation of the optimum of the same step and durations; None if there is none
+    engine: Measurements | None  #: measurements in the engine; None without a simulation
+    notes: tuple[str, ...]  #: joints that were left out, exchanged sides, reasons for missing results
 
     def rows(self) -> list[tuple[str, float, float]]:
         """Return name and value of each index, and its value at the optimum, NaN if there is none."""

@@ -68,27 +68,16 @@ def place(problem: GaitProblem, at: Mapping[str, float]) -> GaitProblem:
 
 @dataclass(frozen=True, kw_only=True)
 class SweepPoint:
-    """Result at one point of the grid.
+    """Result at one point of the grid."""
 
-    Attributes:
-        at: value of each axis.
-        objective: exact value, in the problem's sense.
-        feasible: a feasible optimum was found.
-        status: in words; without a feasible point it names the violated constraints.
-        x: by variable name.
-        violation: exact total violation.
-        evaluations: calls of f.
-        time_s: wall time [s].
-    """
-
-    at: Mapping[str, float]
-    objective: float
-    feasible: bool
-    status: str
-    x: Mapping[str, float]
-    violation: float
-    evaluations: int
-    time_s: float
+    at: Mapping[str, float]  #: value of each axis
+    objective: float  #: exact value, in the problem's sense
+    feasible: bool  #: a feasible optimum was found
+    status: str  #: in words; without a feasible point it names the violated constraints
+    x: Mapping[str, float]  #: by variable name
+    violation: float  #: exact total violation
+    evaluations: int  #: calls of f
+    time_s: float  #: wall time [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,23 +86,16 @@ class Sweep(Question[list[SweepPoint]]):
 
     An NLP solver follows the grid forwards and backwards, so that each point is a neighbour of the last and starts from it; a
     search starts afresh at each. Infeasible points are part of the result, with the violated constraints.
-
-    Attributes:
-        axes: at least one.
-        algorithm: an NLP solver or a search algorithm.
-        starts: random starts of an NLP solver at both ends of its path, and where no neighbour helps.
-        evaluations: budget of a search, and of a run of SLSQP.
-        seed: of starts and searches.
     """
 
     name: ClassVar[str] = "sweep"
     counts: ClassVar[str] = "solves"
 
-    axes: Sequence[Axis]
-    algorithm: str = IPOPT
-    starts: int = 5
-    evaluations: int = 10_000
-    seed: int = 0
+    axes: Sequence[Axis]  #: at least one
+    algorithm: str = IPOPT  #: an NLP solver or a search algorithm
+    starts: int = 5  #: random starts of an NLP solver at both ends of its path, and where no neighbour helps
+    evaluations: int = 10_000  #: budget of a search, and of a run of SLSQP
+    seed: int = 0  #: of starts and searches
 
     def __post_init__(self) -> None:
         """Validate the grid and the algorithm.

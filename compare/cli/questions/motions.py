@@ -26,6 +26,7 @@ def motions(
     ] = 1,
     seed: Seed = 0,
     robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
+    intervals: Annotated[int, typer.Option(min=1, help="Intervals of the phase.")] = 10,
     output: Output,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the least power of richer motions.
@@ -38,5 +39,5 @@ def motions(
     from compare.questions.motions.motion import load_phase
     from compare.questions.motions.motions import Motions
 
-    phase, rising, free = load_phase(problem, robot), parse_names(orders), parse_names(free_orders)
+    phase, rising, free = load_phase(problem, robot, intervals), parse_names(orders), parse_names(free_orders)
     output.answer(Motions(problem=phase, orders=rising, free_orders=free, starts=starts, seed=seed))

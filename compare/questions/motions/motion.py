@@ -25,6 +25,7 @@ from nlp_gait.gaits.capabilities import FITTED_STARTS, resolve
 from nlp_gait.symbolic.splines import refine_spline
 
 PHASES = ("nao-ssp", "nao-dsp")
+INTERVALS = 10  # of the papers
 ORDERS = tuple(SPANS)[:-1]
 FREE_ORDERS = ("spline-2", "spline-4", "spline-8", "spline-16")
 # Samples in each interval, so that no motion bends between them: with 4, free joints on 16 spans hide a tenth of their power.
@@ -40,19 +41,12 @@ SOLVER = IpoptSettings(time_limit_s=3600.0, iterations=1000)
 
 @dataclass(frozen=True, kw_only=True)
 class MotionTask:
-    """One problem to solve.
+    """One problem to solve."""
 
-    Attributes:
-        kind: ``"planned"``, the same ``"coarse"`` with the papers' number of samples, ``"smooth"``, or ``"free"``.
-        problem: name.
-        options: of the problem.
-        starts: random starts next to the one from a simpler motion's optimum.
-    """
-
-    kind: str
-    problem: str
-    options: Mapping[str, Any]
-    starts: int
+    kind: str  #: ``"planned"``, the same ``"coarse"`` with the papers' number of samples, ``"smooth"``, or ``"free"``
+    problem: str  #: name
+    options: Mapping[str, Any]  #: of the problem
+    starts: int  #: random starts next to the one from a simpler motion's optimum
 
     @property
     def spec(self) -> ProblemSpec:
@@ -72,41 +66,24 @@ class MotionTask:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Optimum of one task.
+    """Optimum of one task."""
 
-    Attributes:
-        task: what was solved.
-        seed: of the random starts.
-        variables: number of them.
-        status: in words.
-        feasible: at least one start converged to a feasible point.
-        power_W: on the problem's own samples.
-        dense_power_W: on the judge's dense grid.
-        objectives: values of what the smooth tasks minimise, by name with its unit.
-        worst: constraint with the largest violation on the dense grid, with the amount; empty if there is none.
-        converged: starts that ended in a feasible optimum, of ``attempts``.
-        attempts: number of starts.
-        powers_W: power at the end of each start, the one from the simpler motion first; None where it is infeasible.
-        iterations: of the reported start.
-        time_s: wall time of IPOPT, all starts.
-        x: by variable name.
-    """
-
-    task: MotionTask
-    seed: int
-    variables: int
-    status: str
-    feasible: bool
-    power_W: float
-    dense_power_W: float
-    objectives: Mapping[str, float]
-    worst: str
-    converged: int
-    attempts: int
+    task: MotionTask  #: what was solved
+    seed: int  #: of the random starts
+    variables: int  #: number of them
+    status: str  #: in words
+    feasible: bool  #: at least one start converged to a feasible point
+    power_W: float  #: on the problem's own samples
+    dense_power_W: float  #: on the judge's dense grid
+    objectives: Mapping[str, float]  #: values of what the smooth tasks minimise, by name with its unit
+    worst: str  #: constraint with the largest violation on the dense grid, with the amount; empty if there is none
+    converged: int  #: starts that ended in a feasible optimum, of ``attempts``
+    attempts: int  #: number of starts
+    #: power at the end of each start, the one from the simpler motion first; None where it is infeasible
     powers_W: tuple[float | None, ...] = ()
-    iterations: int
-    time_s: float
-    x: Mapping[str, float]
+    iterations: int  #: of the reported start
+    time_s: float  #: wall time of IPOPT, all starts
+    x: Mapping[str, float]  #: by variable name
 
     @property
     def coefficients(self) -> int:
@@ -120,10 +97,10 @@ def check_phase(name: str) -> None:
         raise InputError(f"motions are compared for {' and '.join(PHASES)}, got {name!r}")
 
 
-def load_phase(name: str, robot: str) -> GaitProblem:
-    """Return a phase with a robot, by name; raises as ``check_phase``."""
+def load_phase(name: str, robot: str = "nao-v5", intervals: int = INTERVALS) -> GaitProblem:
+    """Return a phase by name, with a robot and a number of intervals; raises as ``check_phase``."""
     check_phase(name)
-    return ProblemSpec(name=name, options={"robot": robot}).load()
+    return ProblemSpec(name=name, options={"robot": robot, "intervals": intervals}).load()
 
 
 def make_tasks(
@@ -132,6 +109,7 @@ def make_tasks(
     orders: Sequence[str] = ORDERS,
     free_orders: Sequence[str] = FREE_ORDERS,
     robot: str = "nao-v5",
+    intervals: int = INTERVALS,
     starts: int = 1,
 ) -> list[MotionTask]:
     """Return the tasks of one phase, in an order in which each can start from an earlier one.
@@ -147,7 +125,8 @@ def make_tasks(
         raise InputError("there must be at least one order")
 
     def make(kind: str, trajectory: str, problem: str = phase, starts: int = 0, **more: Any) -> MotionTask:
-        options = {"robot": robot, "trajectory": trajectory, "samples_per_interval": SAMPLES, **more}
+        options = {"robot": robot, "intervals": intervals, "trajectory": trajectory}
+        options |= {"samples_per_interval": SAMPLES, **more}
         return MotionTask(kind=kind, problem=problem, options=options, starts=starts)
 
     planned = [make(PLANNED, order, starts=starts) for order in orders]

@@ -36,30 +36,22 @@ DRAWN = 20  # samples of a drawn path for each of the problem's own
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motions(Question[tuple[Motion, ...]]):
-    """How much power do richer motions of a NAO phase save?
-
-    Attributes:
-        orders: motions of hip, foot and arms, rising.
-        free_orders: motions of free joints, rising.
-        starts: random starts for each order, next to the simpler optimum.
-        seed: of the random starts.
-    """
+    """How much power do richer motions of a NAO phase save?"""
 
     name: ClassVar[str] = "motions"
     counts: ClassVar[str] = "motions"
 
-    orders: Sequence[str] = ORDERS
-    free_orders: Sequence[str] = FREE_ORDERS
-    starts: int = 1
-    seed: int = 0
+    orders: Sequence[str] = ORDERS  #: motions of hip, foot and arms, rising
+    free_orders: Sequence[str] = FREE_ORDERS  #: motions of free joints, rising
+    starts: int = 1  #: random starts for each order, next to the simpler optimum
+    seed: int = 0  #: of the random starts
 
     @cached_property
     def tasks(self) -> list[MotionTask]:
         """The problems to solve."""
-        robot = str(self.problem.options.get("robot", ""))
-        return make_tasks(
-            self.problem.name, orders=self.orders, free_orders=self.free_orders, robot=robot, starts=self.starts
-        )
+        body = {name: self.problem.options[name] for name in ("robot", "intervals")}
+        orders = {"orders": self.orders, "free_orders": self.free_orders}
+        return make_tasks(self.problem.name, **orders, **body, starts=self.starts)
 
     @property
     def total(self) -> int:

@@ -76,15 +76,10 @@ def _rows(groups: tuple[str, ...], group: str) -> list[int]:
 
 @dataclass(frozen=True, kw_only=True)
 class Speed:
-    """Mean speed of the hip over the phase: the distance that the phase prescribes, divided by its duration.
+    """Mean speed of the hip over the phase: the distance that the phase prescribes, divided by its duration."""
 
-    Attributes:
-        duration: variable that holds the phase's duration.
-        distance_m: of the hip along x.
-    """
-
-    duration: str
-    distance_m: float
+    duration: str  #: variable that holds the phase's duration
+    distance_m: float  #: of the hip along x
     name: str = SPEED
     unit: str = "m/s"
 

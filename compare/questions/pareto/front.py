@@ -34,23 +34,15 @@ WINDOW = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class FrontPoint:
-    """A point of the front.
+    """A point of the front."""
 
-    Attributes:
-        demanded: least value of the criterion that was demanded.
-        value: exact value of the criterion, at least that.
-        power_W: exact power.
-        price: slope of the front, from the multiplier of the demand [W per unit of the criterion]; NaN if the solver gives none.
-        violation: exact total violation.
-        x: (n,) as plain numbers.
-    """
-
-    demanded: float
-    value: float
-    power_W: float
+    demanded: float  #: least value of the criterion that was demanded
+    value: float  #: exact value of the criterion, at least that
+    power_W: float  #: exact power
+    #: slope of the front, from the multiplier of the demand [W per unit of the criterion]; NaN if the solver gives none
     price: float = 0.0
-    violation: float
-    x: tuple[float, ...]
+    violation: float  #: exact total violation
+    x: tuple[float, ...]  #: (n,) as plain numbers
 
 
 def solve_front(
@@ -198,38 +190,24 @@ def _make_reached(problem: GaitProblem, criterion: CompetingObjective, solution:
 
 @dataclass(frozen=True, kw_only=True)
 class Knee:
-    """A point at which the front bends away from the better values.
+    """A point at which the front bends away from the better values."""
 
-    Attributes:
-        value: of the criterion.
-        power_W: there.
-        price_before: slope just below it [W per unit].
-        price_after: slope just above it [W per unit].
-        turn_deg: by how much the front turns around it, with both ranges as 1 [degree].
-        chord_distance: from the straight line between the front's ends, with both ranges as 1; negative behind it.
-    """
-
-    value: float
-    power_W: float
-    price_before: float
-    price_after: float
-    turn_deg: float
-    chord_distance: float
+    value: float  #: of the criterion
+    power_W: float  #: there
+    price_before: float  #: slope just below it [W per unit]
+    price_after: float  #: slope just above it [W per unit]
+    turn_deg: float  #: by how much the front turns around it, with both ranges as 1 [degree]
+    chord_distance: float  #: from the straight line between the front's ends, with both ranges as 1; negative behind it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bends:
-    """How a front bends.
+    """How a front bends."""
 
-    Attributes:
-        knees: bends, by rising criterion.
-        farthest: number of the point farthest from the chord, on its better side.
-        convex: no segment is flatter than the one before it by more than a hundredth of its slope: then there is at most one
-            knee in the sense of the chord.
-    """
-
-    knees: tuple[Knee, ...]
-    farthest: int
+    knees: tuple[Knee, ...]  #: bends, by rising criterion
+    farthest: int  #: number of the point farthest from the chord, on its better side
+    #: no segment is flatter than the one before it by more than a hundredth of its slope: then there is at most one knee in the
+    #: sense of the chord
     convex: bool
 
 

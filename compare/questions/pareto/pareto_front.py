@@ -47,44 +47,28 @@ MARKS = ("x", "+", ".")
 
 
 class FoundFront(NamedTuple):
-    """The true front with its knees, and what the searches found.
+    """The true front with its knees, and what the searches found."""
 
-    Attributes:
-        front: with the points that were solved to answer the searches.
-        bends: its knees.
-        searches: fronts of all runs.
-        qualities: a row for each search and budget.
-        challenge: None without searches.
-    """
-
-    front: tuple[FrontPoint, ...]
-    bends: Bends
-    searches: tuple[SearchFront, ...] = ()
-    qualities: tuple[Quality, ...] = ()
-    challenge: Challenge | None = None
+    front: tuple[FrontPoint, ...]  #: with the points that were solved to answer the searches
+    bends: Bends  #: its knees
+    searches: tuple[SearchFront, ...] = ()  #: fronts of all runs
+    qualities: tuple[Quality, ...] = ()  #: a row for each search and budget
+    challenge: Challenge | None = None  #: None without searches
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParetoFront(Question[FoundFront]):
-    """How does the least power trade against one criterion, and how near do searches come?
-
-    Attributes:
-        objective: name of the criterion next to power.
-        points: of the front.
-        starts: random starts at some of its points.
-        searches: budgets by algorithm; none for the front alone.
-        runs: of each algorithm.
-        seed: of starts and of the first run.
-    """
+    """How does the least power trade against one criterion, and how near do searches come?"""
 
     name: ClassVar[str] = "pareto"
 
-    objective: str = "dbm_y_mean"
-    points: int = 40
-    starts: int = 5
+    objective: str = "dbm_y_mean"  #: name of the criterion next to power
+    points: int = 40  #: of the front
+    starts: int = 5  #: random starts at some of its points
+    #: budgets by algorithm; none for the front alone
     searches: Mapping[str, Sequence[int]] = field(default_factory=dict)
-    runs: int = 11
-    seed: int = 0
+    runs: int = 11  #: of each algorithm
+    seed: int = 0  #: of starts and of the first run
 
     def __post_init__(self) -> None:
         """Validate criterion and searches.

@@ -28,21 +28,13 @@ from nlp_gait.formulation import GaitProblem
 
 @dataclass(frozen=True, kw_only=True)
 class SurfacePoint:
-    """Least power for two demands.
+    """Least power for two demands."""
 
-    Attributes:
-        demanded: of each criterion.
-        values: reached, at least that.
-        power_W: exact.
-        violation: exact total violation.
-        x: (n,) as plain numbers.
-    """
-
-    demanded: tuple[float, float]
-    values: tuple[float, float]
-    power_W: float
-    violation: float
-    x: tuple[float, ...]
+    demanded: tuple[float, float]  #: of each criterion
+    values: tuple[float, float]  #: reached, at least that
+    power_W: float  #: exact
+    violation: float  #: exact total violation
+    x: tuple[float, ...]  #: (n,) as plain numbers
 
 
 class FoundSurface(NamedTuple):
@@ -54,21 +46,14 @@ class FoundSurface(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParetoSurface(Question[FoundSurface]):
-    """How does the least power trade against two criteria, from their cheapest to their largest values?
-
-    Attributes:
-        objectives: names of the two criteria.
-        points: least number of pairs of demands, on a square grid.
-        starts: random starts at both ends of the path over the grid.
-        seed: of these.
-    """
+    """How does the least power trade against two criteria, from their cheapest to their largest values?"""
 
     name: ClassVar[str] = "pareto"
 
-    objectives: tuple[str, str]
-    points: int = 40
-    starts: int = 5
-    seed: int = 0
+    objectives: tuple[str, str]  #: names of the two criteria
+    points: int = 40  #: least number of pairs of demands, on a square grid
+    starts: int = 5  #: random starts at both ends of the path over the grid
+    seed: int = 0  #: of these
 
     def __post_init__(self) -> None:
         """Validate the criteria; raises as ``make_competing_objective``."""

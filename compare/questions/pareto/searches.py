@@ -64,23 +64,14 @@ class PowerAndCompeting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchFront:
-    """Feasible nondominated points of one run after a budget.
+    """Feasible nondominated points of one run after a budget."""
 
-    Attributes:
-        solver: name of the search.
-        run: number.
-        budget: evaluations allowed.
-        values: (k,) criterion.
-        powers: (k,) [W].
-        X: (k, n).
-    """
-
-    solver: str
-    run: int
-    budget: int
-    values: Array
-    powers: Array
-    X: Array
+    solver: str  #: name of the search
+    run: int  #: number
+    budget: int  #: evaluations allowed
+    values: Array  #: (k,) criterion
+    powers: Array  #: (k,) [W]
+    X: Array  #: (k, n)
 
 
 def run_searches(
@@ -145,48 +136,32 @@ def select_best(fronts: Sequence[SearchFront]) -> list[FrontPoint]:
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """All runs of one search with one budget; medians with the extremes over runs.
+    """All runs of one search with one budget; medians with the extremes over runs."""
 
-    Attributes:
-        solver: name of the search.
-        budget: evaluations.
-        runs: number.
-        empty: runs without a feasible point; they count as hypervolume 0 and are left out of what follows.
-        hypervolume: (least, median, greatest) share of the true front's, with both ranges as 1 and the reference 1.1.
-        igd: (least, median, greatest) mean distance from a point of the true front to the nearest one found.
-        gap: (least, median, greatest) over runs of the mean power above the true front's at an equal criterion, relative.
-    """
-
-    solver: str
-    budget: int
-    runs: int
-    empty: int
+    solver: str  #: name of the search
+    budget: int  #: evaluations
+    runs: int  #: number
+    empty: int  #: runs without a feasible point; they count as hypervolume 0 and are left out of what follows
+    #: (least, median, greatest) share of the true front's, with both ranges as 1 and the reference 1.1
     hypervolume: tuple[float, float, float]
+    #: (least, median, greatest) mean distance from a point of the true front to the nearest one found
     igd: tuple[float, float, float] | None
+    #: (least, median, greatest) over runs of the mean power above the true front's at an equal criterion, relative
     gap: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Challenge:
-    """The best points of all searches, compared with the least power at their own criterion.
+    """The best points of all searches, compared with the least power at their own criterion."""
 
-    Attributes:
-        points: number of nondominated points.
-        solved: for how many of these, the lowest, the least power was solved for.
-        infeasible: how many of these the exact functions find infeasible.
-        least_gap: smallest power above the least one at an equal criterion, relative; negative if a point is better.
-        median_gap: likewise.
-        moved: number of points at which the front itself was improved by more than a millionth.
-        front: the front with all solved points.
-    """
-
-    points: int
-    solved: int
-    infeasible: int
+    points: int  #: number of nondominated points
+    solved: int  #: for how many of these, the lowest, the least power was solved for
+    infeasible: int  #: how many of these the exact functions find infeasible
+    #: smallest power above the least one at an equal criterion, relative; negative if a point is better
     least_gap: float
-    median_gap: float
-    moved: int
-    front: tuple[FrontPoint, ...]
+    median_gap: float  #: likewise
+    moved: int  #: number of points at which the front itself was improved by more than a millionth
+    front: tuple[FrontPoint, ...]  #: the front with all solved points
 
 
 def compute_qualities(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]) -> list[Quality]:

@@ -31,32 +31,21 @@ MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Price:
-    """Effect of a change of one quantity on the optimum.
+    """Effect of a change of one quantity on the optimum."""
 
-    Attributes:
-        name: of the parameter, or of the robot's quantity.
-        unit: of the quantity; ``"1"`` for a factor.
-        value: its current value, 0 for a length that is added.
-        slope: derivative of the optimal objective.
-        step: natural step [unit].
-        words: the step in words, for example ``"1 mm"``.
-        reach: how far the quantity may change, down and up, while x* moves along one line.
-        x: derivative of x* by variable name; None where dependent bounds contradict each other.
-        resolved: the slope by solving again slightly lower and higher; None without verification.
-        x_error: largest difference of ``x`` from solving again, in units of its largest entry; None without verification.
-        one_step: change of the objective by solving again a natural step lower and higher; None where that failed.
-    """
-
-    name: str
-    unit: str
-    value: float
-    slope: float
-    step: float
-    words: str
-    reach: tuple[float, float]
+    name: str  #: of the parameter, or of the robot's quantity
+    unit: str  #: of the quantity; ``"1"`` for a factor
+    value: float  #: its current value, 0 for a length that is added
+    slope: float  #: derivative of the optimal objective
+    step: float  #: natural step [unit]
+    words: str  #: the step in words, for example ``"1 mm"``
+    reach: tuple[float, float]  #: how far the quantity may change, down and up, while x* moves along one line
+    #: derivative of x* by variable name; None where dependent bounds contradict each other
     x: Mapping[str, float] | None
-    resolved: float | None = None
+    resolved: float | None = None  #: the slope by solving again slightly lower and higher; None without verification
+    #: largest difference of ``x`` from solving again, in units of its largest entry; None without verification
     x_error: float | None = None
+    #: change of the objective by solving again a natural step lower and higher; None where that failed
     one_step: tuple[float | None, float | None] | None = None
 
     @property

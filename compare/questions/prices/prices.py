@@ -42,48 +42,30 @@ PREFIXED = {"W": ("mW", 1e3), "J": ("J", 1.0)}
 
 @dataclass(frozen=True, kw_only=True)
 class FoundPrices:
-    """Prices at the optimum of a problem.
+    """Prices at the optimum of a problem."""
 
-    Attributes:
-        objective: at the optimum.
-        x: by variable name.
-        limits: parameters with a price, most expensive step first.
-        free: number of parameters without one.
-        robot: quantities of the robot, largest change first; empty if the problem has no robot.
-        weak: bounds that are active without a price, or nearly active: there, derivatives are one-sided.
-        dependent: number of active constraints that follow from others.
-        residual: of the first-order conditions.
-        reason: why there are no derivatives; None if there are.
-    """
-
-    objective: float
-    x: Mapping[str, float]
-    limits: tuple[Price, ...]
-    free: int
-    robot: tuple[Price, ...]
-    weak: tuple[str, ...]
-    dependent: int
-    residual: float
-    reason: str | None
+    objective: float  #: at the optimum
+    x: Mapping[str, float]  #: by variable name
+    limits: tuple[Price, ...]  #: parameters with a price, most expensive step first
+    free: int  #: number of parameters without one
+    robot: tuple[Price, ...]  #: quantities of the robot, largest change first; empty if the problem has no robot
+    weak: tuple[str, ...]  #: bounds that are active without a price, or nearly active: there, derivatives are one-sided
+    dependent: int  #: number of active constraints that follow from others
+    residual: float  #: of the first-order conditions
+    reason: str | None  #: why there are no derivatives; None if there are
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prices(Question[FoundPrices]):
-    """What does each limit cost, and each error of the robot's masses, leg lengths and soles?
-
-    Attributes:
-        starts: random starts.
-        seed: of the starts.
-        checks: how many of the robot's quantities, largest change first, are verified by solving again; all parameters are.
-        solver: one with multipliers; its optimum is refined by IPOPT.
-    """
+    """What does each limit cost, and each error of the robot's masses, leg lengths and soles?"""
 
     name: ClassVar[str] = "prices"
 
-    starts: int = 10
-    seed: int = 0
+    starts: int = 10  #: random starts
+    seed: int = 0  #: of the starts
+    #: how many of the robot's quantities, largest change first, are verified by solving again; all parameters are
     checks: int = 3
-    solver: Solver | None = None
+    solver: Solver | None = None  #: one with multipliers; its optimum is refined by IPOPT
 
     @property
     def inputs(self) -> dict[str, Any]:

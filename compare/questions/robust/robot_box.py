@@ -23,21 +23,13 @@ Corner = tuple[int, ...]  # +1 or -1 for each quantity of the box
 
 @dataclass(frozen=True, kw_only=True)
 class Worst:
-    """The worst case of a gait over a set of robots.
+    """The worst case of a gait over a set of robots."""
 
-    Attributes:
-        violation: largest of one row, in its unit; 0 if all limits are satisfied.
-        row: its name.
-        unit: of the violation.
-        corner: changes of the quantities of that robot.
-        power_W: largest over all robots of the set.
-    """
-
-    violation: float
-    row: str
-    unit: str
-    corner: Mapping[str, float]
-    power_W: float
+    violation: float  #: largest of one row, in its unit; 0 if all limits are satisfied
+    row: str  #: its name
+    unit: str  #: of the violation
+    corner: Mapping[str, float]  #: changes of the quantities of that robot
+    power_W: float  #: largest over all robots of the set
 
 
 class RobotBox:

@@ -31,25 +31,16 @@ class FoundRobust(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robust(Question[FoundRobust]):
-    """What does it cost to keep all limits for all robots within the tolerances?
-
-    Attributes:
-        mass: tolerance of every mass, up and down [%].
-        sole: tolerance of the soles' position in x and y [mm].
-        starts: random starts of the nominal problem.
-        seed: of the starts and of the random corners.
-        samples: random corners on which each result is evaluated.
-        simulate: simulate both gaits on the worst robots (extra ``sim``).
-    """
+    """What does it cost to keep all limits for all robots within the tolerances?"""
 
     name: ClassVar[str] = "robust"
 
-    mass: float = 5.0
-    sole: float = 2.0
-    starts: int = 10
-    seed: int = 0
-    samples: int = 20
-    simulate: bool = True
+    mass: float = 5.0  #: tolerance of every mass, up and down [%]
+    sole: float = 2.0  #: tolerance of the soles' position in x and y [mm]
+    starts: int = 10  #: random starts of the nominal problem
+    seed: int = 0  #: of the starts and of the random corners
+    samples: int = 20  #: random corners on which each result is evaluated
+    simulate: bool = True  #: simulate both gaits on the worst robots (extra ``sim``)
 
     def __post_init__(self) -> None:
         """Require a robot, and MuJoCo if it is needed.

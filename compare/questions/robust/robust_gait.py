@@ -37,63 +37,38 @@ ROUNDS = 8
 
 @dataclass(frozen=True, kw_only=True)
 class RobustGait:
-    """A gait that keeps its limits in a box of robots.
+    """A gait that keeps its limits in a box of robots."""
 
-    Attributes:
-        name: of the box, in words.
-        box: half-widths by quantity.
-        corners: changes of the robots in the scenario problem; the first is the nominal one, without changes.
-        robots: their names.
-        rounds: number of searches for worse corners.
-        settled: the last round found no worse corner.
-        status: of the last solution.
-        nominal_x: optimum for the nominal robot alone.
-        nominal_W: its power there.
-        nominal_worst: its worst case over the corners.
-        x: robust optimum.
-        power_W: with the nominal robot.
-        worst_W: in the worst corner: the minimised objective.
-        worst: its worst case over the corners.
-        random_worst: over random corners that are not in the scenario problem.
-    """
-
-    name: str
-    box: Mapping[str, float]
+    name: str  #: of the box, in words
+    box: Mapping[str, float]  #: half-widths by quantity
+    #: changes of the robots in the scenario problem; the first is the nominal one, without changes
     corners: tuple[Mapping[str, float], ...]
-    robots: tuple[str, ...]
-    rounds: int
-    settled: bool
-    status: str
-    nominal_x: Mapping[str, float]
-    nominal_W: float
-    nominal_worst: Worst
-    x: Mapping[str, float]
-    power_W: float
-    worst_W: float
-    worst: Worst
-    random_worst: Worst
+    robots: tuple[str, ...]  #: their names
+    rounds: int  #: number of searches for worse corners
+    settled: bool  #: the last round found no worse corner
+    status: str  #: of the last solution
+    nominal_x: Mapping[str, float]  #: optimum for the nominal robot alone
+    nominal_W: float  #: its power there
+    nominal_worst: Worst  #: its worst case over the corners
+    x: Mapping[str, float]  #: robust optimum
+    power_W: float  #: with the nominal robot
+    worst_W: float  #: in the worst corner: the minimised objective
+    worst: Worst  #: its worst case over the corners
+    random_worst: Worst  #: over random corners that are not in the scenario problem
 
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedGait:
-    """One gait on one robot, open loop.
+    """One gait on one robot, open loop."""
 
-    Attributes:
-        gait: ``"nominal"`` or ``"robust"``.
-        robot: its name, with its changes.
-        fell_at_s: None if it stayed up.
-        largest_tilt_deg: of the torso.
-        margin_m: mean lateral distance of the engine's centre of pressure, averaged over one period of the set-points, to the
-            nearer edge of the supporting soles.
-        predicted_margin_m: the same of the planned ZMP on this robot, over the same instants.
-    """
-
-    gait: str
-    robot: str
-    fell_at_s: float | None
-    largest_tilt_deg: float
+    gait: str  #: ``"nominal"`` or ``"robust"``
+    robot: str  #: its name, with its changes
+    fell_at_s: float | None  #: None if it stayed up
+    largest_tilt_deg: float  #: of the torso
+    #: mean lateral distance of the engine's centre of pressure, averaged over one period of the set-points, to the nearer edge of
+    #: the supporting soles
     margin_m: float
-    predicted_margin_m: float
+    predicted_margin_m: float  #: the same of the planned ZMP on this robot, over the same instants
 
 
 def make_boxes(problem: GaitProblem, mass: float, sole_m: float) -> dict[str, Box]:

@@ -20,19 +20,12 @@ from nlp_gait.simulation.simulate import simulate_plan
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gait:
-    """Cheapest cycle at one point of the axis.
+    """Cheapest cycle at one point of the axis."""
 
-    Attributes:
-        point: as the sweep found it, with the violated constraints where there is no feasible cycle.
-        result: problem and x at this point.
-        indexes: exact performance indexes.
-        walk: in the engine; None without a simulation.
-    """
-
-    point: SweepPoint
-    result: Result
-    indexes: Mapping[str, float]
-    walk: Walk | None = None
+    point: SweepPoint  #: as the sweep found it, with the violated constraints where there is no feasible cycle
+    result: Result  #: problem and x at this point
+    indexes: Mapping[str, float]  #: exact performance indexes
+    walk: Walk | None = None  #: in the engine; None without a simulation
 
     @property
     def at(self) -> float:

@@ -46,23 +46,14 @@ PLACES: tuple[Place, ...] = ("model", "engine")
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedGait:
-    """Gait of a planner on the footsteps of a cheapest gait.
+    """Gait of a planner on the footsteps of a cheapest gait."""
 
-    Attributes:
-        planner: its name.
-        at: value on the axis.
-        indexes: exact performance indexes; empty if there is no gait.
-        broken: violated limits, with their violation.
-        note: what the planner chose, or why there is no gait.
-        walk: in the engine; None without a simulation.
-    """
-
-    planner: str
-    at: float
-    indexes: Mapping[str, float]
-    broken: tuple[str, ...]
-    note: str
-    walk: Walk | None = None
+    planner: str  #: its name
+    at: float  #: value on the axis
+    indexes: Mapping[str, float]  #: exact performance indexes; empty if there is no gait
+    broken: tuple[str, ...]  #: violated limits, with their violation
+    note: str  #: what the planner chose, or why there is no gait
+    walk: Walk | None = None  #: in the engine; None without a simulation
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -75,12 +66,8 @@ class PlannedGait:
         return None if self.walk is None else self.walk.engine_J_per_planned_m
 
 
-def check_planners(names: Sequence[str], problem: GaitProblem) -> tuple[str, ...]:
-    """Return the planners of these names.
-
-    Raises:
-        InputError: a planner is unknown, or does not support an option of the problem.
-    """
+def check_planners(names: Sequence[str], problem: GaitProblem) -> None:
+    """Raise InputError if a planner is unknown, or does not support an option of the problem."""
     for name in names:
         if name not in PLANNERS:
             raise InputError(f"a baseline is one of {', '.join(PLANNERS)}, got {name!r}")
@@ -90,7 +77,6 @@ def check_planners(names: Sequence[str], problem: GaitProblem) -> tuple[str, ...
         for name, value in problem.options.items():
             if name not in ("objective", *shared) and value != defaults.get(name):
                 raise InputError(f"the {CART_TABLE} walk does not support {name}={value}; leave that option out")
-    return tuple(dict.fromkeys(names))
 
 
 def _shared_options(problem: GaitProblem) -> dict[str, Any]:

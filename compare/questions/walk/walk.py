@@ -54,25 +54,16 @@ class FoundGaits(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CheapestWalk(Question[FoundGaits]):
-    """What does walking cost along an axis? The problem is a walking cycle with the power as its objective.
-
-    Attributes:
-        axis: parameter or variable; by default ten speeds.
-        starts: random starts of IPOPT at both ends of the axis, and where no neighbour helps.
-        seed: of these starts.
-        steps: number of steps of each gait to simulate; 0 for none (extra ``sim``).
-        drive: of the simulation.
-        planners: other planners, on the same footsteps.
-    """
+    """What does walking cost along an axis? The problem is a walking cycle with the power as its objective."""
 
     name: ClassVar[str] = "walk"
 
-    axis: Axis
-    starts: int = 5
-    seed: int = 0
-    steps: int = 0
-    drive: Drive = Drive()
-    planners: Sequence[str] = ()
+    axis: Axis  #: parameter or variable; by default ten speeds
+    starts: int = 5  #: random starts of IPOPT at both ends of the axis, and where no neighbour helps
+    seed: int = 0  #: of these starts
+    steps: int = 0  #: number of steps of each gait to simulate; 0 for none (extra ``sim``)
+    drive: Drive = Drive()  #: of the simulation
+    planners: Sequence[str] = ()  #: other planners, on the same footsteps
 
     def __post_init__(self) -> None:
         """Validate problem and planners, and require MuJoCo if it is needed.
@@ -108,7 +99,7 @@ class CheapestWalk(Question[FoundGaits]):
             work.progress(f"{gait.at:g}")
         others: tuple[PlannedGait, ...] = ()
         options = {"starts": self.starts, "seed": self.seed, "steps": self.steps}
-        planners = check_planners(self.planners, problem)
+        planners = tuple(dict.fromkeys(self.planners))
         for other in plan_gaits(problem, gaits, planners, **options, drive=self.drive, work=work):
             others = (*others, other)
             yield FoundGaits(tuple(gaits), others)

@@ -12,7 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
+from compare.cli.questions.output import Output
 from compare.cli.simulation_options import DriveOptions
+from compare.drawing.figures import new_figure
 from compare.questions.question import Work, find
 from compare.questions.sweep import Sweep, SweepPoint, parse_axis
 from compare.questions.walk import planners
@@ -46,6 +48,12 @@ def question() -> CheapestWalk:
     return CheapestWalk(problem=problem, axis=parse_axis(OVER), starts=1)
 
 
+@pytest.fixture
+def no_cycle_figure(coarse_pictures: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw an empty figure instead of the cycle, for tests that look at no figure."""
+    monkeypatch.setattr(module, "plot_cycle", lambda _: new_figure())
+
+
 @pytest.fixture(scope="module")
 def gaits(question: CheapestWalk, folder: Path) -> tuple[Gait, ...]:
     """Two gaits, and a point without one."""
@@ -62,6 +70,7 @@ def test_gaits_satisfy_the_axis(gaits: tuple[Gait, ...]) -> None:
         assert gait.indexes["cost_of_transport"] == pytest.approx(gait.point.objective / (5.30535 * 9.8 * gait.at))
 
 
+@pytest.mark.usefixtures("no_cycle_figure")
 def test_the_table_and_the_results_can_be_read_back(
     question: CheapestWalk, gaits: tuple[Gait, ...], tmp_path: Path
 ) -> None:
@@ -85,6 +94,7 @@ def test_figures_are_drawn_with_and_without_a_gait(question: CheapestWalk, gaits
     assert figures(infeasible) == ["nao-cycle-cost"]
 
 
+@pytest.mark.usefixtures("no_cycle_figure")
 def test_other_planners_take_the_same_footsteps(
     question: CheapestWalk, gaits: tuple[Gait, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -103,7 +113,7 @@ def test_other_planners_take_the_same_footsteps(
     assert any(sentence.startswith("Published: 9.16 to 13.35 %") for sentence in sentences)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("coarse_pictures")
 def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command with a made-up gait: the planner uses only its footsteps."""
     pytest.importorskip("urdf_parser_py")
@@ -178,21 +188,16 @@ def test_the_command_simulates_stored_gaits(gaits: tuple[Gait, ...], folder: Pat
     assert f"{100 * error:+.2f} %" in page
 
 
-def test_the_engine_simulates_ten_steps_by_default(
-    gaits: tuple[Gait, ...], folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_engine_simulates_ten_steps_by_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
-    simulated: list[int] = []
-
-    def fake(result: Result, steps: int, *_: object) -> None:
-        simulated.append(steps)
-
-    monkeypatch.setattr(module, "simulate_walk", fake)
-    for options in (["--engine"], ["--engine", "--steps", "3"]):
-        assert CliRunner().invoke(app, [*COMMAND, "--out", str(folder), *options]).exit_code == 0
-    assert simulated == [10, 10, 3, 3]
+    steps: list[int] = []
+    monkeypatch.setattr(Output, "answer", lambda _, question: steps.append(question.steps))
+    for options in ([], ["--engine"], ["--engine", "--steps", "3"]):
+        assert CliRunner().invoke(app, [*COMMAND, "--out", str(tmp_path), *options]).exit_code == 0
+    assert steps == [0, 10, 3]
 
 
+@pytest.mark.usefixtures("no_cycle_figure")
 def test_an_interrupted_walk_keeps_the_gaits(
     gaits: tuple[Gait, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
