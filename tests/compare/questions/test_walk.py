@@ -49,7 +49,7 @@ def question() -> CheapestWalk:
 
 
 @pytest.fixture
-def no_cycle_figure(coarse_pictures: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def no_cycle_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw an empty figure instead of the cycle, for tests that look at no figure."""
     monkeypatch.setattr(module, "plot_cycle", lambda _: new_figure())
 
@@ -113,7 +113,6 @@ def test_other_planners_take_the_same_footsteps(
     assert any(sentence.startswith("Published: 9.16 to 13.35 %") for sentence in sentences)
 
 
-@pytest.mark.usefixtures("coarse_pictures")
 def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command with a made-up gait: the planner uses only its footsteps."""
     pytest.importorskip("urdf_parser_py")
