@@ -59,7 +59,9 @@ class UnseenOptima:
     good_turing: float  #: share of starts that would reach an unseen optimum: the optima reached once, divided by N
     #: Expected number of all local optima, for a uniform prior on their number and shares; None if the sample is too small
     expected_optima: float | None
-    expected_covered: float | None  #: expected share of starts that reach seen optima, for the same prior; None likewise
+    expected_covered: (
+        float | None
+    )  #: expected share of starts that reach seen optima, for the same prior; None likewise
     largest_missed: float  #: upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
 
 
