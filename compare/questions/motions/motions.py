@@ -29,7 +29,7 @@ from compare.questions.question import Answer, Question, Work, make_csv_table, m
 from compare.report.document import Figure, Table
 from nlp_gait.formulation import Array
 
-KIND_WORDS = {PLANNED: "", COARSE_KIND: "11 samples: ", SMOOTHED: "least ", FREED: "free joints, "}
+KIND_WORDS = {PLANNED: "", SMOOTHED: "least ", FREED: "free joints, "}
 LOOKS = {PLANNED: (COLOURS["pso"], "o-", "hip, foot and arms"), FREED: (COLOURS["ga"], "s-", "free joints")}
 DRAWN = 20  # samples of a drawn path for each of the problem's own
 
@@ -49,9 +49,15 @@ class Motions(Question[tuple[Motion, ...]]):
     @cached_property
     def tasks(self) -> list[MotionTask]:
         """The problems to solve."""
-        body = {name: self.problem.options[name] for name in ("robot", "intervals")}
-        orders = {"orders": self.orders, "free_orders": self.free_orders}
-        return make_tasks(self.problem.name, **orders, **body, starts=self.starts)
+        options = self.problem.options
+        return make_tasks(
+            self.problem.name,
+            orders=self.orders,
+            free_orders=self.free_orders,
+            robot=str(options["robot"]),
+            intervals=int(options["intervals"]),
+            starts=self.starts,
+        )
 
     @property
     def total(self) -> int:
@@ -106,11 +112,13 @@ def describe_motion(motion: Motion) -> str:
     """Return in words what was solved."""
     if motion.task.kind == SMOOTHED:
         return f"{KIND_WORDS[SMOOTHED]}{motion.task.options['objective']}, {motion.task.trajectory}"
+    if motion.task.kind == COARSE_KIND:
+        return f"{motion.task.options['intervals'] + 1} samples: {motion.task.trajectory}"
     return KIND_WORDS[motion.task.kind] + motion.task.trajectory
 
 
 def describe_motions(motions: Sequence[Motion]) -> list[str]:
-    """Return sentences on the trend of the orders, violations between 11 samples, and the price of smoothness."""
+    """Return sentences on the trend of the orders, violations between few samples, and the price of smoothness."""
     sentences = []
     for kind, (_, _, words) in LOOKS.items():
         powers = [m.power_W for m in motions if m.task.kind == kind]
@@ -125,7 +133,7 @@ def describe_motions(motions: Sequence[Motion]) -> list[str]:
     for m in motions:
         if m.task.kind == COARSE_KIND:
             sentences.append(
-                f"on the paper's 11 samples {m.task.trajectory} seems to need {m.power_W:.4f} W; "
+                f"on {m.task.options['intervals'] + 1} samples {m.task.trajectory} seems to need {m.power_W:.4f} W; "
                 f"between them it needs {m.dense_power_W:.4f} W" + (f" and violates {m.worst}" if m.worst else "")
             )
     cheapest = {m.task.trajectory: m for m in motions if m.task.kind == PLANNED}

@@ -18,9 +18,11 @@ from compare.questions.motions import motion as module
 from compare.questions.motions.motion import Motion, extrapolate, find_start, load_phase, make_tasks
 from compare.questions.motions.motions import Motions, describe_motions
 from compare.questions.question import Work, find
+from compare.report import writing
 from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError
+from tests.compare.pictures import save_coarsely
 
 RUN = CliRunner()
 ORDERS = ["cubic", "quintic"]
@@ -33,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def question() -> Motions:
-    return Motions(problem=load_phase("nao-dsp", "nao-v5"), orders=ORDERS, free_orders=(), starts=0)
+    return Motions(problem=load_phase("nao-dsp", intervals=2), orders=ORDERS, free_orders=(), starts=0)
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +43,12 @@ def found(folder: Path, question: Motions) -> tuple[Motion, ...]:
     return find(question, Work(store=Store(folder)))
 
 
-def test_a_quintic_needs_less_and_has_no_room_to_hide_between_11_samples(found: tuple[Motion, ...]) -> None:
+def test_a_quintic_needs_less_and_hides_power_between_few_samples(found: tuple[Motion, ...]) -> None:
     cubic, quintic, coarse = found
     assert all(motion.feasible for motion in found)
     assert quintic.power_W < 0.9 * cubic.power_W
-    assert quintic.power_W == pytest.approx(quintic.dense_power_W, rel=0.01)
-    assert coarse.power_W == pytest.approx(coarse.dense_power_W, rel=0.1)
+    assert quintic.power_W == pytest.approx(quintic.dense_power_W, rel=0.15)
+    assert coarse.power_W < 0.1 * coarse.dense_power_W and coarse.worst.startswith("torque_change")
     assert (cubic.coefficients, quintic.coefficients) == (0, 14)
 
 
@@ -64,8 +66,19 @@ def test_a_question_continues_from_its_files(
         find(replace(question, seed=1), Work(store=Store(folder)))
 
 
-def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...]) -> None:
-    command = ["motions", "nao-dsp", "--orders", "cubic,quintic", "--free-orders", "", "--starts", "0"]
+def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    command = [
+        "motions",
+        "nao-dsp",
+        "--orders",
+        "cubic,quintic",
+        "--free-orders",
+        "",
+        "--starts",
+        "0",
+        "--intervals",
+        "2",
+    ]
     command += ["--out", str(folder)]
     done = RUN.invoke(app, [*command, "--json"])
     assert done.exit_code == 0, done.output
@@ -76,12 +89,13 @@ def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...]) -> 
     assert [float(line["power_W"]) for line in lines] == [motion.power_W for motion in found]
     pictures = [path for path in written.values() if path.suffix in (".png", ".svg")]
     assert len(pictures) == 4 and all(picture.stat().st_size > 10_000 for picture in pictures)
+    monkeypatch.setattr(writing, "save", save_coarsely)
     printed = RUN.invoke(app, command).stdout
-    assert "11 samples: quintic" in printed and "never rises" in printed
+    assert all(words in printed for words in ("3 samples: quintic", "never rises", "and violates torque_change"))
 
 
 def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: tuple[Motion, ...]) -> None:
-    *_, task = make_tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], starts=0)
+    *_, task = make_tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], intervals=2)
     problem = ProblemSpec(name=task.problem, options=task.options).load()
     planned = ProblemSpec(name="nao-dsp", options=task.options).load()
     x0 = find_start(task, problem, found)

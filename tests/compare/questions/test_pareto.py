@@ -67,7 +67,7 @@ def test_dominated_points_go() -> None:
 
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_criteria_are_the_judges_numbers(name: str) -> None:
-    problem = nlp_gait.load(name)
+    problem = nlp_gait.load(name, intervals=4)
     x = X if name == "nao-ssp" else np.array([0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.0217, 2.0])
     judged = evaluate(problem, x)
     objective = nlp_gait.compile_objective(problem)
@@ -167,7 +167,7 @@ def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProb
 
 def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path) -> None:
     question = ParetoSurface(problem=small, objectives=("dbm_y_mean", "speed"), points=4, starts=1)
-    surface = find(question)
+    surface = find(question, Work(store=Store(folder)))
     powers = {p.demanded: p.power_W for p in surface.points}
     for (margin, speed), power in powers.items():
         assert all(other >= power * (1 - 1e-6) for (m, s), other in powers.items() if m >= margin and s >= speed)
