@@ -73,10 +73,13 @@ PARAMETERS = (
 
 @maker
 def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
-    """Return the trajectory optimisation of one step in so many equal intervals; raises InputError for less than ten.
+    """Return the trajectory optimisation of one step.
 
     States are angles and rates of the seven links that move while the stance foot stands flat; controls are their
     accelerations and the ground's forces on sole and toe of the rear foot.
+
+    Args:
+        intervals: equal parts of the step, at least 10.
 
     Source:
         Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.

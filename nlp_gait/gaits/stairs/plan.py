@@ -89,7 +89,7 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
     Args:
         minimise: energy, the integral of sum |torque x rate| over all joints, or the peak of the joints' jerk (the paper's
             knot shifting).
-        intervals: of the step, a quarter in each phase; InputError for other numbers.
+        intervals: of the step, a quarter in each phase.
 
     Source:
         Bhardwaj et al., section V and Table III.

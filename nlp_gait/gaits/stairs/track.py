@@ -94,7 +94,7 @@ def stairs_track(
         scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
             quantum's pose within each evaluation (which makes one many times slower).
-        duration_s: of the rollout, in whole quanta of 0.01 s; InputError if it is longer than a minute.
+        duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
 
     Source:
         Bhardwaj et al., sections VII to X.

@@ -66,7 +66,7 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     """Return the gait problem of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
     Args:
-        intervals: of Simpson's rule over a step; InputError if it is not even.
+        intervals: of Simpson's rule over a step; even.
         horizon: Q over one step, as printed in (9), or over one second of walking, as Table IV implies.
         zmp: reading of the zero-moment point, see ``walk12_model.Zmp``.
 
