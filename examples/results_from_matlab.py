@@ -12,7 +12,7 @@ from pathlib import Path
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import summarise
-from compare.drawing.distributions import plot_final_gaps
+from compare.drawing.comparison_figures import plot_final_gaps
 from compare.study.import_runs import import_runs
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task

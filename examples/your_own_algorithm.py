@@ -13,7 +13,7 @@ import numpy as np
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import HEADER, format_cells, summarise
-from compare.drawing.convergence import plot_convergence
+from compare.drawing.comparison_figures import plot_convergence
 from compare.report.document import Document, text_table
 from compare.report.writing import markdown_page
 from compare.study.run_study import Study, run_study

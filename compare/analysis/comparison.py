@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from statistics import median
 from types import MappingProxyType
 from typing import Any
 
@@ -51,9 +52,7 @@ class SolverRuns:
     @property
     def median_cost(self) -> float:
         """Over all runs, infinite if half of them or more are infeasible."""
-        ordered = sorted(self.costs)
-        low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
-        return math.inf if math.isinf(high) else (low + high) / 2
+        return median(self.costs)
 
     @property
     def best(self) -> RunRecord | None:

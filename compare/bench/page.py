@@ -9,7 +9,7 @@ from compare.analysis.solver_table import count, percent
 from compare.analysis.statistics.run_length import TARGETS
 from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard
-from compare.drawing.distributions import plot_suite_ecdf
+from compare.drawing.comparison_figures import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, text_table
 from nlp_gait import gaitbench
 

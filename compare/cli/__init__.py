@@ -26,8 +26,7 @@ from compare.cli.questions.prices import prices
 from compare.cli.questions.robust import robust
 from compare.cli.questions.sweep import sweep
 from compare.cli.questions.walk import walk
-from compare.cli.report import report
-from compare.cli.reproduce import reproduce
+from compare.cli.report import report, reproduce
 from compare.cli.search import search
 from compare.cli.simulate import simulate
 from compare.cli.solve import solve

@@ -9,15 +9,7 @@ import typer
 
 from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks
 from compare.cli.command import command
-from compare.cli.common import (
-    end_interrupted,
-    print_result,
-    print_table,
-    progress_bar,
-    stderr,
-    stdout,
-    until_interrupted,
-)
+from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say, stdout, until_interrupted
 from compare.cli.options import AsJson, Jobs, parse_names
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
@@ -70,7 +62,7 @@ def bench(
             f"--instances {','.join(known)}"
         )
     if missing:
-        stderr.print(f"skipped (no baseline records shipped): {', '.join(missing)}", soft_wrap=True)
+        say(f"skipped (no baseline records shipped): {', '.join(missing)}")
         chosen = tuple(id for id in chosen if id in known)
     make_writable_folder(out)
     records: list[RunRecord] = []

@@ -1,4 +1,4 @@
-"""``nlp-gait report``."""
+"""``nlp-gait report`` and ``nlp-gait reproduce``."""
 
 from __future__ import annotations
 
@@ -6,14 +6,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, stdout
+from compare.cli.common import (
+    end_interrupted,
+    interruptible,
+    print_result,
+    print_table,
+    print_written,
+    progress_bar,
+    stdout,
+)
 from compare.cli.options import AsCsv, AsJson, Code, name_all
 from compare.cli.simulation_options import DriveOptions
+from compare.papers import REPRODUCTIONS, load_reproduction
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
@@ -71,6 +80,27 @@ def report(
     simulated = simulate_best(folder, label_editions(read_records(folder)), drive_options.make()) if engine else []
     written = rebuild_report(folder, weighting, as_csv=as_csv)
     print_result(as_json, plain_simulations(simulated), written, lambda: print_simulations(simulated))
+
+
+@command
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the report, its tables and figures; results stored in it are used again.")
+    ],
+    effort: Annotated[
+        Literal["quick", "full"], typer.Option(help="As much as in the paper, or the least that fills every table.")
+    ] = "full",
+) -> None:
+    """Recompute a paper's tables and figures next to the printed ones, and check its claims.
+
+    Example: `nlp-gait reproduce nao --out reproduction`
+    """
+    reproduction = load_reproduction(paper)
+    chosen = reproduction.quick if effort == "quick" else reproduction.full
+    with interruptible(out), progress_bar(paper, chosen.steps) as advance:
+        reproduction.reproduce(out, chosen, advance)
+    print_written(out / "report.md")
 
 
 def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:

@@ -12,8 +12,7 @@ from compare.analysis.solver_table import HEADER, SolverSummary, count, format_c
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import BY_UNIT, heading, seconds
 from compare.analysis.verdict import compare_pairs
-from compare.drawing.convergence import SMALLEST_GAP, plot_convergence
-from compare.drawing.distributions import plot_ecdf, plot_final_gaps
+from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, text_table
 from compare.study.record import RunRecord, load_gait

@@ -10,7 +10,7 @@ from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_p
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import write_verdict
-from compare.drawing.distributions import list_expected_costs, plot_performance_profile
+from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.document import Document, Figure, Section, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.writing import write_document

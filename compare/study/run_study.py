@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -152,13 +151,8 @@ def _run_missing(study: Study, records: dict[int, RunRecord]) -> Iterator[tuple[
 
 def _prepare_solvers(tasks: Sequence[Task]) -> None:
     """Compile once what pays for many runs; the runs find it in the cache folder, in whatever process they are."""
-
-    def group(task: Task) -> tuple[str, str]:
-        return task.problem.title, task.title
-
     named = [t for t in tasks if not t.is_search and not t.is_user_code and isinstance(t.problem.name, str)]
-    for _, runs in groupby(sorted(named, key=group), key=group):
-        task = next(runs)
+    for task in {(t.problem.title, t.title): t for t in reversed(named)}.values():
         with suppress(GaitError):  # the records of the runs report it
             task.make_solver().prepare(task.problem.load(), PLANNED_RUNS)
 

@@ -47,16 +47,13 @@ class ExactModel:
         named = dict(zip(self.index_names, indexes.tolist(), strict=True))
         return ExactValues(float(cost[0]), float(violation[0]), g, lower, upper, named)
 
-    def rows(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
-        """Return all rows with their names and units."""
-        return self._name_rows(values, range(len(self.row_names)))
-
     def find_violated(self, values: ExactValues) -> tuple[ConstraintValue, ...]:
         """Return the rows that are violated by more than the tolerance, worst first; NaN is the worst."""
         violated = np.flatnonzero(~(_compute_violations(values) <= FEASIBILITY_TOLERANCE))
-        return find_violated_rows(self._name_rows(values, violated))
+        return find_violated_rows(self.rows(values, violated))
 
-    def _name_rows(self, values: ExactValues, chosen: Iterable[int]) -> tuple[ConstraintValue, ...]:
+    def rows(self, values: ExactValues, chosen: Iterable[int] | None = None) -> tuple[ConstraintValue, ...]:
+        """Return all rows, or chosen ones, with their names and units."""
         violations = _compute_violations(values)
         return tuple(
             ConstraintValue(
@@ -67,7 +64,7 @@ class ExactModel:
                 violation=float(violations[k]),
                 unit=self.row_units[k],
             )
-            for k in chosen
+            for k in (range(len(self.row_names)) if chosen is None else chosen)
         )
 
 

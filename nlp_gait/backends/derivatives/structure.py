@@ -103,9 +103,6 @@ def _concatenate(function: ca.Function) -> ca.Function:
 def _by_sample(matrices: list[SX], count: int) -> SX:
     """Return the nonzeros of matrices with a block of columns for each sample as one vector, sample by sample."""
     parts = [nonzeros(matrix) for matrix in matrices]
-    order = []
-    before = 0
-    for part in parts:
-        order.append(before + np.arange(part.shape[0]).reshape(count, -1))
-        before += part.shape[0]
+    starts = np.cumsum([0, *(part.shape[0] for part in parts)])
+    order = [np.arange(*ends).reshape(count, -1) for ends in zip(starts[:-1], starts[1:], strict=True)]
     return ca.vertcat(*parts)[np.hstack(order).ravel().tolist()]
