@@ -10,25 +10,12 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.statistics.inference import a12
-from compare.papers.nao import nao_runs
+from compare.papers.nao import nao_runs as nao
 from compare.papers.nao.nao_claims import CHECKS
 from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import PHASES, SWING_POWER_W, PrintedPhase
-from compare.papers.nao.nao_runs import (
-    ALGORITHMS,
-    DURATION_SWEEP,
-    LEVER,
-    SWING_SWEEP,
-    NaoEffort,
-    SweepPoint,
-    load_points,
-    make_spec,
-    make_special_sweeps,
-    make_sweep,
-    make_tasks,
-    run_and_store_points,
-)
+from compare.papers.nao.nao_runs import ALGORITHMS, NaoEffort, SweepPoint
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
 from compare.report.document import Rows, Value
@@ -40,16 +27,16 @@ from nlp_gait.backends.solvers import ipopt
 
 def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
     """Run searches and IPOPT on both phases, and sweep over their variables."""
-    store, tasks = Store(runner.folder), make_tasks(effort)
+    store, tasks = Store(runner.folder), nao.make_tasks(effort)
     searches = [task for task in tasks if task.is_search]
     for task in searches:
-        if load_points(store, task) is None:
+        if nao.load_points(store, task) is None:
             locate_record(runner.folder, task).unlink(missing_ok=True)  # only a run gives its points
-    runs = runner.run_tasks(tasks, partial(run_and_store_points, runner.folder))
+    runs = runner.run_tasks(tasks, partial(nao.run_and_store_points, runner.folder))
     ssp, dsp = (_sweep_phase(runner, effort, phase, runs, _load_all_points(store, phase, searches)) for phase in PHASES)
-    special = _solve_sweeps(runner, make_special_sweeps(effort))
-    swing, durations = special[SWING_SWEEP], special[DURATION_SWEEP]
-    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations, lever=runs[LEVER, IPOPT])
+    special = _solve_sweeps(runner, nao.make_special_sweeps(effort))
+    swing, durations = special[nao.SWING_SWEEP], special[nao.DURATION_SWEEP]
+    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations, lever=runs[nao.LEVER, IPOPT])
 
 
 def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
@@ -57,7 +44,7 @@ def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]
     points = {}
     for name in ALGORITHMS:
         tasks = [task for task in searches if (task.problem.title, task.title) == (phase.problem, name)]
-        runs = [found for task in tasks if (found := load_points(store, task)) is not None]
+        runs = [found for task in tasks if (found := nao.load_points(store, task)) is not None]
         x, power = (np.concatenate(arrays) for arrays in zip(*runs, strict=True))
         run = np.repeat(np.arange(len(runs), dtype=float), [len(power) for _, power in runs])
         points[name] = Points(x=x, power_W=power, run=run)
@@ -68,17 +55,11 @@ def _sweep_phase(
     runner: Runner, effort: NaoEffort, paper: PrintedPhase, runs: Runs, points: Mapping[str, Points]
 ) -> PhaseFindings:
     """Sweep by IPOPT over each variable's feasible range."""
-    spec, starts = make_spec(paper.problem, effort), runs[paper.problem, IPOPT]
-    sweeps = [
-        make_sweep(
-            f"{paper.problem}-sweep-x{i + 1}",
-            spec,
-            i,
-            choose_sweep_values(points, i, value, effort.sweep_points),
-            effort.sweep_starts,
-        )
-        for i, value in enumerate(choose_best(starts).x.values())
-    ]
+    spec, starts = nao.make_spec(paper.problem, effort), runs[paper.problem, IPOPT]
+    sweeps = []
+    for i, optimum in enumerate(choose_best(starts).x.values()):
+        values = choose_sweep_values(points, i, optimum, effort.sweep_points)
+        sweeps.append(nao.make_sweep(f"{paper.problem}-sweep-x{i + 1}", spec, i, values, effort.sweep_starts))
     return PhaseFindings(
         paper=paper,
         problem=spec.load(),
@@ -90,7 +71,7 @@ def _sweep_phase(
 
 
 def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> dict[str, list[SweepPoint]]:
-    results = runner.compute(sweeps, code=(nao_runs, ipopt))
+    results = runner.compute(sweeps, code=(nao, ipopt))
     return {name: [SweepPoint(**row) for row in rows] for name, rows in results.items()}
 
 
@@ -136,8 +117,8 @@ def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
 def make_tables(findings: NaoFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
     tables = {
-        SWING_SWEEP: _list_swing_heights(findings),
-        DURATION_SWEEP: [(point.at, point.power_W) for point in findings.durations],
+        nao.SWING_SWEEP: _list_swing_heights(findings),
+        nao.DURATION_SWEEP: [(point.at, point.power_W) for point in findings.durations],
         "rank-sum-tests": [row for phase in findings.phases for row in _list_tests(phase)],
         "power-gap": [row for phase in findings.phases for row in _list_gaps(phase)],
     }

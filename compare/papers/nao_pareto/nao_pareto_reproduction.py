@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.analysis.units import join_words
+from compare.analysis.units import axis_label, join_words
+from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_axes
 from compare.papers.claims import Verdict
-from compare.papers.nao_pareto import nao_pareto_runs
+from compare.papers.nao_pareto import nao_pareto_runs as runs
 from compare.papers.nao_pareto.nao_pareto_claims import CHECKS, NEAR
-from compare.papers.nao_pareto.nao_pareto_figures import draw_figures
 from compare.papers.nao_pareto.nao_pareto_findings import (
     EVEN_POINTS,
     NAMES,
@@ -20,17 +20,10 @@ from compare.papers.nao_pareto.nao_pareto_findings import (
     PhaseFindings,
     collect_points,
 )
-from compare.papers.nao_pareto.nao_pareto_runs import (
-    CRITERION,
-    PHASES,
-    ParetoEffort,
-    make_run,
-    make_searches,
-    make_spec,
-)
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, CRITERION, ParetoEffort
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
-from compare.questions.pareto.pareto_front import ParetoFront
+from compare.questions.pareto.pareto_front import SEARCH_COLOURS, ParetoFront
 from compare.questions.pareto.searches import REFERENCE, Challenge, challenge_front
 from compare.questions.question import Work, find
 from compare.report.document import Rows, Value
@@ -39,53 +32,44 @@ from metaheuristics.multi_objective import constrained_moead, dynamic_nsga3, pym
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 def run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
     """Solve for the true front of each phase, run the searches on it, and solve again from their best points."""
-    return ParetoFindings(phases=tuple(_run_phase(runner, phase, effort) for phase in PHASES), effort=effort)
+    return ParetoFindings(phases=tuple(_run_phase(runner, phase, effort) for phase in runs.PHASES), effort=effort)
 
 
 def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFindings:
     work = Work(store=Store(runner.folder / phase, runner.progress), progress=runner.progress)
-    problem = make_spec(phase, effort).load()
+    problem = runs.make_spec(phase, effort).load()
     question = ParetoFront(problem=problem, objective=CRITERION, points=effort.points, starts=effort.starts)
     front, criterion = find(question, work).front, question.criterion
     problem = criterion.drop_demand(problem)
-    searches = make_searches(phase, front, effort)
-    code = (nao_pareto_runs, constrained_moead, dynamic_nsga3, pymoo)
+    searches = runs.make_searches(phase, front, effort)
+    code = (runs, constrained_moead, dynamic_nsga3, pymoo)
     results = runner.compute([search for of_case in searches.values() for search in of_case], code)
-    runs = {case: [make_run(results[search.name]) for search in of_case] for case, of_case in searches.items()}
-    points = collect_points(front, (run for of_case in runs.values() for run in of_case))
+    done = {case: [runs.make_run(results[search.name]) for search in of_case] for case, of_case in searches.items()}
+    points = collect_points(front, (run for of_case in done.values() for run in of_case))
     solve = partial(challenge_front, problem, criterion, front, points, work.solver(), work.progress)
-    step = Computation(
-        name=f"{phase}-challenge",
-        inputs={
-            **fingerprint(problem),
-            "criterion": CRITERION,
-            "front": [asdict(point) for point in front],
-            "points": [asdict(point) for point in points],
-        },
-        function=lambda: asdict(solve()),
-    )
+    given = {"front": [asdict(point) for point in front], "points": [asdict(point) for point in points]}
+    inputs = {**fingerprint(problem), "criterion": CRITERION, **given}
+    step = Computation(name=f"{phase}-challenge", inputs=inputs, function=lambda: asdict(solve()))
     (answer,) = runner.compute([step], code=()).values()
-    return PhaseFindings(
-        problem=problem,
-        criterion=criterion,
-        first_front=front,
-        answer=decode(Challenge, answer),
-        runs=runs,
-    )
+    answer = decode(Challenge, answer)
+    return PhaseFindings(problem=problem, criterion=criterion, first_front=front, answer=answer, runs=done)
 
 
 def compute_values(findings: ParetoFindings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
-    ssp, dsp = findings.phases
+    ssp, _ = findings.phases
     effort, verdicts = findings.effort, [claim.verdict for claim in REPRODUCTION.check_claims(findings).values()]
     return {
-        "runs": effort.runs,
+        "effort": effort,
         "budgets": join_words(f"{budget:,}" for budget in effort.budgets),
         "largest": f"{effort.budgets[-1]:,}",
-        "points": effort.points,
         "samples": effort.intervals + 1,
         "reference": REFERENCE,
         "even": EVEN_POINTS,
@@ -95,8 +79,7 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
         "held": verdicts.count(Verdict.HOLDS),
         "refuted": verdicts.count(Verdict.FAILS),
         "robot": ssp.problem.options["robot"],
-        "ssp": {"variables": len(ssp.problem.names)},
-        "dsp": {"variables": len(dsp.problem.names)},
+        "variables": [len(phase.problem.names) for phase in findings.phases],
     }
 
 
@@ -141,6 +124,68 @@ def _make_running(phase: PhaseFindings) -> Rows:
     columns = [chosen[0].evaluations]
     columns += [100 * np.median(m.hypervolume, axis=0) for m in chosen] + [np.median(m.igd, axis=0) for m in chosen]
     return np.column_stack(columns).tolist()
+
+
+LINES = dict(zip(ALGORITHMS, ("-", "--", ":", "-."), strict=True))
+
+
+def draw_figures(findings: ParetoFindings) -> dict[str, Figure]:
+    """Return the figures by name."""
+    running = {f"running-{phase.problem.name}": _draw_running(phase) for phase in findings.phases}
+    return running | {f"fronts-{phase.problem.name}": _draw_fronts(phase) for phase in findings.phases}
+
+
+def _draw_running(phase: PhaseFindings) -> Figure:
+    """Hypervolume missing and distance over evaluations, with the largest budget: medians, and the range of all runs."""
+    budget = phase.budgets[-1]
+    figure = new_figure(6.6, 3.0)
+    left, right = figure.subplots(1, 2)
+    for name in ALGORITHMS:
+        m = phase.measures[name, budget]
+        colour = SEARCH_COLOURS[name]
+        for axes, values in ((left, 100 * (1.0 - m.hypervolume)), (right, m.igd)):
+            shown = np.where(np.isfinite(values), values, np.nan)
+            known = np.isfinite(values).all(axis=0)
+            at, shown = m.evaluations[known], shown[:, known]
+            axes.fill_between(at, shown.min(axis=0), shown.max(axis=0), color=colour, alpha=0.12, linewidth=0)
+            axes.plot(at, np.median(shown, axis=0), LINES[name], color=colour, label=NAMES[name])
+    left.set_ylabel("hypervolume missing to the front's [%]")
+    right.set_ylabel("inverted generational distance [1]")
+    for axes in (left, right):
+        axes.set_xlabel("evaluations")
+        use_log_axes(axes, both=True)
+    _add_legend(figure, left, 4)
+    return figure
+
+
+def _draw_fronts(phase: PhaseFindings) -> Figure:
+    """The true front with its knees, and the ends of all runs with the largest budget, a panel for each algorithm."""
+    budget, criterion = phase.budgets[-1], phase.criterion
+    line = np.array([(p.value, p.power_W) for p in phase.front])
+    figure = new_figure(6.6, 4.6)
+    for axes, name in zip(figure.subplots(2, 2, sharex=True, sharey=True).ravel(), ALGORITHMS, strict=True):
+        values, powers = phase.points(name, budget)
+        axes.plot(values, powers, ".", color=SEARCH_COLOURS[name], markersize=2.5, alpha=0.4, rasterized=True)
+        axes.plot(*line.T, "-", color=COLOURS["ipopt"], linewidth=1.0, label="true front")
+        knees = [(k.value, k.power_W) for k in phase.bends.knees]
+        if knees:
+            axes.plot(*zip(*knees, strict=True), "o", color="none", markeredgecolor=COLOURS["aco"], label="knee")
+        axes.set_title(NAMES[name], loc="left")
+        width, height = np.ptp(line[:, 0]), np.ptp(line[:, 1])
+        axes.set_xlim(line[0, 0] - 0.05 * width, line[-1, 0] + 0.05 * width)
+        axes.set_ylim(0.0, line[-1, 1] + 0.15 * height)
+    for axes in figure.axes[2:]:
+        axes.set_xlabel(axis_label(criterion.name, criterion.unit))
+    for axes in figure.axes[::2]:
+        axes.set_ylabel("power [W]")
+    _add_legend(figure, figure.axes[0], 2)
+    return figure
+
+
+def _add_legend(figure: Figure, axes: Axes, columns: int) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.set_figheight(figure.get_figheight() + LEGEND_ROW_IN)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 REPRODUCTION = Reproduction(

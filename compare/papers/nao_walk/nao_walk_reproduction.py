@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from compare.analysis.units import join_words
-from compare.papers.nao_walk import nao_walk_runs
+from compare.papers.nao_walk import nao_walk_runs as runs
 from compare.papers.nao_walk.nao_walk_claims import CHECKS, HEATS, NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_figures import draw_figures
-from compare.papers.nao_walk.nao_walk_runs import (
-    FEED_FORWARD,
-    FRICTIONS,
-    KINDS,
-    LIFT_M,
-    MASS_FACTORS,
-    PUSHES_NS,
-    SLOPES_DEG,
-    SPECS,
-    SPEED_M_S,
-    STEP_M,
-    STRETCHED_M,
-    TORSO_M,
-    NaoWalkEffort,
-    make_footsteps,
-    make_gait_computations,
-    make_walk_computations,
-    sum_energy,
-)
+from compare.papers.nao_walk.nao_walk_runs import KINDS, SPECS, SPEED_M_S, NaoWalkEffort, sum_energy
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
-from compare.report.document import Rows
+from compare.report.document import Rows, Value
 from nlp_gait.errors import InputError
 from nlp_gait.gaits.biped import cart_table, recorded_cycle
 from nlp_gait.simulation import drive, simulate
@@ -45,8 +28,8 @@ def run_nao_walk(runner: Runner, effort: NaoWalkEffort) -> NaoWalkFindings:
         InputError: no optimal gait was found at the default speed.
     """
     load_mujoco()  # fail before the work if it is missing
-    code = (nao_walk_runs, cart_table, recorded_cycle, drive, simulate)
-    gaits = runner.compute(make_gait_computations(effort), code)
+    code = (runs, cart_table, recorded_cycle, drive, simulate)
+    gaits = runner.compute(runs.make_gait_computations(effort), code)
     speeds = {heat: gaits[f"speeds-{heat}"] for heat in SPECS}
     optima = {}
     for heat, points in speeds.items():
@@ -54,14 +37,14 @@ def run_nao_walk(runner: Runner, effort: NaoWalkEffort) -> NaoWalkFindings:
         if not at["feasible"]:
             raise InputError(f"no optimal gait was found at {SPEED_M_S:g} m/s with K of the {heat}; use more starts")
         optima[heat] = at["x"]
-    walks = runner.compute(make_walk_computations(effort, optima), code)
+    walks = runner.compute(runs.make_walk_computations(effort, optima), code)
     return NaoWalkFindings(
         effort=effort,
         speeds=speeds,
         torsos=gaits["torsos"],
         straighter=_select(gaits, "straighter-"),
         joints=_select(walks, "joints-"),
-        drives={name: list(_select(walks, f"drives-{name}-").values()) for name in FEED_FORWARD},
+        drives={name: list(_select(walks, f"drives-{name}-").values()) for name in runs.FEED_FORWARD},
     )
 
 
@@ -73,17 +56,21 @@ def _select(results: dict[str, Any], prefix: str) -> dict[str, Any]:
 def compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
     effort = findings.effort
-    disturbances = {"pushes": PUSHES_NS, "slopes": SLOPES_DEG, "frictions": FRICTIONS, "masses": MASS_FACTORS}
+    disturbances = {
+        "pushes": runs.PUSHES_NS,
+        "slopes": runs.SLOPES_DEG,
+        "frictions": runs.FRICTIONS,
+        "masses": runs.MASS_FACTORS,
+    }
     return {
-        "step_mm": 1000 * STEP_M,
-        "period_s": make_footsteps().period_s,
+        "step_mm": 1000 * runs.STEP_M,
+        "period_s": runs.make_footsteps().period_s,
         "speed_cm_s": 100 * SPEED_M_S,
-        "torso_mm": 1000 * TORSO_M,
-        "lift_mm": 1000 * LIFT_M,
-        "stretched_mm": 1000 * STRETCHED_M,
-        "starts": effort.starts,
+        "torso_mm": 1000 * runs.TORSO_M,
+        "lift_mm": 1000 * runs.LIFT_M,
+        "stretched_mm": 1000 * runs.STRETCHED_M,
+        "effort": effort,
         "full_error": Drive().full_error_rad,
-        "walked": effort.walked,
         **{name: join_words(f"{value:g}" for value in values) for name, values in disturbances.items()},
         "lengths": join_words(f"{1000 * length:.0f}" for length in effort.steps_m),
     }
@@ -99,17 +86,6 @@ NAMES = {
 
 def make_tables(findings: NaoWalkFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
-    straighter = [
-        [
-            HEATS.get(heat, heat),
-            *(
-                value
-                for bound in ("free", "paper")
-                for value in (1000 * at[bound]["hip_m"], at[bound]["knee_deg"], at[bound]["power_W"])
-            ),
-        ]
-        for heat, at in findings.straighter.items()
-    ]
     drives = [
         [name, share, point["walked_share"], point["sheet_J_per_m"], point["paper_J_per_m"], point["tracking_rad"]]
         + [point["falls"], point["disturbances"], 100 * point["fastest_m_s"]]
@@ -125,30 +101,27 @@ def make_tables(findings: NaoWalkFindings) -> dict[str, Rows]:
     torsos = [
         [1000 * at["torso_m"], at["knee_deg"], at["paper_J_per_m"], at["sheet_J_per_m"]] for at in findings.torsos
     ]
-    return {
-        "joints": _make_joints(findings),
-        "torsos": torsos,
-        "straighter": straighter,
-        "drives": drives,
-        "speeds": speeds,
-    }
-
-
-def _make_joints(findings: NaoWalkFindings) -> Rows:
-    """Shares of each kind of joint; the engine has no numbers of a walk that fell."""
-    return [
-        [
-            NAMES[gait],
-            where,
-            HEATS[heat],
-            *(100 * findings.share(gait, where, heat, kind) for kind in KINDS),
-            sum_energy(found[where].values(), heat),
-        ]
-        for gait, found in findings.joints.items()
-        for where in ("model", "engine")
-        if where == "model" or found["fell_at_s"] is None
-        for heat in SPECS
+    straighter = [
+        [HEATS.get(heat, heat), *_list_optimum(at["free"]), *_list_optimum(at["paper"])]
+        for heat, at in findings.straighter.items()
     ]
+    joints = _list_joints(findings)
+    return {"joints": joints, "torsos": torsos, "straighter": straighter, "drives": drives, "speeds": speeds}
+
+
+def _list_optimum(found: Mapping[str, float]) -> list[float]:
+    return [1000 * found["hip_m"], found["knee_deg"], found["power_W"]]
+
+
+def _list_joints(findings: NaoWalkFindings) -> Rows:
+    """Shares of each kind of joint; the engine has no numbers of a walk that fell."""
+    rows: list[list[Value]] = []
+    for gait, found in findings.joints.items():
+        for where in ("model",) if found["fell_at_s"] is not None else ("model", "engine"):
+            for heat in SPECS:
+                shares = [100 * findings.share(gait, where, heat, kind) for kind in KINDS]
+                rows.append([NAMES[gait], where, HEATS[heat], *shares, sum_energy(found[where].values(), heat)])
+    return rows
 
 
 REPRODUCTION = Reproduction(

@@ -76,14 +76,13 @@ class NaoWalkEffort(Effort):
 def make_gait_computations(effort: NaoWalkEffort) -> list[Computation]:
     """Return optimal gaits over speed, the robot's own walk at other heights, and optima whose legs may stretch."""
     heats = {f"{heat:g}": replace(SPECS["paper"], values={"heat_loss_W_per_Nm2": heat}) for heat in effort.heats}
+    speeds, starts = effort.speeds_m_s, effort.starts
     curves = [
-        make_computation(
-            f"speeds-{name}", spec, partial(solve_over_speed, spec), speeds=effort.speeds_m_s, starts=effort.starts
-        )
+        make_computation(f"speeds-{name}", spec, partial(solve_over_speed, spec), speeds=speeds, starts=starts)
         for name, spec in SPECS.items()
     ]
     straighter = [
-        make_computation(f"straighter-{name}", spec, partial(solve_free_height, spec), starts=effort.starts)
+        make_computation(f"straighter-{name}", spec, partial(solve_free_height, spec), starts=starts)
         for name, spec in {**heats, "sheet": SPECS["sheet"]}.items()
     ]
     return [*curves, make_computation("torsos", SPECS["paper"], compute_heights, heights=effort.torsos_m), *straighter]
@@ -96,27 +95,18 @@ def make_walk_computations(effort: NaoWalkEffort, optima: Mapping[str, Mapping[s
         "own-plain": ("none", "", {}),
         **{f"optimum-{heat}": ("torque", heat, x) for heat, x in optima.items()},
     }
-    spec, walked = SPECS["paper"], effort.walked
+    spec, steps = SPECS["paper"], effort.walked
+    settings: dict[str, Any] = {"steps": steps, "lengths": effort.steps_m, "disturbed": effort.disturbed}
     joints = [
-        make_computation(
-            f"joints-{name}", spec, simulate_joints, feed_forward=feed_forward, heat=heat, x=dict(x), steps=walked
-        )
-        for name, (feed_forward, heat, x) in gaits.items()
+        make_computation(f"joints-{name}", spec, simulate_joints, feed_forward=fed, heat=heat, x=dict(x), steps=steps)
+        for name, (fed, heat, x) in gaits.items()
     ]
-    lengths = effort.steps_m
     drives = [
         make_computation(
-            f"drives-{feed_forward}-{stiffness:g}",
-            spec,
-            simulate_drives,
-            feed_forward=feed_forward,
-            stiffness=stiffness,
-            steps=walked,
-            lengths=lengths,
-            disturbed=effort.disturbed,
+            f"drives-{fed}-{share:g}", spec, simulate_drives, feed_forward=fed, stiffness=share, **settings
         )
-        for feed_forward in FEED_FORWARD
-        for stiffness in effort.stiffnesses
+        for fed in FEED_FORWARD
+        for share in effort.stiffnesses
     ]
     return joints + drives
 

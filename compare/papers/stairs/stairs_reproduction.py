@@ -11,22 +11,11 @@ import numpy as np
 
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.stairs import stairs_motion, stairs_runs
+from compare.papers.stairs import stairs_motion
+from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs.stairs_figures import draw_figures
-from compare.papers.stairs.stairs_motion import FEEDBACK, STEP_S
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_runs import (
-    ALGORITHMS,
-    LOST_RAD,
-    RULES,
-    StairsEffort,
-    StairsFindings,
-    make_computations,
-    make_first_tasks,
-    make_other_spec,
-    make_track_spec,
-    make_track_tasks,
-)
+from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
@@ -38,9 +27,9 @@ NEAR_BOUND = 0.01  # of a gain's range
 
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     """Run plans and ideals, then track the best plans, then compute what follows from them."""
-    findings = StairsFindings(effort=effort, runs=runner.run_tasks(make_first_tasks(effort)))
-    findings.runs.update(runner.run_tasks(make_track_tasks(findings)))
-    return replace(findings, others=runner.compute([*make_computations(findings)], (stairs_runs, stairs_motion)))
+    findings = StairsFindings(effort=effort, runs=runner.run_tasks(runs.make_first_tasks(effort)))
+    findings.runs.update(runner.run_tasks(runs.make_track_tasks(findings)))
+    return replace(findings, others=runner.compute([*runs.make_computations(findings)], (runs, stairs_motion)))
 
 
 def compute_values(findings: StairsFindings) -> dict[str, Any]:
@@ -48,25 +37,20 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
     effort = findings.effort
     (end_rate,) = [variable for variable in GOVERNING_VARIABLES if variable.name == "end_rate_rad_s"]
     return {
-        "plan_evaluations": effort.plan_evaluations,
-        "track_evaluations": effort.track_evaluations,
-        "network_case": effort.cases[0],
+        "effort": effort,
         "cases": " | ".join(f"case {case}" for case in effort.cases),
         "papers": " | ".join(f"paper {case}" for case in effort.cases),
         "ours": " | ".join(f"ours {case}" for case in effort.cases),
         "cases_4f": " | ".join(".4f" for _ in effort.cases),
         "cases_6g": " | ".join(".6g" for _ in effort.cases),
-        "hip_height_m": TABLE_3["hip_height_m"],
-        "hip_starts": effort.hip_starts,
+        "table_3": TABLE_3,
         "quantum_s": QUANTUM,
-        "step_ms": 1e3 * STEP_S,
-        "feedback_rad_s": math.sqrt(FEEDBACK[0]),
-        "lost_rad": LOST_RAD,
-        "t1_s": PAPER_TIMES[0],
-        "t2_s": PAPER_TIMES[1],
-        "tolerance_m2": RULES["adam"].tolerance_m2,
-        "adam_rate": RULES["adam"].rate,
-        "end_rate": (end_rate.lower, end_rate.upper),
+        "step_ms": 1e3 * stairs_motion.STEP_S,
+        "feedback_rad_s": math.sqrt(stairs_motion.FEEDBACK[0]),
+        "lost_rad": runs.LOST_RAD,
+        "times": PAPER_TIMES,
+        "adam": runs.RULES["adam"],
+        "end_rate": end_rate,
         **_count_gains_at_bounds(findings),
         **_compute_growth(findings),
     }
@@ -77,7 +61,7 @@ def _count_gains_at_bounds(findings: StairsFindings) -> dict[str, Any]:
     tracks = [(case, findings.best("track", case, name)) for case in findings.cases for name in (*ALGORITHMS, IPOPT)]
     at_bounds = 0
     for case, run in tracks:
-        problem = make_track_spec(case, findings.plan(case)).load()
+        problem = runs.make_track_spec(case, findings.plan(case)).load()
         share = (problem.upper - [run.x[name] for name in problem.names]) / (problem.upper - problem.lower)
         at_bounds += all(share[problem.variable_index(gain)] <= NEAR_BOUND for gain in ("kp", "kd"))
     return {"at_bounds": at_bounds, "best_tracks": len(tracks), "near_bound": NEAR_BOUND}
@@ -97,21 +81,6 @@ def _compute_growth(findings: StairsFindings) -> dict[str, Any]:
 
 
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it
-# Tables of a result in each case, by name: the result, and its keys.
-PICKED = {
-    "printed-scheme": (
-        "printed",
-        ("explicit_quanta", "implicit_largest_error_rad", "compensated_largest_error_rad"),
-    ),
-    "replay": (
-        "replay",
-        ("feedback_end_rad", "open_loop_t1_rad", "open_loop_t2_rad", "open_loop_lost_s", "open_loop_end_rad"),
-    ),
-    "learned": (
-        "learned",
-        ("closed-form cost", "network cost", "largest_angle_error_rad", "mean_angle_error_rad"),
-    ),
-}
 # Rows of Table IV: words, name in the paper's table and in our result, and where in our results.
 QUANTITIES = (
     ("largest joint acceleration [rad/s^2]", "acceleration", "differences"),
@@ -138,40 +107,40 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
         "angle-differences": [_list_differences(findings, case) for case in findings.cases],
-        **{name: _list_results(findings, *picked) for name, picked in PICKED.items()},
+        "printed-scheme": _list_results(findings, "printed"),
+        "replay": _list_results(findings, "replay"),
+        "learned": _list_results(findings, "learned"),
     }
 
 
-def _list_results(findings: StairsFindings, step: str, keys: Sequence[str]) -> Rows:
-    return [[case, *(findings.others[f"{step}-{case}"][key] for key in keys)] for case in findings.cases]
+def _list_results(findings: StairsFindings, name: str) -> Rows:
+    return [[case, *findings.others[f"{name}-{case}"].values()] for case in findings.cases]
 
 
 def _list_table_3(findings: StairsFindings) -> Rows:
     plans = [findings.plan(case) for case in findings.cases]
-    rows = []
-    for name in [variable.name for variable in GOVERNING_VARIABLES]:
-        printed = f"{TABLE_3[name]:g}" if name in TABLE_3 else None
-        rows.append([name, printed, *(plan[name] for plan in plans)])
-    return rows
+    printed = {name: f"{value:g}" for name, value in TABLE_3.items()}
+    names = [variable.name for variable in GOVERNING_VARIABLES]
+    return [[name, printed.get(name), *(plan[name] for plan in plans)] for name in names]
 
 
 def _list_plans(findings: StairsFindings, case: int) -> Rows:
     """Best plan of each solver, with the ends of all its runs."""
     rows: list[Sequence[Value]] = []
     for solver in (IPOPT, *ALGORITHMS):
-        runs, verdict = findings.runs[f"plan-{case}", solver], findings.best("plan", case, solver).verdict
-        every = ", ".join(f"{value:.2f}" for value in list_objectives(runs))
+        found, verdict = findings.runs[f"plan-{case}", solver], findings.best("plan", case, solver).verdict
+        every = ", ".join(f"{value:.2f}" for value in list_objectives(found))
         if solver == IPOPT:
-            ends = list_objectives(run for run in runs if run.claimed)
+            ends = list_objectives(run for run in found if run.claimed)
             hits = sum(value <= verdict.objective * (1 + MATCH) for value in ends)
-            every = f"{hits} of {len(runs)} starts, {len(ends)} converged"
+            every = f"{hits} of {len(found)} starts, {len(ends)} converged"
         between = "feasible" if verdict.dense_feasible else verdict.violated[0]
-        rows.append([case, solver, verdict.objective, every, verdict.feasible, between, _compute_time_s(runs)])
+        rows.append([case, solver, verdict.objective, every, verdict.feasible, between, _compute_time_s(found)])
     return rows
 
 
-def _compute_time_s(runs: Sequence[RunRecord]) -> float:
-    return float(np.mean([run.time_s.solve for run in runs]))
+def _compute_time_s(records: Sequence[RunRecord]) -> float:
+    return float(np.mean([record.time_s.solve for record in records]))
 
 
 def _list_table_4(findings: StairsFindings) -> Rows:
@@ -205,11 +174,11 @@ def _list_tracks(findings: StairsFindings, case: int) -> Rows:
 
 
 def _list_ideal(findings: StairsFindings, case: int) -> Sequence[Value]:
-    runs, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
-    every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in runs)
+    found, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
+    every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in found)
     energies = [verdict.indexes["energy_J"], findings.best("plan", case).verdict.objective]
     others = [verdict.indexes["peak_torque_Nm"], verdict.indexes["torso_pitch_rad"]]
-    return [case, verdict.objective, every, *energies, *others, _compute_time_s(runs)]
+    return [case, verdict.objective, every, *energies, *others, _compute_time_s(found)]
 
 
 def _list_jerk(findings: StairsFindings, case: int) -> Sequence[Value]:
@@ -218,9 +187,9 @@ def _list_jerk(findings: StairsFindings, case: int) -> Sequence[Value]:
 
 
 def _list_fixed_hip(findings: StairsFindings, case: int) -> Sequence[Value]:
-    runs, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
-    feasible = sum(run.verdict.feasible for run in runs)
-    return [case, f"{feasible} of {len(runs)}", "; ".join(verdict.violated[:3]) or "nothing"]
+    found, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
+    feasible = sum(run.verdict.feasible for run in found)
+    return [case, f"{feasible} of {len(found)}", "; ".join(verdict.violated[:3]) or "nothing"]
 
 
 def _list_differences(findings: StairsFindings, case: int) -> Sequence[Value]:
@@ -235,7 +204,7 @@ def _list_other_stairs(findings: StairsFindings) -> Rows:
     for tread, rise in findings.effort.other_stairs:
         cells: list[Value] = [tread, rise]
         for name, unit in (("stairs-plan", " J"), ("stairs-ideal", "")):
-            run = choose_best(findings.runs[make_other_spec(findings.effort, name, tread, rise).title, IPOPT])
+            run = choose_best(findings.runs[runs.make_other_spec(findings.effort, name, tread, rise).title, IPOPT])
             worst = ", ".join(run.verdict.violated[:3])
             cells.append(f"{run.verdict.objective:.3f}{unit}" if run.claimed else f"none; violated: {worst}")
         rows.append(cells)

@@ -11,30 +11,11 @@ import numpy as np
 from compare.judge import DENSE_INTERVALS
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.walk12 import walk12_runs
+from compare.papers.walk12 import walk12_runs as runs
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
-from compare.papers.walk12.walk12_findings import (
-    Walk12Findings,
-    compute_corner_slopes,
-    compute_hip_miss,
-)
+from compare.papers.walk12.walk12_findings import Walk12Findings, compute_corner_slopes, compute_hip_miss
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
-from compare.papers.walk12.walk12_runs import (
-    CORNER_M,
-    GA_EVALUATIONS,
-    HORIZONS,
-    MODEL,
-    MOMENT_FREE_WEIGHTS,
-    PAPER,
-    PathPoint,
-    Walk12Effort,
-    compute_f1,
-    find_f1max,
-    make_first_tasks,
-    make_paths,
-    make_second_tasks,
-    title_table_4,
-)
+from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
 from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
@@ -49,11 +30,11 @@ PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
 
 def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     """Run Table III under both normalisations, Table IV, the errata and both paths."""
-    runs = runner.run_tasks(make_first_tasks(effort))
-    runs |= runner.run_tasks(make_second_tasks(effort, runs))
-    paths = runner.compute(make_paths(effort), code=(walk12_runs,))
+    records = runner.run_tasks(runs.make_first_tasks(effort))
+    records |= runner.run_tasks(runs.make_second_tasks(effort, records))
+    paths = runner.compute(runs.make_paths(effort), code=(runs,))
     weighted, front = ([PathPoint(**row) for row in rows] for rows in paths.values())
-    return Walk12Findings(effort=effort, runs=runs, weighted=weighted, front=front)
+    return Walk12Findings(effort=effort, runs=records, weighted=weighted, front=front)
 
 
 def make_trajectories(findings: Walk12Findings) -> list[Table]:
@@ -70,22 +51,10 @@ def make_trajectories(findings: Walk12Findings) -> list[Table]:
 
 def compute_values(findings: Walk12Findings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
+    problem, robot, lengths = load("walk12"), load_point_mass_biped(), _get_step_lengths()
     return {
-        **_compute_settings(findings),
-        **_compute_normalisation(findings),
-        **_compute_tradeoff(findings),
-        **_compute_errata(findings),
-    }
-
-
-def _compute_settings(findings: Walk12Findings) -> dict[str, Any]:
-    problem, robot, effort = load("walk12"), load_point_mass_biped(), findings.effort
-    lengths = _get_step_lengths()
-    return {
-        "ga_evaluations": GA_EVALUATIONS,
-        "pso_evaluations": effort.pso_evaluations,
-        "runs": effort.runs,
-        "starts": effort.starts,
+        "effort": findings.effort,
+        "ga_evaluations": runs.GA_EVALUATIONS,
         "f1max": F1MAX,
         "f2max": F2MAX,
         "knee_rad": problem.value("reach_margin_rad"),
@@ -101,7 +70,10 @@ def _compute_settings(findings: Walk12Findings) -> dict[str, Any]:
         "branch_m": math.sqrt(abs(robot.thigh_m**2 - robot.shank_m**2)),
         "corner_m": CORNER_M,
         "corner_leg_mm": 1e3 * (robot.leg_m - 2 * CORNER_M),
-        "free_weights": MOMENT_FREE_WEIGHTS,
+        "free_weights": runs.MOMENT_FREE_WEIGHTS,
+        **_compute_normalisation(findings),
+        **_compute_tradeoff(findings),
+        **_compute_errata(findings),
     }
 
 
@@ -156,7 +128,7 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         for zmp in get_args(Zmp)
     }
     (corner,) = findings.runs["corner", IPOPT]
-    free = [choose_best(findings.runs[f"moment-free-{weight:g}", IPOPT]) for weight in MOMENT_FREE_WEIGHTS]
+    free = [choose_best(findings.runs[f"moment-free-{weight:g}", IPOPT]) for weight in runs.MOMENT_FREE_WEIGHTS]
     f1 = {horizon: [compute_f1(row, horizon=horizon) for row in TABLE_4] for horizon in HORIZONS}
     implied = [row.implied_f1 for row in TABLE_4]
     return {
@@ -167,10 +139,7 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
         "stable": findings.stable[-1],
-        "trend": {
-            "implied": _describe_trend(implied),
-            **{horizon: _describe_trend(values) for horizon, values in f1.items()},
-        },
+        "trend": {name: _describe_trend(values) for name, values in (("implied", implied), *f1.items())},
         "horizon_gap": compute_range(100 * abs(f / wanted - 1) for f, wanted in zip(f1["1s"], implied, strict=True)),
     }
 
@@ -240,13 +209,10 @@ def _list_table_4(findings: Walk12Findings) -> Rows:
     rows: list[Sequence[Value]] = []
     for row in TABLE_4:
         for horizon in HORIZONS:
-            optimum = choose_best(findings.runs[title_table_4(row, horizon), IPOPT])
+            optimum = choose_best(findings.runs[runs.title_table_4(row, horizon), IPOPT])
             words = {"step": "0 to T", "1s": "1 s"}[horizon]
-            ours = [
-                compute_f1(row, horizon=horizon),
-                find_f1max(findings.runs, title_table_4(row, horizon, most_stable=True)),
-            ]
-            ours += [optimum.verdict.objective, *get_point(optimum)]
+            f1max = runs.find_f1max(findings.runs, runs.title_table_4(row, horizon, most_stable=True))
+            ours = [compute_f1(row, horizon=horizon), f1max, optimum.verdict.objective, *get_point(optimum)]
             rows.append([row.step_time_s, words, row.f1max, row.f, row.implied_f1, *ours])
     return rows
 
