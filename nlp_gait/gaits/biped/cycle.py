@@ -89,10 +89,8 @@ class WalkingCycle:
             for parameter in parameters
             if parameter.name in BALANCE
         ]
-        shared = [parameter for parameter in own["ssp"] if parameter.name not in BALANCE]
-        shared += [
-            parameter for parameter in own["dsp"] if parameter not in own["ssp"] and parameter.name not in BALANCE
-        ]
+        both = dict.fromkeys((*own["ssp"], *own["dsp"]))
+        shared = [parameter for parameter in both if parameter.name not in BALANCE]
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
         limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
         return (*self._speed_parameters(), *balance, *limit, *shared)
@@ -132,8 +130,7 @@ class WalkingCycle:
             objective=mean if self.at_given_speed else energy / step,
             constraints=(
                 *(row for part in found.values() for row in part.constraints),
-                *self._jump_rows(jumps, at),
-                *self._step_rows(at),
+                *self._join(jumps, at),
             ),
             indexes={
                 "power_W": energy / period,
@@ -157,12 +154,16 @@ class WalkingCycle:
             indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
         )
 
-    def _jump_rows(self, jumps: Mapping[str, MX], motion: Point) -> tuple[Constraint, ...]:
-        limit, joints = motion["torque_jump_limit_Nm"], self.body.joints
-        return tuple(
+    def _join(self, jumps: Mapping[str, MX], at: Point) -> list[Constraint]:
+        """Return the rows of both switches, and of the step length where it follows from the speed."""
+        limit, joints = at["torque_jump_limit_Nm"], self.body.joints
+        rows = [
             make_rows(f"{switch}_torque_jump", "Nm", jump, -limit, limit, joints, "once", self.body.torque_scale)
             for switch, jump in jumps.items()
-        )
+        ]
+        if self.at_given_speed:
+            rows.append(make_rows("step_length", "m", at[STEP], at[f"{STEP}.lower"], at[f"{STEP}.upper"], over="once"))
+        return rows
 
     @property
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
@@ -179,13 +180,6 @@ class WalkingCycle:
     def _assemble_at(self, name: PhaseName, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         at = self.add_step(point)
         return self._assemble_phase(name, at, self.phases[name].sample(at, ops, phases), ops)
-
-    def _step_rows(self, motion: Point) -> tuple[Constraint, ...]:
-        if not self.at_given_speed:
-            return ()
-        return (
-            make_rows("step_length", "m", motion[STEP], motion[f"{STEP}.lower"], motion[f"{STEP}.upper"], over="once"),
-        )
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Compute changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start."""

@@ -1,19 +1,20 @@
-"""NAO as its gaits take it: its joints, its closed-form legs under an upright torso, and the swing of its arms."""
+"""NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms, its motors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from casadi import DM, MX, SX, cos, vertcat
+import numpy as np
+from casadi import DM, MX, SX, cos, fmax, vertcat, vertsplit
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point, Signals
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
-from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins
-from nlp_gait.gaits.biped.samples import Instant
-from nlp_gait.gaits.nao.ankle_coupling import parse_nao_motors
+from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.motors import Motors
+from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao.joints import (
     HELD_ARM_ANGLES,
     JOINTS,
@@ -21,6 +22,7 @@ from nlp_gait.gaits.nao.joints import (
     LEG_JOINTS,
     PLANNED_JOINTS,
     RESTING_ARM_ANGLES,
+    YAW_PITCHES,
     measure_leg,
 )
 from nlp_gait.gaits.nao.skeleton import make_skeleton
@@ -53,6 +55,18 @@ ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {  # [rad]
 # Table 3 swings the shoulders about 1.5 rad and the elbows about 0.53 rad, their rolls by 0.22 rad for each rad of the shoulders.
 MIDDLE_SHOULDER, MIDDLE_ELBOW, ELBOW_PER_SHOULDER = 1.5, 0.53, 0.22
 LARGEST_SWING, LARGEST_RATE = 0.5, 1.0  # [rad], [rad/s]; Table 3 swings the shoulders by 0.5 rad to either side
+# Ankle pitch, least and greatest roll of the left ankle [rad]; straight lines between. The right ankle mirrors it.
+# Source: public MATLAB tables "Nao Parameters v4.0" (there stored under the other side's name; the greatest range is that of
+# the left joint).
+ANKLE_ROLL = (
+    (-1.189442, -0.049916, 0.075049),
+    (-0.840027, -0.179943, 0.169995),
+    (-0.700051, -0.397935, 0.220086),
+    (-0.449946, -0.397935, 0.768992),
+    (0.100007, -0.397935, 0.768992),
+    (0.349938, -0.397935, 0.550477),
+    (0.922755, 0.0, 0.049916),
+)
 ARM_COORDINATE = Coordinate(
     name="arm_swing",
     rate="arm_rate",
@@ -121,6 +135,41 @@ def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
     return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved
+
+
+def parse_nao_motors(text: str, robot: Robot) -> Motors:
+    """Return the features of NAO's motors that an option's text lists."""
+    return Motors.parse(text, robot, JOINTS, YAW_PITCHES, AnkleCoupling())
+
+
+class AnkleCoupling(Limit):
+    """Roll of both ankles within the lines over their pitch."""
+
+    reads_motion = True
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        angles: Mapping[str, MX] = dict(zip(samples.moving, vertsplit(samples.q), strict=True))
+        names = [str(k) for k in range(samples.steps + 1)]
+        found = []
+        for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
+            pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
+            least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
+            found += [
+                make_rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
+                make_rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
+            ]
+        return found, {}
+
+
+def ankle_roll(pitch: MX, column: int) -> MX:
+    """Return the least (column 1) or greatest (2) roll of the left ankle over its pitch [rad], constant beyond the table."""
+    corners = np.array(ANKLE_ROLL)
+    slopes = np.diff(corners[:, column]) / np.diff(corners[:, 0])
+    turns = np.diff(np.concatenate([[0.0], slopes, [0.0]]))
+    value = MX(corners[0, column])
+    for at, turn in zip(corners[:, 0].tolist(), turns.tolist(), strict=True):
+        value = value + turn * fmax(pitch - at, 0.0)
+    return value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

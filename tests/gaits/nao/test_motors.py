@@ -14,7 +14,7 @@ from scipy.integrate import trapezoid
 
 from nlp_gait import load, solve
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.gaits.nao.ankle_coupling import ANKLE_ROLL, ankle_roll
+from nlp_gait.gaits.nao.body import ANKLE_ROLL, ankle_roll
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 
