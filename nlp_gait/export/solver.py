@@ -12,6 +12,7 @@ from nlp_gait.backends.derivatives.compiled import FLAGS
 from nlp_gait.backends.derivatives.operations import format_number
 from nlp_gait.backends.derivatives.source import write_array, write_nlp_source
 from nlp_gait.backends.derivatives.structure import split_nlp
+from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
 from nlp_gait.export.c_files import format_comment, write_c_files
 from nlp_gait.formulation import GaitProblem
@@ -20,20 +21,6 @@ from nlp_gait.formulation.locking import lock_casadi
 # Name of each file by its template; the C++ file is assembled from the plan.
 TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}
 BOUNDS = {"w_lower": "lbx", "w_upper": "ubx", "g_lower": "lbg", "g_upper": "ubg"}
-WRAPPERS = """
-extern "C" long long @_bytes(void) { return nlp_gait_bytes(); }
-extern "C" void @_prepare(void* memory) { nlp_gait_prepare(memory); }
-extern "C" void @_values(void* memory, const double* w, const double* p, double* f, double* g) {
-  nlp_gait_values(memory, w, p, f, g);
-}
-extern "C" void @_first(void* memory, const double* w, const double* p, double* gradient, double* jacobian) {
-  nlp_gait_first(memory, w, p, gradient, jacobian);
-}
-extern "C" void @_second(void* memory, const double* w, const double* p, double f_weight, const double* g_weights,
-                         double* hessian) {
-  nlp_gait_second(memory, w, p, f_weight, g_weights, hessian);
-}
-"""
 
 
 @lock_casadi
@@ -80,7 +67,7 @@ def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) 
                 for name, values in constants.items()
             ),
             *(_constant("long long", f"{prefix}_{name}", values) for name, values in {**starts, **rows}.items()),
-            WRAPPERS.replace("@", prefix),
+            read_native_source("nlp_gait.export", "solver_functions.cpp.in").replace("@PREFIX@", prefix),
         ]
     )
 

@@ -48,11 +48,7 @@ def format_motion(points: SetPoints) -> str:
 
 
 def read_motion(path: Path, motors: Collection[str] | None = None) -> SetPoints:
-    """Read the set-points of a `.motion` file for the motors of a robot; None accepts any name.
-
-    Raises:
-        InputError: a violation of the grammar, with its line.
-    """
+    """Read the set-points of a `.motion` file for the motors of a robot (None: any); raises InputError with the line."""
     text = read_text(path, "motion")
     return parse_motion(text, path.name, motors)
 

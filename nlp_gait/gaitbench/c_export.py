@@ -24,11 +24,7 @@ TEMPLATES = {
 
 
 def export_objective(instance: Instance, folder: Path) -> list[Path]:
-    """Write source, header, example, callers and build line of an instance in physical units; return the files.
-
-    Raises:
-        OutputError: the folder cannot be written to.
-    """
+    """Write source, header, example, callers and build line of an instance in physical units; raises OutputError."""
     instance = Instance(instance.id)
     sides = OneSidedRows(build_kernel(instance.gait_problem), instance.gait_problem)
     prefix = make_prefix(instance.id)

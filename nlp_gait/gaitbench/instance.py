@@ -24,25 +24,18 @@ _BUILDING = threading.RLock()
 
 
 class OneSidedRows:
-    """Rows of a problem as one-sided rows, G <= 0 in units of each row's scale, without the variables' bounds.
-
-    Attributes:
-        row: (m,) index of the kernel's row that each is made from.
-        sign: (m,) +1 for an upper bound, -1 for a lower one.
-        bound: (m,) [unit of the row].
-        weight: (m,) 1 / scale.
-        names: (m,) for example ``torque_change[LKneePitch, 3] <= upper``.
-    """
+    """The m rows of a problem as one-sided rows, G <= 0 in units of each row's scale, without the variables' bounds."""
 
     def __init__(self, kernel: Kernel, problem: GaitProblem) -> None:
         lower, upper = kernel.row_bounds(problem)
         own = len(lower) - len(problem.names)
         both = np.stack([lower[:own], upper[:own]], axis=1)
-        self.row, side = (np.asarray(part) for part in np.nonzero(np.isfinite(both)))
-        self.sign = np.where(side == 1, 1.0, -1.0)
-        self.bound = both[self.row, side]
-        self.weight = kernel.weights[self.row]
+        self.row, side = (np.asarray(part) for part in np.nonzero(np.isfinite(both)))  # (m,) rows of the kernel
+        self.sign = np.where(side == 1, 1.0, -1.0)  # (m,) +1 for an upper bound
+        self.bound = both[self.row, side]  # (m,) [unit of the row]
+        self.weight = kernel.weights[self.row]  # (m,) 1 / scale
         words = (">= lower", "<= upper")
+        # (m,) for example ``torque_change[LKneePitch, 3] <= upper``
         self.names = tuple(f"{kernel.model.row_names[r]} {words[s]}" for r, s in zip(self.row, side, strict=True))
 
     def __call__(self, g: Array) -> Array:
@@ -56,29 +49,23 @@ class Instance:
         f, violation = problem(X)
 
     It is picklable, and may be called from several threads and processes at once.
-
-    Attributes:
-        id: its name, which never changes.
-        definition: what it is made from.
-        unit_cube: whether x runs from 0 to 1 instead of in physical units.
-        names: (n,) variables.
-        units: (n,) of the variables; all ``"1"`` in the unit cube.
-        lower: (n,) bounds.
-        upper: (n,).
-        evidence: that ``best_known`` is the optimum; ``str()`` says it in words.
     """
 
     def __init__(self, id: str, *, unit_cube: bool = False) -> None:
         """Use ``gaitbench.load`` instead."""
-        self.id = id
-        self.unit_cube = unit_cube
-        self.definition = get_definition(id)
+        self.id = id  #: its name, which never changes
+        self.unit_cube = unit_cube  #: whether x runs from 0 to 1 instead of in physical units
+        self.definition = get_definition(id)  #: what it is made from
         self.gait_problem: GaitProblem = gaitbench(instance=id)
-        self.names = self.gait_problem.names
+        self.names = self.gait_problem.names  #: (n,) variables
         self._origin = self.gait_problem.lower
         self._width = self.gait_problem.upper - self._origin
+        self._slope = self._width if unit_cube else np.ones(len(self.names))  # physical variables by x
+        #: (n,) of the variables; all ``"1"`` in the unit cube
         self.units = tuple("1" if unit_cube else variable.unit for variable in self.gait_problem.variables)
+        #: (n,) bounds
         self.lower = np.zeros(len(self.names)) if unit_cube else np.array(self.gait_problem.lower)
+        #: (n,) bounds
         self.upper = np.ones(len(self.names)) if unit_cube else np.array(self.gait_problem.upper)
         for array in (self.lower, self.upper):
             array.setflags(write=False)
@@ -147,7 +134,7 @@ class Instance:
 
     @property
     def evidence(self) -> Evidence:
-        """Why the best known objective may be the optimum."""
+        """Why the best known objective may be the optimum; ``str()`` says it in words."""
         return self.facts.evidence
 
     def to(self, adapter: str, **options: Any) -> Any:
@@ -166,11 +153,6 @@ class Instance:
             MissingExtraError: the package is not installed.
         """
         return find_adapter(adapter)(self, **options)
-
-    @property
-    def _slope(self) -> Array:
-        """(n,) derivatives of the physical variables by x."""
-        return self._width if self.unit_cube else np.ones(len(self.names))
 
     @cached_property
     def _objective(self) -> CompiledObjective:

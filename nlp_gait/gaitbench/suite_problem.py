@@ -49,7 +49,6 @@ def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:
     refine = base.refine
     if refine is None:
         return problem
-
     return replace(problem, refine=lambda factor: _convert(refine(factor), definition))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.robots import Robot
-from nlp_gait.robots.mirror import mirror_sign, partners
+from nlp_gait.robots.tree import mirror_sign, partners
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
 SIDES_SWAPPED = {

@@ -90,8 +90,7 @@ class Biped:
 def make_biped_model(robot: Robot) -> Biped:
     """Convert a robot to a biped.
 
-    Raises:
-        InputError: its legs are not two mirror images of six turning joints each, or the posture names a wrong joint.
+    Raises InputError unless its legs are mirror images of six turning joints each, and its posture names only other joints.
     """
     feet = [robot.feet[side].link for side in SIDES]
     paths = [robot.path_to_root(foot) for foot in feet]

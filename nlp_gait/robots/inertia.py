@@ -98,10 +98,7 @@ def check_inertias(robot: str, links: Sequence[Link]) -> None:
     """Refuse tensors that seem to refer to the joints.
 
     Most links have ratios above 1. If none of at least five links does, and most are above one half, all tensors were probably
-    taken about the joints. One wrong tensor among right ones is not found.
-
-    Raises:
-        RobotDataError: with the ratios of the farthest links, and what to write into the file.
+    taken about the joints: raises RobotDataError. One wrong tensor among right ones is not found.
     """
     ratios = {link.name: compute_joint_ratio(link) for link in links}
     far = sorted((name for name in ratios if ratios[name] > FAR_RATIO), key=lambda name: -ratios[name])

@@ -12,8 +12,8 @@ import numpy as np
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.inertia import Array
 from nlp_gait.robots.leg import LEG_JOINT_COUNT
-from nlp_gait.robots.mirror import are_mirror_images
 from nlp_gait.robots.repair import Records, turn_records
+from nlp_gait.robots.tree import are_mirror_images
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
@@ -69,10 +69,8 @@ class Legs(NamedTuple):
 def find_legs(robot: str, joints: Records, feet: Mapping[str, Mapping[str, Any]]) -> Legs:
     """Find the legs by the feet of the robot file, by side, or else by geometry.
 
-    The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet.
-
-    Raises:
-        RobotDataError: there is no such pair, or it is not clearly lower than others.
+    The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet. Raises RobotDataError if
+    there is no such pair, or if it is not clearly lower than others.
     """
     chains = _find_chains(joints)
     if feet:
@@ -113,9 +111,7 @@ def infer_feet(
     """Return the records of both feet with their soles, and turn the robot's records so that it faces along x.
 
     What the robot file states about the feet and the forward direction has precedence; ``notes`` receive what was inferred.
-
-    Raises:
-        RobotDataError: a leg without six joints, no flat sole, or no clear forward direction.
+    Raises RobotDataError for a leg without six joints, without a flat sole, or without a clear forward direction.
     """
     for link, chain in zip(legs.feet, legs.chains, strict=True):
         if len(chain) != LEG_JOINT_COUNT:

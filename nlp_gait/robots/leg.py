@@ -24,8 +24,7 @@ SHORTEST_M = 1e-3
 class Leg:
     """Six turning joints from the torso to a foot, at zero angles, in the torso's axes and from its origin [m].
 
-    Raises:
-        InputError: there is no bending knee, no hip with three different axes, or no ankle with two.
+    Raises InputError without a bending knee, a hip with three different axes, or an ankle with two.
     """
 
     joints: tuple[str, ...]  # names, the hip's first

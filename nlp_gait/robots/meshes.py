@@ -75,11 +75,7 @@ def cylinder_points(radius: float, half_length: float) -> Array:
 
 
 def mesh_points(path: Path) -> Array:
-    """Read the corners (N, 3) of a mesh, in the file's own unit; those of Collada in metres.
-
-    Raises:
-        RobotDataError: the file cannot be read, has another format, or is damaged.
-    """
+    """Read the corners (N, 3) of a mesh in the file's own unit, those of Collada in metres; raises RobotDataError."""
     data = read_bytes(path, "mesh", error=RobotDataError)
     readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}
     reader = readers.get(path.suffix.lower())

@@ -53,11 +53,7 @@ def perturbed_name(name: str, changes: Mapping[str, float]) -> str:
 
 
 def split_name(text: str) -> tuple[str, dict[str, float]]:
-    """Split a robot's name and its changes.
-
-    Raises:
-        InputError: the text after the mark is not a list of changes.
-    """
+    """Split a robot's name and its changes; raises InputError if the text after the mark is not a list of changes."""
     name, mark, listed = text.rpartition(MARK)
     if not mark or listed.endswith((".json", ".urdf", ".xml")):  # the mark may be part of a file's path
         return text, {}

@@ -42,11 +42,7 @@ def weld_faults(
     find_joint_fault: FindFault,
     notes: list[str],
 ) -> None:
-    """Weld links and joints that cannot be used to their parents; refuse a leg that cannot be used.
-
-    Raises:
-        RobotDataError: a faulty link or joint of a leg.
-    """
+    """Weld links and joints that cannot be used to their parents; raise RobotDataError for one of a leg."""
     faults = {name: fault for name, raw in joints.items() if (fault := find_joint_fault(name, raw)) is not None}
     for name, fault in faults.items():
         if joints[name]["child"] in legs:

@@ -1,12 +1,16 @@
-"""Import of MuJoCo, with messages on how to install it."""
+"""Import of MuJoCo, with messages on how to install it, and indices in its arrays."""
 
 from __future__ import annotations
 
 import os
 import sys
 from types import ModuleType
+from typing import Any
+
+import numpy as np
 
 from nlp_gait.errors import MissingExtraError, OutputError
+from nlp_gait.simulation.plan import SIDES, Plan
 
 DRIVER = "MUJOCO_GL"  # environment variable with MuJoCo's graphics driver, read when it is imported
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -34,3 +38,20 @@ def load_mujoco(*, pictures: bool = False) -> ModuleType:
     # Otherwise warnings go to a log file in the user's folder; a divergence shows as a fall.
     module.set_mju_user_warning(lambda message: None)
     return module
+
+
+class Addresses:
+    """Indices of the joints, actuators, bodies and sites in the engine's arrays."""
+
+    def __init__(self, model: Any, plan: Plan) -> None:
+        joints = [model.joint(name) for name in plan.joints]
+        self.angles = np.array([joint.qposadr[0] for joint in joints])
+        self.rates = np.array([joint.dofadr[0] for joint in joints])
+        self.actuators = np.array([model.actuator(name).id for name in plan.joints])
+        self.torso = model.body(plan.robot.root).id
+        self.soles = np.array([model.site(side).id for side in SIDES])
+        self.foot_of_geometry = np.full(model.ngeom, -1)
+        for i, side in enumerate(SIDES):
+            for part in (plan.robot.feet, plan.robot.toes):
+                if side in part:
+                    self.foot_of_geometry[model.geom_bodyid == model.body(part[side].link).id] = i

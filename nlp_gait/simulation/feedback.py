@@ -11,7 +11,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
 
 STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
@@ -100,17 +100,13 @@ class Balance:
         self._feedback, self._plan, self._stiffness, self._model = feedback, plan, stiffness, model
         self._engine = load_mujoco()
         self._posture = self._engine.MjData(model)  # planned angles under an upright torso at the origin
-        joints = [model.joint(name) for name in plan.joints]
-        self._angles = [joint.qposadr[0] for joint in joints]
-        self._rates = [joint.dofadr[0] for joint in joints]
-        self._torso = model.body(plan.robot.root).id
-        self._soles = [model.site(side).id for side in SIDES]
+        self._at = Addresses(model, plan)
         step_s = model.opt.timestep
         self._every, self._late = max(1, round(feedback.period_s / step_s)), round(feedback.delay_s / step_s)
         self._noise = np.random.default_rng(feedback.seed)
         self._waiting: deque[SensorValues] = deque()
         self._steps = 0
-        self._shift = np.zeros(len(joints))
+        self._shift = np.zeros(len(plan.joints))
         self._integral = np.zeros(6)  # force [N] and moment [Nm]
         weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
         self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
@@ -131,13 +127,15 @@ class Balance:
         settings, noise = self._feedback, self._noise.standard_normal((4, 3))
         turning = np.zeros(6)  # rates, then velocity, along the floor's axes
         body = self._engine.mjtObj.mjOBJ_XBODY
-        self._engine.mj_objectVelocity(self._model, data, body, self._torso, turning, 0)
+        self._engine.mj_objectVelocity(self._model, data, body, self._at.torso, turning, 0)
         share = compute_load_shares(self._plan, self._time(self._steps))[0]
         return SensorValues(
             step=self._steps,
-            place=data.xpos[self._torso] - share @ data.site_xpos[self._soles] + settings.position_noise_m * noise[0],
+            place=data.xpos[self._at.torso]
+            - share @ data.site_xpos[self._at.soles]
+            + settings.position_noise_m * noise[0],
             velocity=turning[3:] + settings.velocity_noise_m_s * noise[1],
-            attitude=data.xmat[self._torso].reshape(3, 3).copy(),
+            attitude=data.xmat[self._at.torso].reshape(3, 3).copy(),
             tilt_error=settings.tilt_noise_rad * noise[2],
             rate=turning[:3] + settings.rate_noise_rad_s * noise[3],
         )
@@ -158,24 +156,24 @@ class Balance:
         self._integral = np.clip(integral, -self._most, self._most)
         wrench += self._integral
         force, moment = planned.T @ wrench[:3], planned.T @ wrench[3:]  # in the torso's planned axes
-        torques = np.zeros(len(self._rates))
+        torques = np.zeros(len(self._at.rates))
         moving, turning = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
-        for part, sole, foot in zip(share, self._soles, soles, strict=True):
+        for part, sole, foot in zip(share, self._at.soles, soles, strict=True):
             if part > 0.0:  # with a fixed foot, the torso moves opposite to the foot under a fixed torso
                 self._engine.mj_jacSite(self._model, self._posture, moving, turning, sole)
                 at_foot = moment - np.cross(foot, force)
-                torques -= part * (moving[:, self._rates].T @ force + turning[:, self._rates].T @ at_foot)
+                torques -= part * (moving[:, self._at.rates].T @ force + turning[:, self._at.rates].T @ at_foot)
         return torques
 
     def _planned_posture(self, at: Array, standing: int) -> tuple[Array, Array]:
         """Return the planned attitude (3, 3) of the torso, by the flat supporting sole, and the soles (2, 3) in its axes [m]."""
         posture = self._posture
         posture.qpos[:] = self._model.qpos0
-        posture.qpos[self._angles] = self._plan.at("q", at)[0]
+        posture.qpos[self._at.angles] = self._plan.at("q", at)[0]
         self._engine.mj_kinematics(self._model, posture)
         self._engine.mj_comPos(self._model, posture)
-        attitude = posture.site_xmat[self._soles[standing]].reshape(3, 3).T
-        return attitude, posture.site_xpos[self._soles] - posture.xpos[self._torso]
+        attitude = posture.site_xmat[self._at.soles[standing]].reshape(3, 3).T
+        return attitude, posture.site_xpos[self._at.soles] - posture.xpos[self._at.torso]
 
 
 def compute_load_shares(plan: Plan, times: Array) -> Array:

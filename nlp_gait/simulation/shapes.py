@@ -55,10 +55,8 @@ Shape: TypeAlias = Capsule | Prism
 def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
     """Return the shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
 
-    The shapes of the children of welded joints, which the simulated robot does not have, move to the parents.
-
-    Raises:
-        InputError: no such outline.
+    The shapes of the children of welded joints, which the simulated robot does not have, move to the parents. Raises InputError
+    for an unknown outline of the soles.
     """
     shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
     low = _find_low_joints(robot)
@@ -98,11 +96,7 @@ def _find_low_joints(robot: Robot) -> set[str]:
 
 
 def get_sole_outline(foot: Foot, sole: str) -> tuple[tuple[float, float], ...]:
-    """Return the corners of a sole from the ankle's projection on the ground [m].
-
-    Raises:
-        InputError: no such outline, or the robot's data does not have it.
-    """
+    """Return the corners of a sole from the ankle's projection on the ground [m]; raises InputError for an unknown outline."""
     if sole not in SOLES:
         raise InputError(f"sole must be one of {', '.join(SOLES)}, got {sole!r}")
     if sole == "rectangle":

@@ -12,7 +12,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Columns, Signals, vector_columns
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.engine import load_mujoco
+from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
 
@@ -111,7 +111,7 @@ def simulate_plan(
     engine = load_mujoco()
     drive, conditions = drive or Drive(), conditions or Conditions()
     model, data = prepare(plan, conditions, drive, sole)
-    at = _Addresses(model, plan)
+    at = Addresses(model, plan)
     steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
     times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
     commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
@@ -156,7 +156,7 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     model.opt.gravity[:] = conditions.gravity(plan.gravity)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)
-    at, start = _Addresses(model, plan), np.zeros(1)
+    at, start = Addresses(model, plan), np.zeros(1)
     data.qvel[:] = 0.0
     # The root's coordinates are the engine's first.
     (x, y, z), (vx, vy, vz) = plan.at("hip", start)[0], plan.rate("hip", start)[0]
@@ -172,24 +172,7 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     return model, data
 
 
-class _Addresses:
-    """Indices of the joints, actuators, bodies and sites in the engine's arrays."""
-
-    def __init__(self, model: Any, plan: Plan) -> None:
-        joints = [model.joint(name) for name in plan.joints]
-        self.angles = np.array([joint.qposadr[0] for joint in joints])
-        self.rates = np.array([joint.dofadr[0] for joint in joints])
-        self.actuators = np.array([model.actuator(name).id for name in plan.joints])
-        self.torso = model.body(plan.robot.root).id
-        self.soles = np.array([model.site(side).id for side in SIDES])
-        self.foot_of_geometry = np.full(model.ngeom, -1)
-        for i, side in enumerate(SIDES):
-            for part in (plan.robot.feet, plan.robot.toes):
-                if side in part:
-                    self.foot_of_geometry[model.geom_bodyid == model.body(part[side].link).id] = i
-
-
-def _pressure(data: Any, at: _Addresses) -> tuple[Array, Array]:
+def _pressure(data: Any, at: Addresses) -> tuple[Array, Array]:
     """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
     contact = data.contact
     active = contact.efc_address >= 0

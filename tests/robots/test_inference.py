@@ -13,7 +13,7 @@ import pytest
 from nlp_gait.errors import GaitError, InputError, RobotDataError
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
-from nlp_gait.robots.mirror import partner, partners
+from nlp_gait.robots.tree import partner, partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
 pytest.importorskip("urdf_parser_py")

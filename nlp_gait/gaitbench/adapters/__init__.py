@@ -17,7 +17,7 @@ ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
     "pygmo": ("plain:to_pygmo", ("pygmo",)),
     "pymoo": ("pymoo:PymooProblem", ("pymoo",)),
     "optuna": ("optuna:OptunaProblem", ("optuna", "optunahub")),
-    "nevergrad": ("nevergrad:to_nevergrad", ("nevergrad",)),
+    "nevergrad": ("plain:to_nevergrad", ("nevergrad",)),
 }
 
 

@@ -46,7 +46,7 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
 from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
-from nlp_gait.robots.mirror import mirror_sign
+from nlp_gait.robots.tree import mirror_sign
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"

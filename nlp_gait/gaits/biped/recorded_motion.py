@@ -16,8 +16,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Robot
-from nlp_gait.robots.mirror import mirror_sign
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import mirror_sign, tree_from
 from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.simplification import simplify

@@ -27,8 +27,7 @@ from nlp_gait.gaits.nao.joints import (
 )
 from nlp_gait.gaits.nao.skeleton import make_skeleton
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.mirror import partner
-from nlp_gait.robots.tree import point_masses, weld
+from nlp_gait.robots.tree import partner, point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic

@@ -37,11 +37,7 @@ LABELS = {
 
 
 def parse_picture_size(text: str) -> tuple[int, int]:
-    """Return width and height of a text such as 1280x720 [pixels].
-
-    Raises:
-        InputError: it has another form, or the size is too small or too large.
-    """
+    """Return width and height of a text such as 1280x720 [pixels]; raises InputError for another form or size."""
     found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
     size = (int(found[1]), int(found[2])) if found else (0, 0)
     if not all(low <= value <= high for low, value, high in zip(SMALLEST, size, LARGEST, strict=True)):
@@ -54,9 +50,7 @@ def draw_pictures(recordings: Sequence[Recording], size: tuple[int, int], note: 
     """Yield pictures (height, width, 3) of one or two recordings side by side; the shorter one stops at its end.
 
     They have the same time between pictures; ``size`` is width and height [pixels], and ``note`` one line about all of them.
-
-    Raises:
-        OutputError: this machine cannot draw off the screen.
+    Raises OutputError if this machine cannot draw off the screen.
     """
     width, height = size
     share = (width - GAP * (len(recordings) - 1)) // len(recordings)

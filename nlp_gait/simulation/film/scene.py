@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import OutputError
+from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.film.recording import Recording
 from nlp_gait.simulation.film.video import Frame
@@ -49,8 +50,7 @@ def find_stairs(model: Any) -> Any:
 class Scene:
     """Views of one recording, together of a width and height [pixels]; call ``close`` at the end.
 
-    Raises:
-        OutputError: this machine cannot draw off the screen.
+    Raises OutputError if this machine cannot draw off the screen.
     """
 
     def __init__(self, recording: Recording, views: Sequence[View], width: int, height: int) -> None:
@@ -89,15 +89,12 @@ class Scene:
         self._surface.make_current()
         for view in self._views:
             above = view.name == "above"
-            engine.mjv_updateScene(
-                self._recording.model,
-                self._data,
+            option, camera, kinds = (
                 self._soles if above else self._whole,
-                None,
                 self._camera(view, k),
                 engine.mjtCatBit.mjCAT_ALL,
-                self._scene,
             )
+            engine.mjv_updateScene(self._recording.model, self._data, option, None, camera, kinds, self._scene)
             self._scene.flags[engine.mjtRndFlag.mjRND_SHADOW] = not above
             (self._add_dots if above else self._add_force)(k)
             # The engine's origin is the lower left corner.
@@ -139,10 +136,10 @@ class Scene:
             return
         foot = np.array([*centre, self._ground(*centre) + 0.001])
         tip = foot + (0.0, 0.0, ARROW_HEIGHT * self._height * load / self._weight)
-        geometry = self._new(self._engine.mjtGeom.mjGEOM_ARROW, FORCE)
+        arrow, width = self._engine.mjtGeom.mjGEOM_ARROW, ARROW_RADIUS * self._height
+        geometry = self._add(arrow, FORCE, np.zeros(3), np.zeros(3))
         if geometry is not None:
-            width = ARROW_RADIUS * self._height
-            self._engine.mjv_connector(geometry, self._engine.mjtGeom.mjGEOM_ARROW, width, foot, tip)
+            self._engine.mjv_connector(geometry, arrow, width, foot, tip)
 
     def _add_dots(self, k: int) -> None:
         """Add the centre of pressure with its path, and the planned zero-moment point."""
@@ -156,7 +153,7 @@ class Scene:
         if np.isfinite(centre).all():
             place = np.array([*centre, self._ground(*centre) + DOTS_ABOVE * self._height + over])
             size = np.array([share * DOT * self._height, FLAT, 0.0])
-            self._new(self._engine.mjtGeom.mjGEOM_CYLINDER, colour, size, place)
+            self._add(self._engine.mjtGeom.mjGEOM_CYLINDER, colour, size, place)
 
     def _ground(self, x: float, y: float) -> float:
         """Return the height of the ground under a point [m]: the floor, or the highest box on it."""
@@ -166,19 +163,12 @@ class Scene:
         under = (np.abs(middles[:, :2] - (x, y)) <= halves[:, :2]).all(axis=1)
         return float(max((middles[:, 2] + halves[:, 2])[under], default=0.0))
 
-    def _new(self, kind: Any, colour: Sequence[float], size: Any = None, place: Any = None) -> Any:
+    def _add(self, kind: Any, colour: Sequence[float], size: Array, place: Array) -> Any:
         """Add a geometry to the scene; return None if it is full."""
         scene = self._scene
         if scene.ngeom >= scene.maxgeom:
             return None
         geometry = scene.geoms[scene.ngeom]
         scene.ngeom += 1
-        self._engine.mjv_initGeom(
-            geometry,
-            kind,
-            np.zeros(3) if size is None else size,
-            np.zeros(3) if place is None else place,
-            np.eye(3).ravel(),
-            np.array(colour, dtype=np.float32),
-        )
+        self._engine.mjv_initGeom(geometry, kind, size, place, np.eye(3).ravel(), np.array(colour, dtype=np.float32))
         return geometry

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -38,11 +40,7 @@ def check_video_path(path: Path) -> Path:
 
 
 def check_frames(duration_s: float, frames_per_s: float) -> None:
-    """Check the number of frames of a film.
-
-    Raises:
-        InputError: there are too many; with a remedy.
-    """
+    """Raise InputError if a film has too many frames."""
     count = math.ceil(duration_s * frames_per_s)
     if count > MOST_FRAMES:
         raise InputError(
@@ -80,17 +78,13 @@ def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
 def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
     import imageio_ffmpeg
 
-    writer = None
-    try:
-        for frame in frames:
-            even = np.ascontiguousarray(frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2])  # for the codec
-            if writer is None:
-                size = (even.shape[1], even.shape[0])
-                writer = imageio_ffmpeg.write_frames(
-                    str(path), size, fps=frames_per_s, macro_block_size=2, output_params=["-f", "mp4"]
-                )
-                writer.send(None)
-            writer.send(even)
-    finally:
-        if writer is not None:
-            writer.close()
+    frames = iter(frames)
+    first = next(frames)
+    height, width = (length // 2 * 2 for length in first.shape[:2])  # even, for the codec
+    writer = imageio_ffmpeg.write_frames(
+        str(path), (width, height), fps=frames_per_s, macro_block_size=2, output_params=["-f", "mp4"]
+    )
+    with closing(writer):
+        writer.send(None)
+        for frame in chain([first], frames):
+            writer.send(np.ascontiguousarray(frame[:height, :width]))

@@ -15,11 +15,7 @@ AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.6, (0.06, 0.0, 0.24)  # 
 
 
 def show_in_window(simulate: Simulator) -> Simulation:
-    """Simulate a gait in real time in MuJoCo's window.
-
-    Raises:
-        OutputError: there is no display.
-    """
+    """Simulate a gait in real time in MuJoCo's window; raises OutputError without a display."""
     load_mujoco()
     _require_display()
     from mujoco import viewer
