@@ -2,7 +2,7 @@
 
 For each problem, with its default options and values: the share of feasible points among uniform random ones, the cost of an
 evaluation, how many starts of IPOPT and how many runs of each default search end within 0.1 % of the best point known, and that
-point with the prices of what binds it. Runs are kept in the folder as those of any study, so that a stopped call goes on; what
+point with the prices of what binds it. Runs are kept in the folder as those of any study, so that a stopped call continues; what
 they say is kept in ``docs/difficulty.json``, problem by problem.
 """
 

@@ -91,7 +91,7 @@ class Page(HTMLParser):
         self._silent += tag in ("script", "style")
 
     def handle_endtag(self, tag: str) -> None:
-        """Text within scripts is none."""
+        """Ignore text within scripts."""
         self._silent -= tag in ("script", "style")
 
     def handle_data(self, data: str) -> None:

@@ -30,7 +30,7 @@ def as_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None
         settings: that differ from its defaults.
 
     Raises:
-        SearchError: the object is none of these, or does not take the settings.
+        SearchError: the object is of no such kind, or does not take the settings.
     """
     settings = dict(settings or {})
     algorithm: Any

@@ -74,8 +74,8 @@ def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 def built_once() -> Iterator[None]:
     """Every problem of the package is loaded once for all tests, with all that is built from it.
 
-    What is built from a problem's mathematics never changes, so that copies share it in use too. A robot from a file is read
-    anew: the file of another test may have the same name.
+    What is built from a problem's mathematics never changes, so that copies share it in use too. A robot file is always read
+    again: the file of another test may have the same name.
     """
     find = registry.find_maker
 

@@ -1,7 +1,7 @@
 """Who is best at which budget: ``python -m benchmarks.budgets --work DIR [--problem NAME ...] [--out DIR]``.
 
 Runs every opponent on every problem until it is within 0.01 % of the best objective that IPOPT finds, or its budget ends, then
-writes tables and a figure. Finished runs stay in DIR, so that the same call goes on with what is missing.
+writes tables and a figure. Finished runs stay in DIR, so that the same call continues with what is missing.
 """
 
 from __future__ import annotations

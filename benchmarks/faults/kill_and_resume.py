@@ -207,7 +207,7 @@ def tried(name: str, folder: Path, made: Mapping[str, Path], kills: int, moments
         process = begin(line(killed))
         try:
             process.communicate(timeout=moments.uniform(0.0, duration))
-            ends += 1  # it was done: begin anew
+            ends += 1  # finished: begin again
             begun(killed)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)

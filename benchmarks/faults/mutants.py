@@ -101,7 +101,7 @@ NAMES = {
     "any": "all",
 }
 NAMES |= {"sf": "cdf", "cdf": "sf", "isfinite": "isnan", "isnan": "isfinite"}
-# Arguments on which no result depends: whether somebody may assign or pass by position, checks, texts, sizes of caches.
+# Arguments on which no result depends: whether assignment and positional arguments are allowed, checks, texts, sizes of caches.
 CONVENTIONS = ("frozen", "kw_only", "slots", "eq", "strict", "encoding", "maxsize")
 STRINGS = {"left": "right", "right": "left", "two-sided": "less"}
 

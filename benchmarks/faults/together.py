@@ -36,7 +36,7 @@ class Found(NamedTuple):
 
 
 def solved(problem: GaitProblem, objective: nlp_gait.CompiledObjective, start: int) -> Found:
-    """One solve from the start point of this number."""
+    """Solve from the start point with this number."""
     x0 = problem.start_point(np.random.default_rng(start))
     solution = nlp_gait.solve(problem, x0=x0, solver=IpoptSettings(compiled=True))
     f, violation = objective(solution.x)
@@ -52,21 +52,21 @@ def solved(problem: GaitProblem, objective: nlp_gait.CompiledObjective, start: i
 
 
 def all_solved(task: Callable[[int], Found], solves: int, first: int) -> list[Found]:
-    """All solves, in an order of one's own: from one number on, and round."""
+    """Return all solves, computed in cyclic order from a given number."""
     order = [(first + k) % solves for k in range(solves)]
     found = {start: task(start) for start in order}
     return [found[start] for start in range(solves)]
 
 
 def different(pool: Executor, count: int, task: Callable[[int], Found], serial: list[Found]) -> int:
-    """How many solves of all workers differ from the serial ones."""
+    """Return how many solves of all workers differ from the serial ones."""
     solves = len(serial)
     jobs = [pool.submit(all_solved, task, solves, worker * solves // count) for worker in range(count)]
     return sum(found != alone for job in jobs for found, alone in zip(job.result(), serial, strict=True))
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print how many differ; the exit status says whether any does."""
+    """Print how many differ; return 1 if any does."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--problem", default="nao-ssp")
     parser.add_argument("--threads", type=int, default=8)

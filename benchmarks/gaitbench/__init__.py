@@ -1,1 +1,1 @@
-"""What GaitBench ships, made anew: best known points and probes (``known``), baseline records (``baseline``)."""
+"""Recompute the data of GaitBench: best known points and probes (``facts``), baseline records (``baseline``)."""

@@ -1,7 +1,7 @@
 """Baseline of GaitBench: ``python -m benchmarks.gaitbench.baseline --work DIR``.
 
 Runs every solver of the baseline on every instance, one instance after the other, and packs an instance for shipping as soon as
-all its runs are there. Finished runs stay in DIR, so that the same call goes on with what is missing.
+all its runs are there. Finished runs stay in DIR, so that the same call continues with what is missing.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ POPULATION, GENERATIONS = 100, 100
 
 
 class ByHand(Problem):
-    """What somebody writes around the kernel."""
+    """Wrapper that a user would write around the kernel."""
 
     def __init__(self, objective: CompiledObjective) -> None:
         super().__init__(n_var=len(objective.lower), n_obj=1, n_ieq_constr=1, xl=objective.lower, xu=objective.upper)

@@ -81,13 +81,13 @@ def write_verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
             "The failed runs below give the reasons.",
         )
     return (
-        "Best known: " + "; ".join(_found(c) for c in known) + ".",
+        "Best known: " + "; ".join(_describe_best_known(c) for c in known) + ".",
         "Median gap to the best known value: " + "; ".join(_distance(c) for c in known) + ".",
         "Expected cost to reach a gap of 0.1 %: " + "; ".join(_cost(c) for c in known) + ".",
     )
 
 
-def _found(comparison: Comparison) -> str:
+def _describe_best_known(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
     best, words = with_unit(comparison.reference, comparison.objective.unit), describe_proof(comparison)

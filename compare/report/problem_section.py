@@ -57,7 +57,7 @@ def problem_section(comparison: Comparison, plays: Sequence[SimulatedGait] = ())
         engine_section(plays),
         _tests(comparison),
         _binding(comparison),
-        _published(comparison),
+        _published_section(comparison),
         _failures(comparison),
         _between(comparison),
     )
@@ -185,7 +185,7 @@ def _for_one_step(active: ActiveConstraint, unit: str) -> str:
     return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
 
 
-def _published(comparison: Comparison) -> Section | None:
+def _published_section(comparison: Comparison) -> Section | None:
     found = make_published_rows(comparison)
     if found is None:
         return None

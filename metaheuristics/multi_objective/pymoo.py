@@ -67,7 +67,7 @@ def _seed_elites(search: Any) -> None:
     """pymoo thins out CMOPSO's elites with a generator of its own, unseeded: with this, equal seeds give equal runs."""
     tournament = search.elites.truncation.survival
 
-    def truncated(members: Any, count: int) -> Any:
+    def truncate(members: Any, count: int) -> Any:
         return tournament.do(search.problem, members, n_survive=count, random_state=search.random_state)
 
-    search.elites.truncation = truncated
+    search.elites.truncation = truncate

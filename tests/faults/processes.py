@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
-    """The command line in a process group of its own, as a terminal would start it, whatever these tests run under (nohup)."""
+    """Start the command line in its own process group, as a terminal would, also under nohup."""
     return subprocess.Popen(
         [sys.executable, "-m", "nlp_gait", *arguments],
         cwd=ROOT,
@@ -29,7 +29,7 @@ def start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
 
 
 def in_own_mounts(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """A shell script that may mount file systems nobody else sees; the test is skipped where that is not allowed."""
+    """Run a shell script that may mount private file systems; the test is skipped where that is not allowed."""
     unshare = shutil.which("unshare")
     if unshare is None or subprocess.run([unshare, "-rm", "true"], capture_output=True).returncode != 0:
         pytest.skip("mounting needs user namespaces")
@@ -43,7 +43,7 @@ def in_own_mounts(script: str, *arguments: str) -> subprocess.CompletedProcess[s
 
 
 def fake_compiler(folder: Path, body: str) -> str:
-    """A compiler that is a shell script: it answers ``--version``, and then does what the body says."""
+    """Write a compiler that is a shell script: it answers ``--version``, and then runs the body."""
     path = folder / "compiler.sh"
     path.write_text(f'#!/bin/sh\nif [ "$1" = --version ]; then echo "fake 1"; exit 0; fi\n{body}\n', encoding="ascii")
     path.chmod(0o700)

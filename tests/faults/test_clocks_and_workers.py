@@ -54,7 +54,7 @@ def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path)
     fresh = tmp_path / ".def.tmp"
     fresh.write_text("{")
     remove_leftovers(tmp_path)
-    assert fresh.exists()  # somebody may be writing it
+    assert fresh.exists()  # another process may be writing it
 
 
 @dataclass(frozen=True, kw_only=True)

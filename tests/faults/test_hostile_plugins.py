@@ -1,4 +1,4 @@
-"""Algorithms of one's own that fail in every way: each is a record that says so, and the others' records are whole."""
+"""User-defined algorithms that fail in every way: each has a record of its failure, and the others' records are complete."""
 
 from __future__ import annotations
 
@@ -71,7 +71,11 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     "closes the outputs": ("start", "os.close(1); os.close(2)", None),
     "changes what it was told": ("tell", "f[:] = -1e9; violation[:] = 0", None),
     "writes into its bounds": ("start", "start.lower[:] = -9", "read-only"),
-    "a population that is none": ("end", "Algorithm.population = 'many'", "population must be a whole number >= 1"),
+    "a population that is not a number": (
+        "end",
+        "Algorithm.population = 'many'",
+        "population must be a whole number >= 1",
+    ),
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
 ROUNDS = 2

@@ -72,7 +72,7 @@ def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path) -> N
         _, messages = process.communicate(timeout=60)
         assert process.returncode == (-9 if number == signal.SIGKILL else 130), messages
     *_, said = messages.splitlines()
-    assert said.startswith("nlp-gait: interrupted after") and said.endswith("; the same command continues")
+    assert said.startswith("nlp-gait: interrupted after") and said.endswith("; rerun the command to continue")
     done = RUN.invoke(app, [*command, "--out", str(killed)])
     assert "results were stored by an earlier run" in done.stderr
     whole, resumed = (

@@ -34,7 +34,7 @@ def offspring(parent: int) -> set[int]:
 
 
 def running(processes: set[int]) -> set[int]:
-    """Those that have not ended; one that nobody has waited for has."""
+    """Return those that have not ended; a process that is not yet reaped has ended."""
     states = {}
     for number in processes:
         try:

@@ -69,7 +69,7 @@ def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
     pipe = "import errno, sys; from compare.cli.command import run_app\ndef fails(): raise BrokenPipeError(errno.EPIPE, '')\n"
     program = f'{sys.executable} -c "{pipe}run_app(fails)"'
     done = shell(program)
-    assert (done.returncode, done.stderr) == (1, "nlp-gait: a process that this one began has ended before its time\n")
+    assert (done.returncode, done.stderr) == (1, "nlp-gait: a child process exited unexpectedly\n")
     assert shell(f"{{ sleep 0.2; {program}; echo $? >&2; }} | true").stderr == "1\n"
 
 

@@ -1,4 +1,4 @@
-"""Absurd sizes that each part allows but whose product nobody can compute: refused by name, before memory or time is spent."""
+"""Sizes that are allowed one by one but whose product is too large: refused by name before memory or time is spent."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def slow_iterations(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
 
 
 def test_ipopt_says_so_and_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By a clock that goes on by a second each time that somebody looks at it."""
+    """Use a clock that advances by a second each time it is read."""
     problem = nlp_gait.load("walk12")
     nlp_gait.solve(problem)  # what is built is built
     clock = iter(range(10_000))

@@ -150,7 +150,7 @@ PLACES = ("names", "lower", "upper", "population", "answer", "f", "violation", "
 
 
 def plugin_ended(rng: random.Random) -> tuple[str, str]:
-    """A search with an objective and an algorithm of one's own, of which one answers anything, and how it ended."""
+    """Return how a search ended whose user-defined objective or algorithm returns any value."""
     place, state = rng.choice(PLACES), rng.getstate()
 
     def run() -> None:

@@ -123,7 +123,7 @@ COUNTS = ("--starts", "--runs", "--evaluations", "--jobs", "--poses", "--steps",
 BAD_COUNTS = ("0", "-1", "1.5", "", "nan", "many", "9" * 400, "\ud800")
 # Little mutated: with right values they take minutes.
 SLOW = ("bench", "compare", "reproduce", "animate", "walk", *STUDIES)
-# How sentences begin that may stand before the last one: what was mended in a robot's file, what a step depends on.
+# How sentences before the last one may begin: what was fixed in a robot's file, what a result depends on.
 NOTES = ("robot ", "steps ")
 HOSTILE = (
     *(text for text in TEXTS if text not in PROBLEMS),

@@ -179,7 +179,7 @@ def _changed(tree: Any, rng: random.Random) -> Any:
 
 
 def _with_twin(tree: Any, holder: dict[Any, Any], key: Any, rng: random.Random) -> Any:
-    """The tree, in whose text the key stands twice."""
+    """Return the tree with a duplicated key in its text."""
     value = holder[key]
     holder[key] = Raw(f"{_json(value)}, {json.dumps(str(key))}: {_json(rng.choice((value, _value(rng))))}")
     return tree

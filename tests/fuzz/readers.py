@@ -290,7 +290,7 @@ def _plain(path: Path) -> Any:
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len({key for key, _ in pairs}) != len(pairs):
-            raise Misread("a key stands twice")
+            raise Misread("a key is duplicated")
         return dict(pairs)
 
     def number(text: str) -> float:

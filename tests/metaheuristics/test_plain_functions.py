@@ -1,4 +1,4 @@
-"""Plain functions and objects of one's own as algorithms: counted, stopped and judged as all others."""
+"""Plain functions and user-defined objects as algorithms: counted, stopped and judged as all others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiled code is loaded only if nobody else can have written it."""
+"""Compiled code is loaded only if no other user can have written it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
     """Return the figures by name."""
     plans = {case: findings.plan(case) for case in findings.cases}
     followed = {case: roll_out(case, plans[case], get_point(findings.best_track(case))) for case in findings.cases}
-    plan, arrays = plans[DRAWN_CASE], _planned(findings, DRAWN_CASE)
+    plan, arrays = plans[DRAWN_CASE], _load_planned_motion(findings, DRAWN_CASE)
     step = TABLE_4[DRAWN_CASE].step_m
     first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
     following = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37))
@@ -48,7 +48,7 @@ def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
     }
 
 
-def _planned(findings: StairsFindings, case: int) -> Mapping[str, Array]:
+def _load_planned_motion(findings: StairsFindings, case: int) -> Mapping[str, Array]:
     problem = make_plan_spec(findings.effort, case).load().dense(DENSITY)
     if problem is None:
         raise TypeError("the planner has samples and signals")

@@ -47,11 +47,11 @@ def make_refinable(
 ) -> GaitProblem:
     """Return a problem on the planned one's samples, which can be refined: ``build`` makes it on a grid."""
 
-    def refined(factor: int) -> GaitProblem:
+    def refine(factor: int) -> GaitProblem:
         grid = Grid(intervals=intervals, samples_per_interval=factor, refined_by="samples_per_interval")
-        return replace(build(grid), options=dict(options), refine=lambda by: refined(factor * by))
+        return replace(build(grid), options=dict(options), refine=lambda by: refine(factor * by))
 
-    return refined(1)
+    return refine(1)
 
 
 def make_recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:

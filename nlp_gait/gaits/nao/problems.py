@@ -162,12 +162,12 @@ def nao_ssp_free(
     phase = make_free_single_support_phase(body, step_length_m, trajectory, grid)
 
     @cache
-    def planned() -> GaitProblem:
+    def make_planned() -> GaitProblem:
         return nao_ssp(robot=robot, rotational_inertia=rotational_inertia, step_length_m=step_length_m)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         """Start from the paper's motion, for random values of its variables."""
-        return fit_joints(trajectory, planned(), draw_uniform(phase.free.paper.names, parameters, rng))
+        return fit_joints(trajectory, make_planned(), draw_uniform(phase.free.paper.names, parameters, rng))
 
     title = "single support with free joints: least mean power"
     return make_phase_problem("ssp-free", title, phase, start=start, searchable=False)

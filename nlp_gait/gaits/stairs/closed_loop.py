@@ -65,7 +65,7 @@ class ClosedLoop:
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
-        desired = _desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        desired = _make_desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
         if self.inverse_kinematics == "network":
             desired = solve_legs_by_network(desired)
         constants = ca.vertcat(
@@ -156,7 +156,7 @@ class ClosedLoop:
         return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
-def _desired(ops: Nonsmooth) -> ca.Function:
+def _make_desired(ops: Nonsmooth) -> ca.Function:
     """Return the function of (time, governing parameters with stair and reach margin) to the desired state (18,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")

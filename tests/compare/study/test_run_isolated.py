@@ -114,7 +114,7 @@ def test_what_it_started_ends_with_it(task: Task) -> None:
         except ProcessLookupError:
             return
         if (stat := Path(f"/proc/{child}/stat")).exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
-            return  # ended, and nobody has asked for its status
+            return  # ended, not yet reaped
         time.sleep(0.05)
     raise AssertionError("it continues")
 

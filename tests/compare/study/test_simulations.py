@@ -1,4 +1,4 @@
-"""Gaits of a study played in the engine: each once, anew when something has changed, and read without the engine."""
+"""Simulated gaits of a study: each is simulated once, again when something has changed, and read without the engine."""
 
 from __future__ import annotations
 

@@ -1,0 +1,85 @@
+"""Plain English in code and docs: no words of the old dialect, and functions named by verbs."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("nlp_gait", "metaheuristics", "compare")
+
+# What not to write, and what to write instead. See the glossary in CONTRIBUTING.md.
+REPLACEMENTS = {
+    r"anew": "again, recompute, rerun",
+    r"of one's own|one's own": "your own, user-defined",
+    r"mend(s|ed|ing)?": "fix",
+    r"stands? twice": "is duplicated",
+    r"whence|wherein|thereof|whereof": "from which, in which, its",
+    r"somebody|nobody|whoever": "the user, the caller, or nothing",
+    r"told apart|tells? apart": "distinguish, given different names",
+    r"what is known of": "information about",
+    r"comes about": "results from",
+    r"goes on(?! (line|axis))": "continues",
+    r"(?-i:(?<!there )is none)": "there is no, is not a",
+    r"has gone(?= (and|so|does))": "ended",
+}
+WORDS = re.compile(rf"\b({'|'.join(REPLACEMENTS)})\b", re.IGNORECASE)
+# A name that is a participle alone says what was done, not what the function does.
+PARTICIPLE = re.compile(
+    r"_?([a-z]+ed|understood|borne|told|sought|drawn|shown|known|left|kept|held|made|given|taken|seen|found|written|begun|said)"
+)
+NOT_PARTICIPLES = frozenset({"_embed", "_speed", "speed", "seed", "_seed", "_feed", "_need", "embed", "proceed"})
+
+
+def prose() -> Iterator[Path]:
+    """Every file whose words users or readers see."""
+    for package in (*PACKAGES, "tests", "benchmarks", "examples"):
+        yield from sorted((ROOT / package).rglob("*.py"))
+        yield from sorted((ROOT / package).rglob("*.hpp"))
+    yield from sorted((ROOT / "docs").glob("*.md"))
+    yield from sorted((ROOT / "docs").rglob("*.py"))
+    yield from sorted((ROOT / "compare").rglob("*.md"))
+    yield from (ROOT / "README.md", ROOT / "CONTRIBUTING.md")
+
+
+def find_words(text: str) -> list[str]:
+    """Lines with a word to replace, as ``12: anew``."""
+    return [f"{text.count(chr(10), 0, found.start()) + 1}: {found.group()}" for found in WORDS.finditer(text)]
+
+
+def find_participles(text: str) -> list[str]:
+    """Functions and methods named by a bare participle; properties may be nouns or adjectives."""
+    functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
+    return [
+        f"{node.lineno}: {node.name}"
+        for node in functions
+        if PARTICIPLE.fullmatch(node.name) and node.name not in NOT_PARTICIPLES and not is_property(node)
+    ]
+
+
+def is_property(node: ast.FunctionDef) -> bool:
+    """Whether a function is a property."""
+    return any("property" in ast.unparse(decorator) for decorator in node.decorator_list)
+
+
+def test_no_word_of_the_dialect_is_left() -> None:
+    files = {path: find_words(path.read_text(encoding="utf-8")) for path in prose() if path != Path(__file__)}
+    assert not {str(path.relative_to(ROOT)): words for path, words in files.items() if words}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_functions_are_named_by_verbs(package: str) -> None:
+    files = {
+        path: find_participles(path.read_text(encoding="utf-8")) for path in sorted((ROOT / package).rglob("*.py"))
+    }
+    assert not {str(path.relative_to(ROOT)): names for path, names in files.items() if names}
+
+
+def test_the_check_finds_what_it_looks_for() -> None:
+    assert find_words("fine\nmade anew by somebody, and mended") == ["2: anew", "2: somebody", "2: mended"]
+    code = "def understood(): ...\nclass A:\n    def _tied(self): ...\n    @property\n    def closed(self): ...\n"
+    assert find_participles(code) == ["1: understood", "3: _tied"]
