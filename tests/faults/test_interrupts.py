@@ -269,7 +269,7 @@ def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkey
     from nlp_gait.formulation import GaitProblem
 
     with monkeypatch.context() as patch:
-        press_after(patch, GaitProblem, "fix", 2)  # the first one checks what was asked
+        press_after(patch, GaitProblem, "start_point", 1)
         assert run(*asked).stderr == (
             f"nlp-gait: interrupted before there was a result; 0 finished results are stored in {tmp_path}; rerun the command "
             "to continue\n"

@@ -70,7 +70,7 @@ def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path, coar
         (["compare", "nao-ssp", "--handling", "dep", "--out", "{new}"], ["unknown constraint handling 'dep'", "deb"]),
         (["search", "nao-ssp", "--penalty-weight", "2"], ["go together"]),
         (["search", "nao-ssp", "--time-limit", "-1"], ["time_limit_s must be"]),
-        (["report", "{new}"], ["holds no records"]),
+        (["report", "{new}"], ["contains no records"]),
     ],
 )
 def test_wrong_use_is_one_sentence(arguments: list[str], words: list[str], folder: Path, tmp_path: Path) -> None:
