@@ -21,6 +21,7 @@ import nlp_gait
 from compare.cli import app
 from compare.papers import load_reproduction
 from compare.papers.paper_runs import Effort, Runner
+from compare.questions import sweep
 from compare.study.record import read_record
 from compare.study.store import Computation
 from nlp_gait.backends.kernel.compiled import CompiledObjective
@@ -40,7 +41,7 @@ RUN = CliRunner()
 
 
 def press_after(
-    monkeypatch: pytest.MonkeyPatch, owner: type, name: str, calls: int, before: Callable[[], None] = lambda: None
+    monkeypatch: pytest.MonkeyPatch, owner: object, name: str, calls: int, before: Callable[[], None] = lambda: None
 ) -> None:
     """Ctrl-C during a certain call of a method."""
     method, count = getattr(owner, name), 0
@@ -266,10 +267,8 @@ def test_animate_while_a_picture_is_drawn(
 @pytest.mark.slow
 def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = ("sweep", "walk12", "--over", "foot_lift_m=0.01,0.02", "--starts", "1", "--out", str(tmp_path))
-    from nlp_gait.formulation import GaitProblem
-
     with monkeypatch.context() as patch:
-        press_after(patch, GaitProblem, "start_point", 1)
+        press_after(patch, sweep, "solve_both_ways", 1)
         assert run(*asked).stderr == (
             f"nlp-gait: interrupted before there was a result; 0 finished results are stored in {tmp_path}; rerun the command "
             "to continue\n"
