@@ -19,12 +19,8 @@ from compare.cli.exchange import import_results, logs
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
 from compare.cli.questions.certainty import certainty
-from compare.cli.questions.motions import motions
-from compare.cli.questions.motors import motors
+from compare.cli.questions.changed_optima import motions, motors, prices, robust, sweep
 from compare.cli.questions.pareto import pareto
-from compare.cli.questions.prices import prices
-from compare.cli.questions.robust import robust
-from compare.cli.questions.sweep import sweep
 from compare.cli.questions.walk import walk
 from compare.cli.report import report, reproduce
 from compare.cli.search import search

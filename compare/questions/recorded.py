@@ -56,13 +56,7 @@ class JudgedGait:
 
 
 def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> JudgedGait:
-    """Judge a recorded gait, solve for the optimum of the same step and durations, and simulate the gait.
-
-    Args:
-        gait: with its limits.
-        in_engine: False to skip the simulation.
-        seed: of the optimum's starts.
-    """
+    """Judge a recorded gait, solve for the optimum of the same step and durations, and simulate the gait, if ``in_engine``."""
     notes: list[str] = []
     if gait.motion.mirrored:
         notes.append("the right foot is the stance foot: left and right are exchanged in all results")

@@ -60,16 +60,8 @@ def solve_front(
     Half of the points are spaced evenly over the criterion, from its value at the least power to the end of the front; the
     others halve the longest gaps between neighbours, measured with both ranges as 1. Each is solved from both neighbours, some
     also from random starts, and the whole front is then followed forwards and backwards, so that a better local optimum
-    spreads as far as it is the better one.
-
-    Args:
-        problem: with its other limits; its demand on the criterion is dropped.
-        criterion: what is traded against power.
-        points: at least five.
-        starts: random starts at both ends and at every third point.
-        seed: of the random starts.
-        solver: with its settings; None for IPOPT with its defaults.
-        progress: receives a note after each solve.
+    spreads as far as it is the better one. The problem keeps its other limits; its demand on the criterion is dropped. ``starts``
+    counts the random starts at both ends and at every third point; the solver is IPOPT with its defaults if it is None.
 
     Raises:
         InputError: too few points, or the least power or the largest criterion cannot be found.

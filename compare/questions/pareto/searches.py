@@ -84,16 +84,10 @@ def run_searches(
     seed: int,
     work: Work,
 ) -> list[SearchFront]:
-    """Return the fronts of all runs; each finished run is stored.
+    """Return the fronts of all runs on a problem without the criterion's demand; each finished run is stored.
 
-    Args:
-        problem: without the criterion's demand.
-        criterion: next to power.
-        scale: of both, so that neither dominates an algorithm's distances.
-        searches: rising numbers of evaluations by algorithm.
-        runs: run k uses seed + k.
-        seed: of the first run.
-        work: stores the runs.
+    The scale keeps either objective from dominating an algorithm's distances. ``searches`` maps algorithms to rising numbers of
+    evaluations; run k uses seed + k.
 
     Raises:
         SearchError: an unknown algorithm, or a budget that is not allowed.
@@ -207,15 +201,8 @@ def challenge_front(
 ) -> Challenge:
     """Find the least power at the criterion of each point, from the point itself and from the nearest point of the front.
 
-    Of more than a thousand points, those are taken that are lowest above the straight lines between the front's points.
-
-    Args:
-        problem: without a demand on the criterion.
-        criterion: next to power.
-        front: the true one, as far as it is known.
-        points: of searches.
-        solver: with its settings; None for IPOPT with its defaults.
-        progress: receives a note after each point.
+    Of more than a thousand points, those are taken that are lowest above the straight lines between the front's points. The
+    problem has no demand on the criterion; the solver is IPOPT with its defaults if it is None.
     """
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
     lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:MOST_CHALLENGES]

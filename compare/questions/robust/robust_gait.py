@@ -74,13 +74,7 @@ class SimulatedGait:
 def make_boxes(problem: GaitProblem, mass: float, sole_m: float) -> dict[str, Box]:
     """Return boxes of growing uncertainty by name: soles alone, with the whole robot's mass, with each link's mass.
 
-    Args:
-        problem: with a robot.
-        mass: tolerance, as a share.
-        sole_m: tolerance of the soles' position [m].
-
-    Raises:
-        InputError: the problem has no robot.
+    The tolerance of masses is a share, that of the soles' position is in metres; raises InputError without a robot.
     """
     robot = problem.display.robot
     if robot is None:
@@ -96,28 +90,12 @@ def make_boxes(problem: GaitProblem, mass: float, sole_m: float) -> dict[str, Bo
 def solve_robust(
     problem: GaitProblem, name: str, box: Box, *, starts: int, seed: int, samples: int, work: Work
 ) -> RobustGait:
-    """Return the robust optimum over a box of robots.
+    """Return the robust optimum over a box of robots; raises InputError if there is no feasible gait.
 
-    Args:
-        problem: of NAO.
-        name: of the box.
-        box: half-widths by the robot's quantity.
-        starts: random starts of the nominal problem.
-        seed: of the starts and of the random corners.
-        samples: random corners on which the robust optimum is evaluated.
-        work: stores the result.
-
-    Raises:
-        InputError: there is no feasible gait.
+    Starts and seed are those of the nominal problem; so many samples are random corners on which the optimum is evaluated.
     """
-    inputs = {
-        **fingerprint(problem),
-        "box": dict(box),
-        "name": name,
-        "starts": starts,
-        "seed": seed,
-        "samples": samples,
-    }
+    effort = {"starts": starts, "seed": seed, "samples": samples}
+    inputs = {**fingerprint(problem), "box": dict(box), "name": name, **effort}
     function = partial(_solve_robust, problem, name, box, starts, seed, samples, work)
     return work.compute(RobustGait, "box-{key}", inputs, function)
 

@@ -98,15 +98,7 @@ def plan_gaits(
 ) -> Iterator[PlannedGait]:
     """Yield the gaits of other planners with the footsteps, durations and swing height of each feasible gait.
 
-    Args:
-        problem: of the gaits, least power.
-        gaits: cheapest ones.
-        planners: some of ``PLANNERS``.
-        starts: of IPOPT for least squared torques.
-        seed: of these.
-        steps: number of steps to simulate; 0 for none.
-        drive: of the simulation.
-        work: stores the results.
+    Starts and seed are those of IPOPT for least squared torques; so many steps are simulated, none for 0.
     """
     for gait in gaits:
         for planner in planners if gait.point.feasible else ():

@@ -13,7 +13,6 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.judge import evaluate
 from compare.questions.motions import motion as module
 from compare.questions.motions.motion import Motion, extrapolate, find_start, load_phase, make_tasks
 from compare.questions.motions.motions import Motions, describe_motions
@@ -21,6 +20,7 @@ from compare.questions.question import Work, find
 from compare.report import writing
 from compare.study.store import Store
 from compare.study.task import ProblemSpec
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from tests.compare.pictures import save_coarsely
 
@@ -100,8 +100,8 @@ def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: tuple[Moti
     planned = ProblemSpec(name="nao-dsp", options=task.options).load()
     x0 = find_start(task, problem, found)
     assert x0 is not None
-    expected = evaluate(planned, np.array(list(found[1].x.values())))
-    assert evaluate(problem, x0).indexes["power_W"] == pytest.approx(expected.indexes["power_W"], rel=1e-9)
+    expected = build_exact_model(planned).at(np.array(list(found[1].x.values())), planned.p)
+    assert build_exact_model(problem).at(x0, problem.p).cost == pytest.approx(expected.cost, rel=1e-9)
 
 
 def test_a_rise_is_reported(question: Motions, found: tuple[Motion, ...]) -> None:

@@ -138,6 +138,7 @@ def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkey
 
     monkeypatch.setattr(Sweep, "find", lambda *_: iter([[point]]))
     monkeypatch.setattr(module, "make_gait", make_gait)
+    monkeypatch.setattr(module, "sample_finely", lambda result: result.problem.signals(result.x))
     monkeypatch.setattr(planners, "HEIGHT_STEP_M", 0.1)  # one height
     arguments = ["walk", "humanoid-cycle", "--robot", robot, "--intervals", "2", "--baseline", "cart-table"]
     arguments += ["--set", "hip_z_lift_off_m.upper=0.39"]

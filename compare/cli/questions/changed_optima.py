@@ -1,0 +1,129 @@
+"""Commands about how an optimum changes: ``motions``, ``motors``, ``prices``, ``robust`` and ``sweep``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from compare.cli.command import command
+from compare.cli.options import Evaluations, NamedProblem, NaoPhase, Seed, parse_names
+from compare.cli.questions.output import Output
+
+
+@command
+def motions(
+    *,
+    problem: Annotated[str, typer.Argument(metavar="[nao-ssp|nao-dsp]")] = "nao-ssp",
+    orders: Annotated[
+        str, typer.Option(help="Motions of hip, foot and arms, separated by commas.")
+    ] = "cubic,quintic,spline-2,spline-4,spline-8",
+    free_orders: Annotated[
+        str, typer.Option(help="Motions of free joints, separated by commas; empty for none.")
+    ] = "spline-2,spline-4,spline-8,spline-16",
+    starts: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Random starts for each order, next to the simpler optimum.")
+    ] = 1,
+    seed: Seed = 0,
+    robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
+    intervals: Annotated[int, typer.Option(min=1, help="Intervals of the phase.")] = 10,
+    output: Output,
+) -> None:
+    """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the least power of richer motions.
+
+    Each order starts from the optimum of the one before, which it contains exactly. Free joints take minutes each.
+    Rerun the command to continue after an interruption.
+
+    Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
+    """
+    from compare.questions.motions.motion import load_phase
+    from compare.questions.motions.motions import Motions
+
+    phase, rising, free = load_phase(problem, robot, intervals), parse_names(orders), parse_names(free_orders)
+    output.answer(Motions(problem=phase, orders=rising, free_orders=free, starts=starts, seed=seed))
+
+
+@command
+def motors(
+    *,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts for each variant.")] = 10,
+    seed: Seed = 0,
+    problem: NaoPhase,
+    output: Output,
+) -> None:
+    """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat and rotor of each motor.
+
+    Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
+    """
+    from compare.questions.real_motors import Motors
+
+    output.answer(Motors(problem=problem.load(), starts=starts, seed=seed))
+
+
+@command
+def prices(
+    *,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts within the bounds.")] = 10,
+    seed: Seed = 0,
+    checks: Annotated[int, typer.Option(min=0, help="Quantities of the robot that are verified by solving again.")] = 3,
+    problem: NamedProblem,
+    output: Output,
+) -> None:
+    """Compute what each limit costs the optimum, and which error of masses, lengths or soles would change it most.
+
+    Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
+    """
+    from compare.questions.prices.prices import Prices
+
+    output.answer(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks))
+
+
+@command
+def robust(
+    *,
+    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
+    sole: Annotated[
+        float, typer.Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")
+    ] = 2.0,
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts of the nominal problem.")] = 10,
+    seed: Seed = 0,
+    samples: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Random corners on which each result is evaluated.")
+    ] = 20,
+    simulate: Annotated[
+        bool, typer.Option(help="Simulate both gaits in MuJoCo on the worst robots (extra sim).")
+    ] = True,
+    problem: NaoPhase,
+    output: Output,
+) -> None:
+    """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
+
+    One motion for all robots of a box, whose worst corners are found one after the other. Example: `nlp-gait robust nao-ssp`
+    """
+    from compare.questions.robust.robust import Robust
+
+    effort = {"starts": starts, "seed": seed, "samples": samples}
+    output.answer(Robust(problem=problem.load(), mass=mass, sole=sole, simulate=simulate, **effort))
+
+
+@command
+def sweep(
+    *,
+    over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
+    algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
+    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
+    evaluations: Evaluations = 10_000,
+    seed: Seed = 0,
+    problem: NamedProblem,
+    output: Output,
+) -> None:
+    """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
+
+    Rerun the command to continue after an interruption.
+
+    Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
+    """
+    from compare.questions.sweep import Sweep, parse_axis
+
+    axes, effort = [parse_axis(text) for text in over], {"starts": starts, "evaluations": evaluations, "seed": seed}
+    output.answer(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort))
