@@ -1,28 +1,144 @@
-"""Checks of the abstract's claims in both phases with every budget, by id in ``nao_pareto_claims.toml``."""
+"""Runs measured against the true front, and checks of the abstract's claims, by id in ``nao_pareto_claims.toml``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import partial
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
 from compare.analysis.statistics.inference import rank_sum
 from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
-from compare.papers.nao_pareto.nao_pareto_findings import NAMES, Measures, ParetoFindings, PhaseFindings
-from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Case, ParetoEffort, Run
+from compare.questions.pareto.competing import CompetingObjective
+from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
+from compare.questions.pareto.pareto_front import SEARCH_NAMES
+from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
 from metaheuristics.array import Array
+from nlp_gait.formulation import GaitProblem
 
+EVEN_POINTS = 200  # of the true front, which distances are measured from
+NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them
 EARLY = 0.1  # share of the budget that counts as the beginning
 COMPETITIVE = 0.02  # of the true front's hypervolume, behind the best
 NEAR = 0.9  # share of the true front's hypervolume that counts as near it
 KNEES = 2
 
-Case = tuple[bool, str]
+Tested = tuple[bool, str]
 """Whether a claim holds in one phase with one budget, and the numbers."""
 
 
-def _check(is_true: Callable[[dict[str, Measures]], Case], findings: ParetoFindings) -> Check:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measures:
+    """Measures of R runs of one search with one budget at L looks."""
+
+    evaluations: Array  # (L,) before each look
+    # (R, L) share of the true front's, both ranges being 1 and the reference 1.1; 0 without a feasible point
+    hypervolume: Array
+    # (R, L) mean distance from a point of the true front, evenly along it, to the nearest one found; infinite without one
+    igd: Array
+    feasible: Array  # (R,) share of the evaluated points that are feasible
+    first_feasible: Array  # (R,) number of the first of these; infinite without one
+    time_s: Array  # (R,) processor time [s]
+    objective_time_s: Array  # (R,) of it in the objectives [s]
+
+    def until(self, share: float) -> Array:
+        """Return (R,) evaluations at the first look with at least a share of the hypervolume; infinite if never."""
+        reached = self.hypervolume >= share
+        at = np.where(reached.any(axis=1), self.evaluations[reached.argmax(axis=1)], np.inf)
+        return np.asarray(at)
+
+    def find_look(self, evaluations: float) -> int:
+        """Return the number of the last look within some evaluations, or of the first look."""
+        return max(0, int(np.count_nonzero(self.evaluations <= evaluations)) - 1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PhaseFindings:
+    """Results of one support phase."""
+
+    problem: GaitProblem  # the phase, without its constraint on the criterion
+    criterion: CompetingObjective  # the second objective
+    first_front: Sequence[FrontPoint]  # of the gradient method alone, whose ranges count as 1 in the searches
+    answer: Challenge  # the front after solving from the searches' best points
+    runs: Mapping[Case, Sequence[Run]]
+
+    @property
+    def front(self) -> tuple[FrontPoint, ...]:
+        """The best known front."""
+        return self.answer.front
+
+    @cached_property
+    def bends(self) -> Bends:
+        """Knees of the front."""
+        return find_bends(self.front)
+
+    @cached_property
+    def budgets(self) -> tuple[int, ...]:
+        """Budgets of the runs."""
+        return tuple(dict.fromkeys(budget for _, budget in self.runs))
+
+    @cached_property
+    def measures(self) -> dict[Case, Measures]:
+        """Measures by search and budget."""
+        return {case: self._measure(runs) for case, runs in self.runs.items()}
+
+    def points(self, algorithm: str, budget: int) -> tuple[Array, Array]:
+        """Return criterion and power [W] of all points at the ends of all runs."""
+        scale = Scale(self.first_front)
+        return scale.undo(np.concatenate([run[-1].F for run in self.runs[algorithm, budget]]))
+
+    def _measure(self, runs: Sequence[Run]) -> Measures:
+        from pymoo.indicators.hv import HV
+        from pymoo.indicators.igd import IGD
+
+        first, scale = Scale(self.first_front), Scale(self.front)
+        values, powers = (np.array([getattr(p, key) for p in self.front]) for key in ("value", "power_W"))
+        true = scale(values, powers)
+        hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(spread_evenly(true))
+        whole = float(hypervolume(true))
+        fronts = [[scale(*first.undo(look.F)) for look in run] for run in runs]
+        ends = [run[-1] for run in runs]
+        return Measures(
+            evaluations=np.array([look.evaluations for look in runs[0]], dtype=float),
+            hypervolume=np.array([[float(hypervolume(F)) / whole if len(F) else 0.0 for F in row] for row in fronts]),
+            igd=np.array([[float(distance(F)) if len(F) else math.inf for F in row] for row in fronts]),
+            feasible=np.array([end.feasible / end.evaluations for end in ends]),
+            first_feasible=np.array([math.inf if e.first_feasible is None else e.first_feasible for e in ends]),
+            time_s=np.array([end.time_s for end in ends]),
+            objective_time_s=np.array([end.objective_time_s for end in ends]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParetoFindings:
+    """All results."""
+
+    phases: tuple[PhaseFindings, ...]  # single and double support
+    effort: ParetoEffort  # what was computed
+
+
+def spread_evenly(front: Array) -> Array:
+    """Return (EVEN_POINTS, 2) points evenly along the lines between a front's (k, 2), which crowd near the searches' best."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(front, axis=0).T))])
+    places = np.linspace(0.0, along[-1], EVEN_POINTS)
+    return np.column_stack([np.interp(places, along, column) for column in front.T])
+
+
+def collect_points(front: Sequence[FrontPoint], runs: Iterable[Run]) -> list[FrontPoint]:
+    """Return the points of all runs that no other point dominates."""
+    scale = Scale(front)
+    found = []
+    for run in runs:
+        values, powers = scale.undo(run[-1].F)
+        for value, power, x in zip(values.tolist(), powers.tolist(), run[-1].X.tolist(), strict=True):
+            found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
+    return select_front(found)
+
+
+def _check(is_true: Callable[[dict[str, Measures]], Tested], findings: ParetoFindings) -> Check:
     """Check a claim about the searches in each phase with each budget."""
     return _decide(
         (
@@ -38,7 +154,7 @@ def _check_knees(findings: ParetoFindings) -> Check:
     return _decide((phase.problem.name, _has_two_knees(phase)) for phase in findings.phases)
 
 
-def _decide(named_cases: Iterable[tuple[str, Case]]) -> Check:
+def _decide(named_cases: Iterable[tuple[str, Tested]]) -> Check:
     cases = dict(named_cases)
     held, verdict, detail = sum(holds for holds, _ in cases.values()), Verdict.FAILS, ""
     if held:
@@ -50,17 +166,17 @@ def _decide(named_cases: Iterable[tuple[str, Case]]) -> Check:
     return decide(verdict, found=found, detail=detail, early=100 * EARLY, competitive=100 * COMPETITIVE)
 
 
-def _is_best(runs: dict[str, Measures]) -> Case:
+def _is_best(runs: dict[str, Measures]) -> Tested:
     volume, distance = _get_ends(runs)
     return _first(volume, max) == "NSGA2" and _first(distance, min) == "NSGA2", _list_ends(runs)
 
 
-def _is_poor(runs: dict[str, Measures]) -> Case:
+def _is_poor(runs: dict[str, Measures]) -> Tested:
     volume, distance = _get_ends(runs)
     return _first(volume, min) == "CMOEAD" and _first(distance, max) == "CMOEAD", _list_ends(runs)
 
 
-def _is_moderate(runs: dict[str, Measures]) -> Case:
+def _is_moderate(runs: dict[str, Measures]) -> Tested:
     volume, distance = _get_ends(runs)
     places = [
         1 + sorted(values, key=values.__getitem__, reverse=best).index("DCNSGA3")
@@ -70,7 +186,7 @@ def _is_moderate(runs: dict[str, Measures]) -> Case:
     return between, f"place {places[0]} of {len(runs)} by hypervolume, {places[1]} by distance"
 
 
-def _is_faster(runs: dict[str, Measures]) -> Case:
+def _is_faster(runs: dict[str, Measures]) -> Tested:
     early = {n: float(np.median(m.hypervolume[:, m.find_look(EARLY * m.evaluations[-1])])) for n, m in runs.items()}
     cmopso = runs["CMOPSO"]
     at = cmopso.evaluations[cmopso.find_look(EARLY * cmopso.evaluations[-1])]
@@ -79,21 +195,21 @@ def _is_faster(runs: dict[str, Measures]) -> Case:
     return _first(early, max) == "CMOPSO", numbers
 
 
-def _is_competitive(runs: dict[str, Measures]) -> Case:
+def _is_competitive(runs: dict[str, Measures]) -> Tested:
     volume, _ = _get_ends(runs)
     behind = max(volume.values()) - volume["CMOPSO"]
     return behind <= COMPETITIVE, f"{100 * behind:.2f} % behind {NAMES[_first(volume, max)]}"
 
 
-def _is_least_feasible(runs: dict[str, Measures]) -> Case:
+def _is_least_feasible(runs: dict[str, Measures]) -> Tested:
     return _is_extreme({n: m.feasible for n, m in runs.items()}, "DCNSGA3", min, 100.0, " %")
 
 
-def _is_costly(runs: dict[str, Measures]) -> Case:
+def _is_costly(runs: dict[str, Measures]) -> Tested:
     return _is_extreme({n: m.time_s for n, m in runs.items()}, "CMOEAD", max, 1.0, " s")
 
 
-def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], factor: float, unit: str) -> Case:
+def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], factor: float, unit: str) -> Tested:
     """Whether a search has the least or greatest median, significantly before the next one."""
     medians = {n: float(np.median(values)) for n, values in samples.items()}
     following = _first({n: median for n, median in medians.items() if n != name}, best)
@@ -102,7 +218,7 @@ def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], 
     return _first(medians, best) == name and p < SIGNIFICANT, f"{shown}; against {NAMES[following]} p = {p:.2g}"
 
 
-def _has_two_knees(phase: PhaseFindings) -> Case:
+def _has_two_knees(phase: PhaseFindings) -> Tested:
     knees, unit = phase.bends.knees, phase.criterion.unit
     shown = ", ".join(f"{k.value:.4f} {unit} at {k.power_W:.3f} W, {k.turn_deg:.0f} degrees" for k in knees) or "none"
     return len(knees) == KNEES, f"{len(knees)} ({shown})"

@@ -12,10 +12,11 @@ from compare.analysis.units import axis_label, join_words
 from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_axes
 from compare.papers.claims import Verdict
 from compare.papers.nao_pareto import nao_pareto_runs as runs
-from compare.papers.nao_pareto.nao_pareto_claims import CHECKS, NEAR
-from compare.papers.nao_pareto.nao_pareto_findings import (
+from compare.papers.nao_pareto.nao_pareto_claims import (
+    CHECKS,
     EVEN_POINTS,
     NAMES,
+    NEAR,
     ParetoFindings,
     PhaseFindings,
     collect_points,

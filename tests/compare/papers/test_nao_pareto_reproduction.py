@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compare.papers.claims import Verdict
-from compare.papers.nao_pareto.nao_pareto_findings import Measures, ParetoFindings, spread_evenly
+from compare.papers.nao_pareto.nao_pareto_claims import Measures, ParetoFindings, spread_evenly
 from compare.papers.nao_pareto.nao_pareto_reproduction import REPRODUCTION
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, choose_looks
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
