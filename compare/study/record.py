@@ -233,11 +233,7 @@ def parse_record(raw: Any) -> RunRecord:
 
 
 def load_gait(record: RunRecord) -> Result:
-    """Return the problem and the point of a record.
-
-    Raises:
-        GaitError: the problem cannot be loaded, such as user code that this command does not name, or has other variables now.
-    """
+    """Return the problem and the point of a record; GaitError if it cannot be loaded or has other variables now."""
     stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
     name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
     problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()

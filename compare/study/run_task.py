@@ -36,10 +36,7 @@ PLANNED_RUNS = 20
 def run_task(task: Task, start: RunRecord | None = None, callback: Callable[..., None] | None = None) -> RunRecord:
     """Perform one run and judge its result; raises InputError if the run to polish has no point.
 
-    Args:
-        task: what to run.
-        start: the run that this one polishes, if it does; its cost is included.
-        callback: called with X, f, violation of every generation of a search.
+    ``start`` is the run that this one polishes; its cost is included. ``callback`` receives X, f, violation of every generation.
     """
     return _search(task, callback) if task.is_search else _solve(task, start)
 

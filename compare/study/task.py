@@ -183,12 +183,7 @@ class Task:
         return self.solver
 
     def make_search(self) -> Algorithm:
-        """Return the search algorithm with its settings; this runs user code for the first time.
-
-        Raises:
-            SearchError: it is not an algorithm, or does not take the settings.
-            UserCodeError: user code cannot be found or fails.
-        """
+        """Return the search with its settings; this first runs user code. Raises SearchError for no search, and UserCodeError."""
         own = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
         if isinstance(own, str):
             return algorithm(own, **self.settings)

@@ -25,13 +25,9 @@ Job = tuple[Task, RunRecord | None]
 def run_jobs(
     jobs: Sequence[Job], workers: int = 1, scheduler: str | None = None, run: Run = run_task
 ) -> Iterator[tuple[int, RunRecord]]:
-    """Run jobs, and yield the position and the record of each as it finishes.
+    """Run jobs in their order, and yield the position and the record of each as it finishes.
 
-    Args:
-        jobs: in the order in which they start.
-        workers: processes; 1 runs in this process.
-        scheduler: address of a Dask scheduler to use instead.
-        run: performs one run.
+    One worker is this process; the address of a Dask scheduler stands for its workers instead.
 
     Raises:
         WorkerError: worker processes keep dying.

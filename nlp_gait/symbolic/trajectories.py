@@ -38,12 +38,8 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
 def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_difference: SX, phase: SX) -> Motion:
     """Return the cubic polynomial over unit time with given ends [u]: ``cubic`` with other coefficients [u].
 
-    Args:
-        start: position at phase 0.
-        end: position at phase 1.
-        half_sum: half of the sum of the velocities at both ends in unit time (velocities times the duration).
-        half_difference: half of that at phase 0 less that at phase 1.
-        phase: time / duration.
+    In unit time velocities are multiplied by the duration; the sum and the difference are those of the velocities at phase 0 and
+    at phase 1.
     """
     rise, bow = end - start, phase * (1 - phase)
     return Motion(

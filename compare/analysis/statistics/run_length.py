@@ -95,9 +95,7 @@ def find_best_known(records: Sequence[RunRecord], objective: Objective) -> float
 def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:
     """Return the cost of all runs until the target or their end, divided by the number that reached it.
 
-    Args:
-        reached: (R,) cost at which each run reached the target; infinite if never.
-        totals: (R,) cost of each whole run.
+    ``reached`` (R,) is the cost at which each run reached the target, infinite if never; ``totals`` (R,) that of each whole run.
 
     Source:
         Hansen, Auger, Ros, Mersmann, Tusar, Brockhoff (2021), COCO: a platform for comparing continuous optimizers in a

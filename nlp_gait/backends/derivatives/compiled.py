@@ -40,11 +40,7 @@ class CompiledNlp:
     """
 
     def __init__(self, nlp: Mapping[str, MX], p: Array, *, second: bool = True) -> None:
-        """Build the library, or load it from the cache, and check it against the virtual machine at parameter values p (k,).
-
-        Raises:
-            CompilerError: there is no compiler, it fails, or the NLP cannot be split.
-        """
+        """Build the library or load it, and check it at parameter values p (k,); CompilerError if the NLP cannot be compiled."""
         lanes = native_lanes()
         names = [*VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
         graph = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]]).serialize()

@@ -32,13 +32,10 @@ class SampleDerivatives(NamedTuple):
 
 
 def derive_sample(function: ca.Function, active: Integers, used: Integers, directions: int) -> SampleDerivatives:
-    """Return the derivatives of a function in the cheapest form.
+    """Return the derivatives of a function of vectors in the cheapest form.
 
-    Args:
-        function: from one vector to one vector.
-        active: places of the inputs that vary.
-        used: places of the outputs that are read.
-        directions: largest number of directions of a sample, where these are not its active inputs.
+    ``active`` inputs vary, ``used`` outputs are read; ``directions`` is the largest number of directions of a sample, where
+    these are not its active inputs.
     """
     u = function.sx_in(0)
     v = function.call([u])[0][used.tolist()]

@@ -20,12 +20,7 @@ class Continuation:
 
     The first problem is solved from random starts. Each later one is tried warm, from the neighbour's primal and dual
     solution, if the solver has one; if that fails, cold from the neighbour's x; if that fails too, from random starts.
-
-    Args:
-        starts: number of random starts if there is no neighbour, or if it does not help.
-        seed: of the random starts.
-        solver: with its settings; None for IPOPT with its defaults.
-        solves: planned number of solves, which decides whether compilation pays if the settings do not.
+    ``solves``, the planned number of solves, decides whether compilation pays if the solver's settings do not.
     """
 
     def __init__(self, *, starts: int = 5, seed: int = 0, solver: Solver | None = None, solves: int = 1) -> None:
