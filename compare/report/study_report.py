@@ -22,7 +22,7 @@ from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 
 
 def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
-    """Rewrite the report of all records of a folder, earlier definitions included; return its files. Raises as ``read_records``."""
+    """Rewrite the report of all records of a folder, earlier ones included; return its files. Raises as ``read_records``."""
     return write_report(folder, label_editions(read_records(folder)), read_manifest(folder), weighting, as_csv=as_csv)
 
 
