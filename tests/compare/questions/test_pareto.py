@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import nlp_gait
 from compare.judge import evaluate
+from compare.questions.pareto import pareto_surface
 from compare.questions.pareto.competing import make_competing_objective, parse_objectives
 from compare.questions.pareto.front import FrontPoint, find_bends, select_front, solve_front
 from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
@@ -17,8 +20,10 @@ from compare.questions.pareto.pareto_surface import ParetoSurface
 from compare.questions.pareto.searches import SearchFront, compute_qualities
 from compare.questions.question import Work, find
 from compare.study.store import Store
+from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import Solution
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -141,7 +146,8 @@ def small() -> GaitProblem:
     problem = nlp_gait.load("nao-ssp", intervals=4)
     fixed = dict(zip(problem.names, X, strict=True))
     free = ("hip_vy_start_m_s", "hip_vy_end_m_s", "single_support_time_s")
-    return problem.fix(**{name: value for name, value in fixed.items() if name not in free})
+    problem = problem.fix(**{name: value for name, value in fixed.items() if name not in free})
+    return problem.with_values(**{"single_support_time_s.lower": 3.0})
 
 
 def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProblem, folder: Path) -> None:
@@ -165,11 +171,20 @@ def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProb
     assert all(path.stat().st_size > 0 for path in written)
 
 
-def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path) -> None:
+def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All pairs of demands can be satisfied here; the last one is reported as if it could not."""
+
+    def solve(problems: list[GaitProblem], **options: Any) -> list[Solution]:
+        *solved, last = solve_both_ways(problems, **options)
+        assert last.converged
+        return [*solved, replace(last, claimed=False)]
+
+    monkeypatch.setattr(pareto_surface, "solve_both_ways", solve)
     question = ParetoSurface(problem=small, objectives=("dbm_y_mean", "speed"), points=4, starts=1)
     surface = find(question, Work(store=Store(folder)))
     powers = {p.demanded: p.power_W for p in surface.points}
     for (margin, speed), power in powers.items():
         assert all(other >= power * (1 - 1e-6) for (m, s), other in powers.items() if m >= margin and s >= speed)
-    assert len(surface.points) + len(surface.infeasible) == 4
+    assert len(surface.points) == 3 and len(surface.infeasible) == 1
+    assert surface.infeasible[0] not in powers
     assert all(path.stat().st_size > 0 for path in question.report(surface).write(folder))
