@@ -270,7 +270,7 @@ def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkey
     with monkeypatch.context() as patch:
         press_after(patch, sweep, "solve_both_ways", 1)
         assert run(*asked).stderr == (
-            f"nlp-gait: interrupted before there was a result; 0 finished results are stored in {tmp_path}; rerun the command "
+            f"nlp-gait: interrupted after 0 of 4 solves; 1 finished results are stored in {tmp_path}; rerun the command "
             "to continue\n"
         )
     assert not list(tmp_path.glob("*.*"))
