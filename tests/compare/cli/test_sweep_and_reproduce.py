@@ -38,7 +38,8 @@ def test_sweep_over_nonsense_is_one_sentence(tmp_path: Path) -> None:
 def test_every_reproduction_has_its_template_and_knows_its_steps() -> None:
     for name in REPRODUCTIONS:
         reproduction = load_reproduction(name)
-        assert (resources.files("compare.papers") / reproduction.template).is_file()
+        folder = resources.files("compare.papers") / reproduction.name
+        assert (folder / f"{reproduction.name}_report.md").is_file()
         assert (reproduction.full.steps is None) == (name == "nao-pareto")
 
 

@@ -81,7 +81,9 @@ def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait
 @pytest.mark.slow
 def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None:
     steep = problem.with_values(stair_length_m=0.508, rise_run_ratio=0.5 / 0.254)
-    refused = nlp_gait.solve(steep, x0=NEAR_BEST, solver=nlp_gait.IpoptSettings(iterations=40, few_rows=False, compiled=False))
+    refused = nlp_gait.solve(
+        steep, x0=NEAR_BEST, solver=nlp_gait.IpoptSettings(iterations=40, few_rows=False, compiled=False)
+    )
     assert not refused.converged
     assert "violated: " in refused.status
     assert refused.worst_violations[0].name.startswith(("reach", "link_", "knee_angle"))
