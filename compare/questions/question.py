@@ -106,11 +106,7 @@ class Answer(Document):
     results: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def write(self, folder: Path) -> list[Path]:
-        """Write report, tables, figures, results and data, and return their paths.
-
-        Raises:
-            OutputError: a file cannot be written.
-        """
+        """Write report, tables, figures, results and data, and return their paths; raises OutputError if that fails."""
         written = write_document(folder, self, self.stem)
         for name, data in {**self.results, self.stem: self.data}.items():
             written.append(folder / f"{name}.json")

@@ -39,11 +39,7 @@ class Axis:
 
 
 def parse_axis(text: str) -> Axis:
-    """Return the axis ``name=low:high:count`` or ``name=v1,v2,...``.
-
-    Raises:
-        InputError: another text, or too many points.
-    """
+    """Return the axis ``name=low:high:count`` or ``name=v1,v2,...``; raises InputError for another text or too many points."""
     name, _, values = text.partition("=")
     try:
         if ":" in values:

@@ -114,8 +114,7 @@ def make_tasks(
 ) -> list[MotionTask]:
     """Return the tasks of one phase, in an order in which each can start from an earlier one.
 
-    Raises:
-        InputError: another phase, or orders that do not rise.
+    Raises InputError for another phase, or orders that do not rise.
     """
     check_phase(phase)
     for given in (orders, free_orders):

@@ -138,11 +138,7 @@ class ParetoFront(Question[FoundFront]):
 
 
 def parse_searches(texts: Sequence[str]) -> dict[str, tuple[int, ...]]:
-    """Return the budgets by algorithm from ``NSGA2=10000,100000``; the text ``none`` alone for no search.
-
-    Raises:
-        InputError: another text.
-    """
+    """Return the budgets by algorithm from ``NSGA2=10000,100000``; none from ``none``; raises InputError for another text."""
     if list(texts) == ["none"]:
         return {}
     searches: dict[str, tuple[int, ...]] = {}

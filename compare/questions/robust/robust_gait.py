@@ -148,11 +148,7 @@ def _require(solution: Solution, what: str) -> Solution:
 
 
 def simulate_robots(problem: GaitProblem, gait: RobustGait, work: Work) -> Iterator[SimulatedGait]:
-    """Simulate the nominal and the robust gait on every robot of the scenario problem (extra ``sim``).
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed.
-    """
+    """Simulate the nominal and the robust gait on all robots of the scenario problem; raises MissingExtraError without MuJoCo."""
     for robot in gait.robots:
         for kind, x in (("nominal", gait.nominal_x), ("robust", gait.x)):
             perturbed = rebuild(problem, robot=robot)

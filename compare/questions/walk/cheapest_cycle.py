@@ -53,11 +53,7 @@ def make_gait(problem: GaitProblem, point: SweepPoint) -> Gait:
 
 
 def simulate_walk(result: Result, steps: int, drive: Drive, work: Work) -> Walk:
-    """Simulate so many steps of a gait.
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed.
-    """
+    """Simulate so many steps of a gait; raises MissingExtraError without MuJoCo."""
     inputs = {**fingerprint(result.problem), "x": result.x.tolist(), "steps": steps, "drive": repr(drive)}
     return work.compute(Walk, "walk-{key}", inputs, partial(_simulate_walk, result, steps, drive))
 
