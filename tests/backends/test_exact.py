@@ -50,7 +50,7 @@ def test_what_is_maximised_costs_its_negative_and_is_indexed_as_it_is() -> None:
     assert out.indexes == pytest.approx({"cost": 3.0})
 
 
-def test_values_of_parameters_reach_the_function_without_building_it_anew() -> None:
+def test_values_of_parameters_reach_the_function_without_rebuilding_it() -> None:
     problem = toy(corner)
     other = problem.with_values(**{"limit": 1.0, "x.lower": 0.5})
     assert build_exact_model(other) is build_exact_model(problem)

@@ -120,7 +120,7 @@ def test_an_interrupt_ends_all_processes_and_keeps_what_they_have() -> None:
     assert not multiprocessing.active_children()
 
 
-def test_what_a_run_raises_is_raised_and_a_process_that_dies_is_told() -> None:
+def test_what_a_run_raises_is_raised_and_a_dead_process_is_reported() -> None:
     problem = toy(corner)
     first = problem.start_point(np.random.default_rng(0))
 

@@ -66,7 +66,7 @@ def test_example(
 
 
 @pytest.mark.slow
-def test_the_three_kinds_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_three_kinds_of_user_code(capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(ROOT / "examples" / "bring_your_own.py"), run_name="__main__")
     assert "annealing, 2000 evaluations: power " in capsys.readouterr().out
 

@@ -89,7 +89,7 @@ def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_whoever_stops_asking_hears_nothing_of_what_is_cancelled() -> None:
+def test_cancelled_runs_are_not_reported_after_an_early_stop() -> None:
     """Ctrl-C in a study is one sentence: joblib's warning of cancelled calls is not a second one."""
     results = run_in_processes({number: partial(time.sleep, 0.05 * number) for number in range(12)}, workers=2)
     assert next(results) == (0, None)

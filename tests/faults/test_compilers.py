@@ -48,7 +48,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-def test_the_objective_is_interpreted_and_that_is_said(
+def test_the_objective_is_interpreted_with_a_warning(
     fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     body, words = FAULTS[fault]
@@ -69,7 +69,7 @@ def test_the_objective_is_interpreted_and_that_is_said(
 
 
 @pytest.mark.parametrize("fault", ["fails", "hangs", "writes rubbish"])
-def test_ipopt_goes_on_with_interpreted_functions_and_that_is_said(
+def test_ipopt_continues_with_interpreted_functions_and_a_warning(
     fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setenv("CXX", fake_compiler(tmp_path, FAULTS[fault][0]))

@@ -29,7 +29,7 @@ def limited(kilobytes: int, *arguments: str) -> subprocess.CompletedProcess[str]
 
 
 @pytest.mark.slow
-def test_a_study_keeps_its_finished_runs_and_goes_on_when_there_is_room(tmp_path: Path) -> None:
+def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(tmp_path: Path) -> None:
     study = "walk12 --algorithms pso --runs 30 --evaluations 500 --starts 0 --jobs 1"
     script = (
         'mkdir "$2/small"; mount -t tmpfs -o size=48k none "$2/small"; '
@@ -78,7 +78,7 @@ def test_what_was_computed_is_printed_though_it_cannot_be_written(
 @pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("options", [(), ("--json",)])
-def test_output_that_cannot_be_written_is_said(options: tuple[str, ...]) -> None:
+def test_output_that_cannot_be_written_is_reported(options: tuple[str, ...]) -> None:
     with FULL.open("w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "nlp_gait", "evaluate", "walk12", "--x", "0.1,0.1,0.01,0.01", *options],

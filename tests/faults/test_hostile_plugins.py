@@ -136,7 +136,7 @@ def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient: None, tmp_path: Path) -> None:
+def test_a_plain_function_is_stopped_at_its_budget_even_if_it_ignores_it(impatient: None, tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(
         "def stubborn(f, lower, upper, evaluations, seed):\n"
         "    while True:\n"
@@ -165,7 +165,7 @@ def test_a_plain_function_is_stopped_at_its_budget_even_if_it_goes_on(impatient:
     assert "a plain function takes (f, lower, upper, evaluations, seed)" in status("few")
 
 
-def test_what_is_not_there_is_said_before_the_work(tmp_path: Path) -> None:
+def test_missing_user_code_is_reported_before_the_work(tmp_path: Path) -> None:
     file = written(tmp_path, "good", "raises in ask")
     for name, words in (
         (f"{tmp_path}/none.py:A", "cannot be read: No such file"),

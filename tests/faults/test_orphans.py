@@ -77,7 +77,7 @@ def test_workers_end_with_the_study(name: str, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
-def test_the_compiler_ends_with_whoever_started_it(name: str, tmp_path: Path) -> None:
+def test_the_compiler_ends_with_the_process_that_started_it(name: str, tmp_path: Path) -> None:
     compiler = fake_compiler(tmp_path, "sleep 600 & wait")
     program = "import nlp_gait; nlp_gait.compile_objective(nlp_gait.load('walk12'))"
     environment = {**os.environ, "CXX": compiler, library_cache.FOLDER_VARIABLE: str(tmp_path / "cache")}

@@ -59,7 +59,7 @@ def test_a_closed_output_is_refused_before_anything_is_written_into_a_file_in_it
 @pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("asked", ["--help", "solve --help", "--version"])
-def test_help_that_cannot_be_written_is_said(asked: str) -> None:
+def test_help_that_cannot_be_written_is_reported(asked: str) -> None:
     done = shell(f"$gait {asked} >/dev/full")
     assert (done.returncode, done.stderr) == (1, "nlp-gait: cannot write the output: No space left on device\n")
 
@@ -84,7 +84,7 @@ def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
         "evaluate walk12 --x 0.1,0.1,0.01,0.01 --signals",
     ],
 )
-def test_a_name_that_is_no_text_is_refused_before_the_work(arguments: str, tmp_path: Path) -> None:
+def test_a_name_that_is_not_text_is_refused_before_the_work(arguments: str, tmp_path: Path) -> None:
     error = one_sentence(*arguments.split(), os.fsdecode(bytes(tmp_path / "f") + b"\xff"))
     assert "its name is not valid UTF-8; choose another name" in error
     assert list(tmp_path.iterdir()) == []
@@ -101,7 +101,7 @@ def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("path", [".", "..", "nosuch/..", "/"])
-def test_a_folder_in_place_of_a_result_is_said(path: str) -> None:
+def test_a_folder_in_place_of_a_result_is_reported(path: str) -> None:
     for command in (["animate", path], ["export", path, "--format", "csv"], ["simulate", path]):
         assert "cannot be read" in one_sentence(*command)
 
@@ -123,7 +123,7 @@ def test_no_room_for_temporary_files_is_one_sentence(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("named", ['g++ "', '""', "'", "g++ \\"])
-def test_a_compiler_that_is_no_command_line_is_passed_over(named: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_compiler_that_is_not_a_command_line_is_skipped(named: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.delenv("CXX", raising=False)
     usual = find_compiler().command

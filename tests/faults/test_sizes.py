@@ -39,7 +39,7 @@ def test_a_grid_is_as_large_as_its_samples(name: str) -> None:
 
 
 @pytest.mark.parametrize("duration_s", [1e8, 1e308, -5.0, 0.0, 1e-300, 1.01 * LONGEST_S])
-def test_a_gait_without_a_duration_is_not_drawn_played_or_exported(duration_s: float, tmp_path: Path) -> None:
+def test_a_gait_without_a_duration_is_not_drawn_simulated_or_exported(duration_s: float, tmp_path: Path) -> None:
     problem = load("nao-ssp")
     x = {**problem.by_name((problem.lower + problem.upper) / 2), "single_support_time_s": duration_s}
     path = tmp_path / "result.json"
@@ -64,7 +64,7 @@ WALK = {"step_length_m": 0.1, "frontal_shift_m": 0.1, "foot_lift_m": 0.02, "bend
         (4, 100.0, f"4 steps of this gait last 400 s, and at most {LONGEST_PLAYED_S:g} s are simulated"),
     ],
 )
-def test_a_walk_is_played_as_long_as_somebody_waits_for(steps: int, step_time_s: float, message: str) -> None:
+def test_the_length_of_a_simulated_walk_is_limited(steps: int, step_time_s: float, message: str) -> None:
     walk = load("walk12").with_values(step_time_s=step_time_s)
     with pytest.raises(InputError, match=message):
         make_plan(Result(problem=walk, x=walk.check_x(WALK)), steps)
@@ -77,7 +77,7 @@ def test_no_controller_commands_every_picosecond_or_once_a_month(owner: type, pe
         owner(period_s=period_s)
 
 
-def test_a_film_has_no_more_frames_than_somebody_waits_for() -> None:
+def test_the_number_of_frames_of_a_film_is_limited() -> None:
     check_frames(60.0, MOST_FRAMES / 60.0)
     with pytest.raises(InputError, match=f"at most {MOST_FRAMES} frames, got 60 s at 50.1 frames a second = 3006"):
         check_frames(60.0, 50.1)

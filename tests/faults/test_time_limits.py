@@ -80,7 +80,7 @@ def test_a_solver_that_cannot_heed_it_is_refused_by_name(tmp_path: Path) -> None
         make_solver("fatrop", time_limit_s=1.0)
 
 
-def test_a_linear_solver_that_is_not_there_is_said_and_never_replaced() -> None:
+def test_a_missing_linear_solver_is_reported_and_never_replaced() -> None:
     problem = nlp_gait.load("walk12")
     for name in ("ma57", "mumps"):
         try:

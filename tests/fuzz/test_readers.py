@@ -44,7 +44,7 @@ def test_kept_inputs(kept: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 @pytest.mark.parametrize("kind", ["folder", "pipe", "device", "loop", "dangling", "empty", "bytes"])
-def test_what_is_no_file_is_refused_at_once(form: Format, kind: str, tmp_path: Path) -> None:
+def test_what_is_not_a_file_is_refused_at_once(form: Format, kind: str, tmp_path: Path) -> None:
     """A pipe would wait for its writer, and /dev/zero never ends."""
     path = prepared(form, tmp_path)
     if kind == "folder":

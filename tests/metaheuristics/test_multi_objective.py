@@ -158,7 +158,7 @@ def test_the_boundary_falls_from_the_first_violation_to_zero() -> None:
     np.testing.assert_allclose(compute_boundary(np.array([1.0]), 5, 10, 1.0), 1e-4, rtol=1e-3)
 
 
-def test_constraints_told_apart_are_told_by_their_worst_row() -> None:
+def test_separate_constraints_are_given_by_their_worst_row() -> None:
     """The value of a group is that of its worst row; a row without a finite value is the greatest."""
     rows = np.array([[-1.0, 2.0, 0.5], [np.nan, -3.0, -0.5]])
     constraints = Constraints(inequalities=lambda X: rows, groups=("a", "a", "b"))

@@ -33,7 +33,7 @@ def annealing(f: Callable[[Array], float], lower: Array, upper: Array, evaluatio
     dual_annealing(f, list(zip(lower, upper, strict=True)), maxfun=10 * evaluations, seed=seed)
 
 
-def test_it_is_ended_at_its_budget_and_its_best_point_kept() -> None:
+def test_it_ends_at_its_budget_with_its_best_point() -> None:
     disk = Disk()
     result = minimize(disk, as_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
     assert (result.evaluations, disk.calls, result.reasons) == (1500, 1500, ("evaluation budget used",))
@@ -60,7 +60,7 @@ def test_it_may_return_early_and_ask_for_many_points_at_once() -> None:
     assert minimize(Disk(), as_algorithm(batches, "b", {"share": 5.0}), evaluations=100).evaluations == 100
 
 
-def test_what_it_is_told_orders_points_as_the_rule_does() -> None:
+def test_the_merit_it_receives_orders_points_as_the_rule_does() -> None:
     told: list[float] = []
 
     def listening(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:

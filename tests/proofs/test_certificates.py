@@ -63,7 +63,7 @@ def test_a_gait_that_is_three_percent_worse_is_never_certified() -> None:
     assert not proof.closed and proof.bound <= costs[0]
 
 
-def test_an_infeasible_gait_is_no_incumbent_of_a_phase() -> None:
+def test_an_infeasible_gait_is_not_an_incumbent_of_a_phase() -> None:
     problem, best = load("nao-dsp"), best_x("nao-dsp")
     cheat = best.copy()
     cheat[5] *= 0.9  # less sway: too small a margin

@@ -117,7 +117,7 @@ DAMAGES = [
 
 
 @pytest.mark.parametrize(("damage", "message"), DAMAGES, ids=[message[:40] for _, message in DAMAGES])
-def test_what_is_wrong_with_a_robot_is_said(
+def test_what_is_wrong_with_a_robot_is_reported(
     tmp_path: Path, damage: Callable[[dict[str, Any]], None], message: str
 ) -> None:
     raw = tiny()
@@ -177,7 +177,7 @@ def test_a_file_is_extended_from_the_folder_of_the_one_that_names_it(tmp_path: P
     assert load_robot(str(folder / "child.json")).links["torso"].mass_kg == 7.0
 
 
-def test_a_damaged_group_beside_extends_is_named(tmp_path: Path) -> None:
+def test_a_damaged_group_next_to_extends_is_named(tmp_path: Path) -> None:
     raw = {"schema": 1, "name": "odd", "extends": "nao-v5", "links": ["LThigh"]}
     with pytest.raises(RobotDataError, match=r"links must be an object, got \['LThigh'\]"):
         load_robot(written(tmp_path, raw))

@@ -68,7 +68,7 @@ def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
         ('<joint name="A_knee"', '<joint name="extra"/><joint name="A_knee"', "has 2 hinges; give each its own body"),
     ],
 )
-def test_what_is_wrong_with_an_mjcf_is_said(path: str, tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_what_is_wrong_with_an_mjcf_is_reported(path: str, tmp_path: Path, old: str, new: str, message: str) -> None:
     text = Path(path).read_text(encoding="utf-8")
     assert old in text
     (tmp_path / "robot.xml").write_text(text.replace(old, new), encoding="utf-8")

@@ -202,7 +202,7 @@ DAMAGES = [
 
 
 @pytest.mark.parametrize(("damage", "message"), DAMAGES, ids=[message[:40] for _, message in DAMAGES])
-def test_what_is_wrong_with_a_urdf_is_said(
+def test_what_is_wrong_with_a_urdf_is_reported(
     tmp_path: Path, damage: Callable[[ElementTree.Element], None], message: str
 ) -> None:
     tree = as_urdf(nao())
@@ -221,7 +221,7 @@ def test_what_is_wrong_with_a_urdf_is_said(
     ],
     ids=["empty", "cut off", "another format", "no link"],
 )
-def test_what_is_no_urdf_is_said(tmp_path: Path, text: str, message: str) -> None:
+def test_what_is_not_a_urdf_is_reported(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(RobotDataError, match=message):
         load_robot(stored(tmp_path, text))
 
@@ -264,7 +264,7 @@ def test_a_roundabout_path_to_a_urdf_is_the_same_path(tmp_path: Path) -> None:
     assert load_robot(f"{path.parent}/../{path.parent.name}/{path.name}").name == "nao-v5"
 
 
-def test_the_robot_file_beside_a_urdf_must_extend_it(tmp_path: Path) -> None:
+def test_the_robot_file_next_to_a_urdf_must_extend_it(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()), partner(nao(), "other.urdf"))
     with pytest.raises(RobotDataError, match=r"robot\.json': 'extends' must be 'robot\.urdf', the file next to it"):
         load_robot(path)

@@ -43,14 +43,14 @@ def test_permissions_are_safe_whatever_the_mask(cache: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", [0o620, 0o602])
-def test_a_library_that_others_may_write_is_built_anew(cache: Path, mode: int) -> None:
+def test_a_library_that_others_may_write_is_rebuilt(cache: Path, mode: int) -> None:
     library = built()
     library.chmod(mode)
     assert stat.S_IMODE(built().stat().st_mode) == 0o600
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs two users, and only root is several")
-def test_a_library_or_folder_of_somebody_else_is_not_used(cache: Path) -> None:
+def test_a_library_or_folder_of_another_user_is_not_used(cache: Path) -> None:
     library = built()
     os.chown(library, 12345, -1)
     assert built().stat().st_uid == os.getuid()

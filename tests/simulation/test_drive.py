@@ -61,7 +61,7 @@ def test_drives_by_name_and_settings_that_do_not_exist():
         Drive(interpolation="cubic")
 
 
-def test_a_servo_is_as_stiff_as_its_motor_is_strong_and_its_limit_is_the_one_asked_for():
+def test_a_drive_is_as_stiff_as_its_motor_is_strong_and_its_limit_is_the_requested_one():
     joint = ROBOT.joint("LKneePitch")
     bare = replace(joint, motor=None)
     limits = {name: Drive(torque_limits=name).torque_limit(joint) for name in ("urdf", "stall", "continuous")}

@@ -169,7 +169,7 @@ def test_pictures_show_both_legs_pressure_and_captions_of_one_gait_or_two(tmp_pa
 
 
 @pytest.mark.parametrize("text", ["", "1280", "100x100", "1280x", "9999x9999", "-640x480", "640x480x3"])
-def test_a_size_that_is_none_is_refused(text):
+def test_a_wrong_size_is_refused(text):
     with pytest.raises(InputError, match="size of a film is WIDTHxHEIGHT in pixels from 320x240 to 3840x2160"):
         parse_picture_size(text)
 

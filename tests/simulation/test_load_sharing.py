@@ -178,7 +178,7 @@ def test_ramps_hold_and_steps_are_mirror_images() -> None:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_shared_is_said(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_shared_is_reported(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="no division of the load keeps both soles flat between 0.4.* s"):
         share_loads(plan, Sharing(friction=1e-4))
     with pytest.raises(InputError, match="no double support"):

@@ -73,7 +73,7 @@ def test_the_planned_climb_needs_the_torques_of_the_engine(climb: Result) -> Non
     np.testing.assert_allclose(planned, senses * model[:, columns], atol=AGREEMENT_NM)
 
 
-def test_the_ideal_step_is_played_through_its_own_instants(ideal: Result) -> None:
+def test_the_ideal_step_is_simulated_through_its_own_instants(ideal: Result) -> None:
     own, plan = ideal.problem.signals(ideal.x), make_plan(ideal)
     per_interval = (len(plan.signals.arrays["t"]) - 1) // (len(own.arrays["t"]) - 1)
     simulated = {name: array[::per_interval] for name, array in plan.signals.arrays.items()}

@@ -67,7 +67,7 @@ def test_the_walk_whose_pressure_leaves_the_sole_falls_within_five_steps() -> No
     assert m.fell_at_s is not None and m.fell_at_s > 1.0
 
 
-def test_a_slow_walk_goes_on_and_the_floor_carries_its_weight() -> None:
+def test_a_slow_walk_continues_and_the_floor_carries_its_weight() -> None:
     problem = nlp_gait.load("walk12").with_values(step_time_s=2.0)
     plan, trace, m = simulate(problem, SLOW_WALK, 3)
     assert not m.fallen

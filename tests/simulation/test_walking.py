@@ -155,7 +155,7 @@ def test_the_command_says_how_far_it_walked(cycle: Result, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("steps", [0, -1, True, 1.0])
-def test_a_number_of_steps_that_is_none_is_refused(signals: Signals, steps: int) -> None:
+def test_a_wrong_number_of_steps_is_refused(signals: Signals, steps: int) -> None:
     with pytest.raises(InputError, match="steps must be a whole number >= 1"):
         repeat_steps(signals, load_nao("nao-v5"), steps)
 

@@ -68,7 +68,7 @@ def pose(leg: Leg, k: int) -> tuple[Array, float, float]:
 
 @pytest.mark.parametrize("name", ["nao", "crooked"])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_the_foot_is_flat_and_where_it_is_asked_for(robots: dict[str, Robot], name: str, side: str) -> None:
+def test_the_foot_is_flat_and_at_the_requested_place(robots: dict[str, Robot], name: str, side: str) -> None:
     """By forward kinematics of the whole robot, from the torso down."""
     robot = robots[name]
     leg, solve = leg_function(robot, side)
@@ -155,7 +155,7 @@ def test_nothing_is_ever_nan_and_a_leg_out_of_reach_stands_still(robots: dict[st
     assert not np.array(far[1]).any() and not np.array(far[2]).any()
 
 
-def test_what_is_no_leg_is_refused(robots: dict[str, Robot]) -> None:
+def test_what_is_not_a_leg_is_refused(robots: dict[str, Robot]) -> None:
     leg = make_biped_model(robots["crooked"]).legs["left"]
     parallel = leg.axes.copy()
     parallel[5] = parallel[4]

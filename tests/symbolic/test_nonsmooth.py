@@ -84,7 +84,7 @@ def test_lifted_acos_has_no_jump_in_value_or_slope_where_the_tangent_begins() ->
             assert float(inside[1]) == pytest.approx(float(outside[1]), rel=1e-5)
 
 
-def test_exact_acos_clamps_and_lifted_acos_goes_on_along_the_tangent() -> None:
+def test_exact_acos_clamps_and_lifted_acos_continues_along_the_tangent() -> None:
     assert [float(v) for v in acos(Exact())(1.5)] == [0.0, 0.0, 0.0]
     limit = 1 - MARGIN
     slope = -1 / np.sqrt(1 - limit**2)

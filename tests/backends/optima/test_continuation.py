@@ -42,7 +42,7 @@ def test_one_direction_stays_in_a_well_and_both_find_the_lower_one() -> None:
     assert [solution.objective for solution in found] == pytest.approx(truth, abs=TOLERANCE)
 
 
-def test_infeasible_problems_are_named_and_the_path_goes_on() -> None:
+def test_infeasible_problems_are_named_and_the_path_continues() -> None:
     limits = [0.5, 1.2, 5.0, 1.5, 2.0]  # x and y end at 2 and 3
     calls: list[None] = []
     found = solve_both_ways(path(toy(corner), limits), starts=2, progress=lambda: calls.append(None))

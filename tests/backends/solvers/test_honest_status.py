@@ -135,7 +135,7 @@ def test_outcomes_rank_by_convergence_then_feasibility_then_violation() -> None:
         ("Insufficient_Memory", "insufficient memory"),
     ],
 )
-def test_what_ipopt_returns_is_said_in_words(returned: str, words: str) -> None:
+def test_what_ipopt_returns_is_described_in_words(returned: str, words: str) -> None:
     """The limit is out of reach, so that the exact functions find every point infeasible."""
     problem = toy(corner, limit=2.5)
     ready = IpoptSettings(iterations=1).prepare(problem)

@@ -162,7 +162,7 @@ def test_what_is_maximised_has_prices_in_its_own_sense() -> None:
     assert bound.price == pytest.approx(3.0, abs=1e-5)  # a higher bound on x raises the objective
 
 
-def test_a_limit_changes_without_building_anything_anew() -> None:
+def test_a_limit_changes_without_rebuilding_anything() -> None:
     problem = toy(corner)
     solve(problem)
     model = build_nlp(problem)

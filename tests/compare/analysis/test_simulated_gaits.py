@@ -85,7 +85,7 @@ def test_a_table_fits_a_terminal() -> None:
     assert rows[0][-1] == "walks 99.7 %"
 
 
-def test_problems_are_told_apart() -> None:
+def test_problems_are_distinguished() -> None:
     plays = [played("a", 1.0, 1.0), played("a", 2.0, 2.2, problem="nao-ssp"), played("b", 2.0, 2.0)]
     assert {name: len(own) for name, own in group_by_problem(plays).items()} == {"nao-dsp": 2, "nao-ssp": 1}
     assert measure_agreement(group_by_problem(plays)["nao-ssp"]).largest_error == pytest.approx(0.1)

@@ -60,7 +60,7 @@ def mine(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["Steps", "annealing"])
-def test_bench_gives_an_algorithm_of_ones_own_its_place(mine: Path, tmp_path: Path, name: str) -> None:
+def test_bench_ranks_a_user_algorithm(mine: Path, tmp_path: Path, name: str) -> None:
     """By ``file.py:name``, without glue; called again it runs nothing and says the same."""
     out = tmp_path / "out"
     call = ("bench", "--algorithm", f"{mine}:{name}", "--instances", ID, "--runs", "3", "--jobs", "1", "--out", out)

@@ -92,7 +92,7 @@ def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):
     )
 
 
-def test_the_solution_is_in_its_file_although_the_reader_of_the_output_has_gone(tmp_path):
+def test_a_broken_pipe_does_not_lose_the_solution_file(tmp_path):
     target = tmp_path / "best.json"
     command = f"{sys.executable} -P -m nlp_gait solve nao-dsp --starts 1 --out {target} | true"
     subprocess.run(command, shell=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("coarse_pictures")
 RUN = CliRunner()
 
 
-def test_it_tells_what_each_feature_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_reports_what_each_feature_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("as published", "+ speed and torque limits", "with these, K of each motor")
     monkeypatch.setattr(motors, "VARIANTS", {name: motors.VARIANTS[name] for name in names})
     done = RUN.invoke(app, ["motors", "nao-dsp", "--starts", "1", "--out", str(tmp_path), "--json"])

@@ -40,7 +40,7 @@ def test_axis(text: str, values: tuple[float, ...]) -> None:
 @pytest.mark.parametrize(
     "text", ["", "a", "a=", "=1", "a=1:2", "a=1:2:0", "a=1:2:-3", "a=1:2:x", "a=nan", "a=1,inf", "a=1:2:3:4"]
 )
-def test_what_is_no_axis_is_refused(text: str) -> None:
+def test_what_is_not_an_axis_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="NAME=LOW:HIGH:COUNT"):
         parse_axis(text)
 

@@ -36,11 +36,11 @@ def test_best_gait_of_each_solver_is_drawn() -> None:
         ("never.py:seen", {"a": 1.0}, "never.py"),
     ],
 )
-def test_what_cannot_be_drawn_is_said(name: str, x: dict[str, float], why: str) -> None:
+def test_what_cannot_be_drawn_is_reported(name: str, x: dict[str, float], why: str) -> None:
     """Code that a record names is not run for it."""
     part = make_gaits_part(comparison(name, x, "pso"))
     assert isinstance(part, str) and part.startswith("The gaits are not drawn: ") and why in part
 
 
-def test_a_problem_that_nobody_knows_is_no_reason_to_fail() -> None:
+def test_an_unknown_problem_does_not_fail_the_report() -> None:
     assert "unknown problem 'walk'" in str(make_gaits_part(compare_problems(study())[0]))

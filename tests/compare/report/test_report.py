@@ -219,7 +219,7 @@ def test_two_problems_have_a_performance_profile(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_feasible_is_said_plainly(tmp_path: Path) -> None:
+def test_nothing_feasible_is_reported_plainly(tmp_path: Path) -> None:
     failed = [record("pso", run, [(10, None)], feasible=False, claimed=False) for run in range(2)]
     write_report(tmp_path, failed, Manifest(settings=None, sessions=()))
     assert "No solver found a feasible point of walk." in (tmp_path / "report.md").read_text(encoding="utf-8")

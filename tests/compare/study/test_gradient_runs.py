@@ -49,7 +49,7 @@ def test_slsqp_leaves_fixed_variables_alone() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fatrop", "sqpmethod", "uno"])
-def test_other_nlp_solvers_come_to_the_same_optimum(name: str) -> None:
+def test_other_nlp_solvers_reach_the_same_optimum(name: str) -> None:
     reason = nlpsol.probe(name)
     if reason is not None:
         pytest.skip(f"{name} does not run here: {reason}")

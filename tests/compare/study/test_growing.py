@@ -56,7 +56,7 @@ def test_a_larger_budget_is_another_run_and_the_smaller_ones_stay(tmp_path: Path
     assert kept == 4 and not said and again == first
 
 
-def test_a_solver_that_is_left_out_is_hidden_and_kept(tmp_path: Path) -> None:
+def test_a_solver_that_is_left_out_is_hidden_and_stays_stored(tmp_path: Path) -> None:
     grown(tmp_path, STUDY)
     records, kept, _ = grown(tmp_path, replace(STUDY, solvers=STUDY.solvers[:1]))
     assert {r.solver for r in records} == {"pso"} and kept == 2

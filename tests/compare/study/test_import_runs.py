@@ -116,13 +116,13 @@ def test_a_file_that_grows_keeps_the_rows_that_it_had(tmp_path: Path) -> None:
         ("", "has no rows"),
     ],
 )
-def test_a_file_that_is_none_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
+def test_a_damaged_file_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text(text)
     with pytest.raises(GaitError, match=message):
         read_points(tmp_path / "x.csv", PROBLEM)
 
 
-def test_what_nobody_can_know_is_asked_for(tmp_path: Path) -> None:
+def test_missing_settings_of_a_run_are_requested(tmp_path: Path) -> None:
     with pytest.raises(GaitError, match="has no evaluations: add a column"):
         import_runs(WALK, finals(tmp_path), "ga")
     with pytest.raises(GaitError, match="--as takes letters"):
@@ -131,7 +131,7 @@ def test_what_nobody_can_know_is_asked_for(tmp_path: Path) -> None:
         import_runs(WALK, finals(tmp_path, extra={"objectiv": [1, 2, 3]}), "ga", evaluations=3)
 
 
-def test_editions_of_one_name_are_told_apart(tmp_path: Path) -> None:
+def test_editions_of_one_name_are_distinguished(tmp_path: Path) -> None:
     study = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),), runs=2, stop=Stop(evaluations=200))
     run_study(Study(tasks=study.tasks(), folder=tmp_path))
     from dataclasses import replace
@@ -167,13 +167,13 @@ def test_the_commands(tmp_path: Path) -> None:
         ("0,0,0.5\n1,1,\n2,1,\n", "line 2: evaluations must be a whole number .*1"),
     ],
 )
-def test_a_history_that_is_none_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
+def test_a_damaged_history_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "h.csv").write_text(f"run,evaluations,objective\n{text}")
     with pytest.raises(GaitError, match=message):
         import_runs(WALK, finals(tmp_path), "ga", tmp_path / "h.csv")
 
 
-def test_what_a_file_leaves_out_is_filled_in_and_what_it_says_is_kept(tmp_path: Path) -> None:
+def test_values_missing_from_a_file_are_filled_in_and_others_stay(tmp_path: Path) -> None:
     """Runs are rows, seeds are runs; several entries at one count are allowed; every value is in the key."""
     with pytest.raises(GaitError, match="a run is duplicated"):
         import_runs(WALK, finals(tmp_path, extra={"run": [1, 1, 2]}), "ga", evaluations=3)

@@ -53,7 +53,7 @@ def refuse(*_: object, **__: object) -> None:
     raise AssertionError("played again")
 
 
-def test_the_command_plays_each_solvers_best_gait(report: dict[str, object], folder: Path) -> None:
+def test_the_command_simulates_each_solvers_best_gait(report: dict[str, object], folder: Path) -> None:
     gaits = report["gaits"]
     assert isinstance(gaits, list)
     assert [gait["solver"] for gait in gaits] == ["pso", "ga"]
@@ -78,7 +78,7 @@ def test_a_later_report_shows_it_without_the_engine(
     assert refused.exit_code == 1 and "pip install 'nlp-gait[sim]'" in refused.stderr
 
 
-def test_what_is_kept_is_not_played_again(
+def test_a_stored_simulation_is_not_repeated(
     report: dict[str, object], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(simulations, "simulate_plan", refuse)
@@ -91,12 +91,12 @@ def test_what_is_kept_is_not_played_again(
         simulate_records(folder, [dsp("pso", 3.0, 0.5)], Drive())
 
 
-def test_a_gait_that_has_changed_has_no_playback_to_show(report: dict[str, object], folder: Path) -> None:
+def test_a_gait_that_has_changed_has_no_simulation_to_show(report: dict[str, object], folder: Path) -> None:
     assert len(load_simulations(folder, [dsp("pso", 3.0), dsp("ga", 4.0, 0.35)])) == 2
     assert load_simulations(folder, [dsp("pso", 3.0, 0.5), dsp("aco", 3.0)]) == []
 
 
-def test_problems_that_cannot_be_played_are_left_out_or_refused(
+def test_problems_that_cannot_be_simulated_are_left_out_or_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
@@ -109,7 +109,7 @@ def test_problems_that_cannot_be_played_are_left_out_or_refused(
     assert refused.exit_code == 1 and "no gait of nao-dsp can be simulated" in refused.stderr
 
 
-def test_a_damaged_playback_is_refused_with_its_remedy(tmp_path: Path) -> None:
+def test_a_damaged_simulation_is_refused_with_its_remedy(tmp_path: Path) -> None:
     gait = dsp("pso", 3.0)
     inputs = {"problem": gait.definition["problem"], "x": dict(gait.x)}
     Store(tmp_path).save("simulations/nao-dsp/pso-0000", inputs, {})
@@ -117,7 +117,7 @@ def test_a_damaged_playback_is_refused_with_its_remedy(tmp_path: Path) -> None:
         load_simulations(tmp_path, [dsp("pso", 3.0)])
 
 
-def test_a_report_without_playbacks_says_how_to_get_them(tmp_path: Path) -> None:
+def test_a_report_without_simulations_says_how_to_get_them(tmp_path: Path) -> None:
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
     write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
     done = CliRunner().invoke(app, ["report", str(tmp_path)])
@@ -136,7 +136,7 @@ def test_compare_says_that_the_engine_is_missing_before_the_work(
     assert not (tmp_path / "study").exists()
 
 
-def test_compare_refuses_problems_that_cannot_be_played_before_the_work(
+def test_compare_refuses_problems_that_cannot_be_simulated_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")

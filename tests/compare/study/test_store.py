@@ -59,7 +59,7 @@ def test_an_interrupted_computation_leaves_no_file(tmp_path: Path) -> None:
     assert not list((tmp_path / "store").iterdir())
 
 
-def test_fingerprint_tells_values_and_mathematics_apart() -> None:
+def test_fingerprint_distinguishes_values_and_mathematics() -> None:
     one = fingerprint(nlp_gait.load("walk12"))
     assert one == fingerprint(nlp_gait.load("walk12"))
     assert one != fingerprint(nlp_gait.load("walk12").with_values(step_time_s=2.0))

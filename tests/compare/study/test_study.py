@@ -191,7 +191,7 @@ def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -
         (Task(problem=ProblemSpec(name="nao-spp"), solver="pso"), "unknown problem"),
     ],
 )
-def test_what_cannot_run_is_said_before_the_work(task: Task, message: str, tmp_path: Path) -> None:
+def test_what_cannot_run_is_reported_before_the_work(task: Task, message: str, tmp_path: Path) -> None:
     with pytest.raises((GaitError, SearchError), match=message):
         run_study(Study(tasks=(task,), folder=tmp_path))
     assert not list(tmp_path.rglob("*.json"))

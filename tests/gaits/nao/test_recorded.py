@@ -156,7 +156,7 @@ def test_arms_may_be_left_out_and_degrees_are_read(tmp_path: Path) -> None:
         ("t\n0\n1\n", "has no angles of"),
     ],
 )
-def test_a_file_that_is_no_motion_is_refused(text: str, message: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_motion_is_refused(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text(text)
     with pytest.raises(GaitError, match=message):
         make_recorded_gait(angles_of(tmp_path / "m.csv"))

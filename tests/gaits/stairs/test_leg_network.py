@@ -62,7 +62,7 @@ def test_gradients_by_weights_are_those_of_the_error() -> None:
     assert after.error_m2[0] == pytest.approx(expected_after, rel=1e-9)
 
 
-def test_rates_of_the_leg_move_its_ankle_as_asked() -> None:
+def test_rates_of_the_leg_move_its_ankle_as_requested() -> None:
     angles, velocity = SX.sym("angles", 2), SX.sym("velocity", 2)
     rates = leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
     moved = ca.jtimes(leg_vector(angles, THIGH, 1.2 * SHANK), angles, rates)
