@@ -88,27 +88,27 @@ def select_best_gaits(records: Sequence[RunRecord]) -> list[RunRecord]:
     ]
 
 
-def group_by_problem(plays: Sequence[SimulatedGait]) -> dict[str, list[SimulatedGait]]:
+def group_by_problem(gaits: Sequence[SimulatedGait]) -> dict[str, list[SimulatedGait]]:
     """Group gaits by problem."""
-    return {name: [p for p in plays if p.problem == name] for name in dict.fromkeys(p.problem for p in plays)}
+    return {name: [p for p in gaits if p.problem == name] for name in dict.fromkeys(p.problem for p in gaits)}
 
 
-def make_engine_rows(plays: Sequence[SimulatedGait]) -> list[tuple[str, ...]]:
+def make_engine_rows(gaits: Sequence[SimulatedGait]) -> list[tuple[str, ...]]:
     """Return rows of text under ``GAIT_HEADER`` for gaits of one problem, the model's best first."""
-    ordered = sorted(plays, key=lambda played: (played.model, played.solver))
-    model = [round_as_printed(played.model) for played in ordered]
-    engine = [math.inf if played.engine is None else round_as_printed(played.engine) for played in ordered]
+    ordered = sorted(gaits, key=lambda gait: (gait.model, gait.solver))
+    model = [round_as_printed(gait.model) for gait in ordered]
+    engine = [math.inf if gait.engine is None else round_as_printed(gait.engine) for gait in ordered]
     return [
         (
-            played.solver,
-            with_unit(played.model, played.unit, DIGITS),
-            with_unit(played.engine, played.unit, DIGITS),
-            "-" if played.engine is None else f"{100.0 * (played.engine / played.model - 1.0):+z.2f} %",
+            gait.solver,
+            with_unit(gait.model, gait.unit, DIGITS),
+            with_unit(gait.engine, gait.unit, DIGITS),
+            "-" if gait.engine is None else f"{100.0 * (gait.engine / gait.model - 1.0):+z.2f} %",
             _rank(model, i),
-            "-" if played.engine is None else _rank(engine, i),
-            _fate(played),
+            "-" if gait.engine is None else _rank(engine, i),
+            _fate(gait),
         )
-        for i, played in enumerate(ordered)
+        for i, gait in enumerate(ordered)
     ]
 
 
@@ -122,16 +122,16 @@ def describe_drive(drive: Drive) -> str:
     return f"{drive.interpolation} set-points every {1e3 * drive.period_s:g} ms, {fed[drive.feed_forward]}"
 
 
-def measure_agreement(plays: Sequence[SimulatedGait]) -> Agreement:
+def measure_agreement(gaits: Sequence[SimulatedGait]) -> Agreement:
     """Return the agreement of model and engine on gaits of one problem."""
-    return compute_agreement([played.model for played in plays], [played.engine for played in plays])
+    return compute_agreement([gait.model for gait in gaits], [gait.engine for gait in gaits])
 
 
 def _rank(values: Sequence[float], i: int) -> str:
     return str(1 + sum(value < values[i] for value in values))
 
 
-def _fate(played: SimulatedGait) -> str:
-    if played.fell_at_s is not None:
-        return f"falls at {played.fell_at_s:.2f} s"
-    return "stays up" if played.walked_share is None else f"walks {100.0 * played.walked_share:.1f} %"
+def _fate(gait: SimulatedGait) -> str:
+    if gait.fell_at_s is not None:
+        return f"falls at {gait.fell_at_s:.2f} s"
+    return "stays up" if gait.walked_share is None else f"walks {100.0 * gait.walked_share:.1f} %"

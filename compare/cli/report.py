@@ -127,7 +127,7 @@ def plain_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
     from compare.analysis.simulated_gaits import group_by_problem, measure_agreement
 
     found = {
-        problem: {"gaits": [asdict(played) for played in own], "agreement": asdict(measure_agreement(own))}
+        problem: {"gaits": [asdict(gait) for gait in own], "agreement": asdict(measure_agreement(own))}
         for problem, own in group_by_problem(simulated).items()
     }
     return {"engine": found} if found else {}

@@ -33,7 +33,7 @@ CAPTION = (
 )
 
 
-def problem_section(comparison: Comparison, plays: Sequence[SimulatedGait] = ()) -> Section:
+def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] = ()) -> Section:
     """Return the section on one problem: tables, figures, lists, and its best gaits in the engine if simulated."""
     summaries = summarise(comparison)
     objective = comparison.objective
@@ -54,7 +54,7 @@ def problem_section(comparison: Comparison, plays: Sequence[SimulatedGait] = ())
     )
     gaits = make_gaits_part(comparison)
     where_needed = (
-        engine_section(plays),
+        engine_section(simulated),
         _tests(comparison),
         _binding(comparison),
         _published_section(comparison),
@@ -230,16 +230,16 @@ def _seconds(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "-"
 
 
-def engine_section(plays: Sequence[SimulatedGait]) -> Section | None:
+def engine_section(simulated: Sequence[SimulatedGait]) -> Section | None:
     """Return the section on every solver's best gait in the engine, for each drive; None without simulations."""
-    if not plays:
+    if not simulated:
         return None
     parts: list[Part] = []
-    for drive in dict.fromkeys(played.drive for played in plays):
-        alike = [played for played in plays if played.drive == drive]
+    for drive in dict.fromkeys(gait.drive for gait in simulated):
+        alike = [gait for gait in simulated if gait.drive == drive]
         parts.append(text_table(GAIT_HEADER, make_engine_rows(alike), f"Best gaits; {describe_drive(drive)}"))
         parts.append(measure_agreement(alike).describe())
-    steps = plays[0].steps
+    steps = simulated[0].steps
     figure = (
         "mean power over the phase"
         if steps is None

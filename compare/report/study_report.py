@@ -35,8 +35,8 @@ def write_report(
     as_csv: bool = False,
 ) -> list[Path]:
     """Write the report with stored simulations, the figures as PNG and SVG, and optionally CSV files; return all paths."""
-    plays = load_simulations(folder, select_best_gaits(records))
-    written = write_document(folder, make_study_document(records, manifest, weighting, plays))
+    simulated = load_simulations(folder, select_best_gaits(records))
+    written = write_document(folder, make_study_document(records, manifest, weighting, simulated))
     if as_csv:
         written += _write_csv_files(folder, records)
     return written
@@ -46,17 +46,17 @@ def make_study_document(
     records: Sequence[RunRecord],
     manifest: Manifest,
     weighting: Weighting = DEFAULT_WEIGHTING,
-    plays: Sequence[SimulatedGait] = (),
+    simulated: Sequence[SimulatedGait] = (),
 ) -> Document:
     """Return the document of a study's records and of their best gaits simulated in the engine."""
     comparisons = compare_problems(records, weighting)
-    sections = [problem_section(c, [play for play in plays if play.problem == c.problem]) for c in comparisons]
+    sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
     if len(comparisons) > 1 and list_expected_costs(comparisons):
         sections.append(_over_problems(comparisons))
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
         verdict=write_verdict(comparisons),
-        parts=(*sections, *(() if plays else (HOW,)), _make_method_section(comparisons, manifest, weighting)),
+        parts=(*sections, *(() if simulated else (HOW,)), _make_method_section(comparisons, manifest, weighting)),
     )
 
 

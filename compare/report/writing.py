@@ -52,7 +52,7 @@ def html(document: Document, drawings: Sequence[str]) -> str:
 
 
 def markdown_page(document: Document) -> str:
-    """Markdown with the figures' PNG files beside it."""
+    """Return Markdown that shows the figures' PNG files."""
     environment = _environment(page=False)
     environment.filters["md"] = _literal
     text = environment.get_template("report.md.j2").render(document=document)

@@ -64,7 +64,7 @@ class PymooFrontSearch:
 
 
 def _seed_elites(search: Any) -> None:
-    """pymoo thins out CMOPSO's elites with a generator of its own, unseeded: with this, equal seeds give equal runs."""
+    """Seed the generator with which pymoo thins out CMOPSO's elites, so that equal seeds give equal runs."""
     tournament = search.elites.truncation.survival
 
     def truncate(members: Any, count: int) -> Any:
