@@ -42,6 +42,7 @@ class _Factories(Mapping[str, Callable[..., T]]):
 ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = _Factories(
     {
         "pso": "algorithms.particle_swarm:ParticleSwarm",
+        "pso-constant": "algorithms.particle_swarm:ConstantInertiaSwarm",
         "ga": "algorithms.genetic:GeneticAlgorithm",
         "aco": "algorithms.ant_colony:AntColony",
         "aco-grid": "algorithms.ant_colony_grid:AntColonyGrid",

@@ -44,7 +44,9 @@ def compare(
     algorithms: Annotated[
         str,
         typer.Option(
-            help="Searches and other solvers, separated by commas, see `nlp-gait list`; `all` stands for every installed "
+            help="Searches and other solvers, separated by commas, see `nlp-gait list`; `pso` damps its inertia weight by 0.99 "
+            "as the code that the NAO paper cites, because the constant weight that the paper prints, `pso-constant`, does not "
+            "settle; `all` stands for every installed "
             f"search (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 COLOURS = {
     "ipopt": "#000000",
     "pso": "#0072B2",
+    "pso-constant": "#56B4E9",
     "ga": "#D55E00",
     "aco": "#009E73",
     "aco-grid": "#CC79A7",

@@ -14,6 +14,7 @@ from compare.drawing.comparison_figures import list_expected_costs, plot_perform
 from compare.report.document import Document, Figure, Section, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.writing import write_document
+from compare.study.description import describe_solver, list_described_names
 from compare.study.manifest import Manifest, Session, read_manifest
 from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
 from compare.study.record_files import read_records
@@ -105,7 +106,8 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
         for solver in comparison.solvers:
             settings = next((r.settings for r in solver.records if r.settings), {})
             seeds = f"{solver.records[0].seed} to {solver.records[-1].seed}"
-            rows.append((comparison.problem, solver.name, seeds, _plain(settings)))
+            what = describe_solver(solver.name).title if solver.name in list_described_names() else "-"
+            rows.append((comparison.problem, solver.name, seeds, _plain(settings), what))
         problem = comparison.records[0].definition.get("problem", {})
         rows.append(
             (
@@ -113,11 +115,11 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
                 "(problem)",
                 "-",
                 _plain({**problem.get("options", {}), **problem.get("parameters", {})}),
+                "-",
             )
         )
-    return Section(
-        title="Settings and seeds", parts=(text_table(("problem", "solver", "seeds", "settings"), rows, prose=True),)
-    )
+    header = ("problem", "solver", "seeds", "settings", "what")
+    return Section(title="Settings and seeds", parts=(text_table(header, rows, prose=True),))
 
 
 def _session(number: int, session: Session) -> Section:

@@ -16,7 +16,10 @@ from metaheuristics.settings import check_count, check_number
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ParticleSwarm:
-    """Global-best particle swarm with damped inertia, limited velocity and reflection of velocity at the bounds.
+    """Global-best particle swarm; its inertia weight is damped by 0.99, as in the code that Gupta, Pratihar, Deb (2023) cite.
+
+    The paper itself prints a constant weight of 1 (`ConstantInertiaSwarm`), with which the swarm does not settle: this is why the
+    cited code is the default. Velocities are limited, and reversed where a particle reaches a bound.
 
     Particles start at rest. The whole swarm moves, is evaluated as one batch, and only then are the bests updated
     (synchronous). Yarpiz updates the global best within the sweep, after every particle (asynchronous), which a batch
@@ -25,7 +28,8 @@ class ParticleSwarm:
     Attributes:
         population: Number of particles.
         inertia: Share of the velocity kept in the first iteration (w).
-        inertia_damping: Factor on the inertia after every iteration (wdamp); 1 for constant inertia.
+        inertia_damping: Factor on the inertia after every iteration (wdamp): 0.99 in the code that the paper cites, 1 for the
+            constant inertia that it prints.
         cognitive: Pull towards a particle's own best (c1).
         social: Pull towards the swarm's best (c2).
         velocity_limit: Largest speed in a variable, as a share of its range, per iteration.
@@ -50,6 +54,14 @@ class ParticleSwarm:
 
     def start(self, start: Start) -> ParticleSwarmSearch:
         return ParticleSwarmSearch(self, start)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ConstantInertiaSwarm(ParticleSwarm):
+    """Global-best particle swarm with the constant inertia weight of 1 that Gupta, Pratihar, Deb (2023) print; else as `pso`."""
+
+    inertia_damping: float = 1.0
+    name: ClassVar[str] = "pso-constant"
 
 
 def move(X: Array, V: Array, to_own: Array, to_swarm: Array, inertia: float, limit: Array) -> tuple[Array, Array]:

@@ -184,6 +184,7 @@ FLOOR = ("random", "sobol")  # which do not converge
 # and the operators of 2008 only recombine and mirror coordinates of the starting points: they are coarse by nature.
 SPHERE = {
     "pso": 1e-10,
+    "pso-constant": 0.06,
     "ga": 1e-4,
     "aco": 1e-20,
     "aco-grid": 0.05,
@@ -199,6 +200,7 @@ SPHERE = {
 }
 ROSENBROCK = {
     "pso": 1e-5,
+    "pso-constant": 2e-3,
     "ga": 0.01,
     "aco": 1e-5,
     "aco-grid": 2.0,
@@ -214,6 +216,7 @@ ROSENBROCK = {
 }
 DISC = {
     "pso": 1e-3,
+    "pso-constant": 0.01,
     "ga": 0.01,
     "aco": 1e-3,
     "aco-grid": 0.5,

@@ -61,7 +61,7 @@ def test_lookup_by_name(name: str) -> None:
 
 def test_unknown_names_are_answered_with_near_ones() -> None:
     with pytest.raises(
-        SearchError, match="unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, ga, aco, aco-grid"
+        SearchError, match="unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, aco, aco-grid"
     ):
         algorithm("psoo")
     with pytest.raises(SearchError, match="'pso' has no setting 'inertial'; did you mean 'inertia'"):
