@@ -1,7 +1,7 @@
 """Documentation site: ``sphinx-build -W -b html docs OUT`` from the root, with the extra ``docs``; needs no network.
 
-What the program can say itself is made from it: ``docs/pages`` writes the pages of problems, algorithms, commands and names to
-``docs/generated``, and the gallery runs the examples.
+What the program can say itself is made from it: ``docs/pages`` writes the pages of problems, papers, algorithms, commands and names
+to ``docs/generated``, and the gallery runs the examples.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from docs.pages import algorithms, api, commands, gallery, problems  # noqa: E402
+from docs.pages import algorithms, api, commands, gallery, papers, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
 project = "nlp-gait"
@@ -22,7 +22,13 @@ project_copyright = "the authors of nlp-gait; BSD-3-Clause"
 smartquotes = False  # two hyphens are an option
 release = version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
-exclude_patterns = ["pages", "generated/gallery/*.ipynb", "generated/gallery/*.py", "**/sg_execution_times.*"]
+exclude_patterns = [
+    "pages",
+    "generated/papers",
+    "generated/gallery/*.ipynb",
+    "generated/gallery/*.py",
+    "**/sg_execution_times.*",
+]
 suppress_warnings = ["config.cache"]  # the gallery's configuration holds functions, which Sphinx cannot pickle
 nitpicky = False
 default_role = "code"
@@ -60,7 +66,7 @@ def setup(app):
 
 
 def write_pages(app):
-    """Pages of problems, algorithms, commands and names."""
+    """Pages of problems, papers, algorithms, commands and names."""
     folder = Path(app.srcdir) / "generated"
-    for part in (problems, algorithms, commands, api):
+    for part in (problems, papers, algorithms, commands, api):
         part.write(folder)

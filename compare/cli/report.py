@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import shlex
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -88,18 +90,21 @@ def reproduce(
     out: Annotated[
         Path, typer.Option(help="Folder for the report, its tables and figures; results stored in it are used again.")
     ],
-    effort: Annotated[
-        Literal["quick", "full"], typer.Option(help="As much as in the paper, or the least that fills every table.")
-    ] = "full",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="The least work that fills every table and figure, instead of the paper's.")
+    ] = False,
 ) -> None:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
-    Example: `nlp-gait reproduce nao --out reproduction`
+    `claims.csv` has every claim with its verdict, `differences.csv` everything that is not as printed with its effect.
+
+    Examples: `nlp-gait reproduce nao --out reproduction`, `nlp-gait reproduce walk12 --quick --out quick`
     """
     reproduction = load_reproduction(paper)
-    chosen = reproduction.quick if effort == "quick" else reproduction.full
-    with interruptible(out), progress_bar(paper, chosen.steps) as advance:
-        reproduction.reproduce(out, chosen, advance)
+    effort = reproduction.quick if quick else reproduction.full
+    command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
+    with interruptible(out), progress_bar(paper, effort.steps) as advance:
+        reproduction.reproduce(out, effort, advance, command=command_line)
     print_written(out / "report.md")
 
 

@@ -1,4 +1,8 @@
-"""What papers print: claims, our differences and tables, read from TOML files next to the code that checks them."""
+"""What papers print: claims, our differences and tables, read from TOML files next to the code that checks them.
+
+A verdict never looks at signs alone: rules such as ``compare_levels`` compare sizes with the tolerance that the claim states; a
+check that decides by other means names them in the claim's ``criterion``.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,9 @@ from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from importlib import resources
 from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from compare.report.document import Table
 from nlp_gait.decoding import decode
@@ -35,6 +42,12 @@ class Claim:
     text: str  # what is claimed
     printed: str = ""  # value in print
     criterion: str = ""  # what decides, where the claim leaves it open
+    tolerance: str = (
+        ""  # of sizes, for example "5 %" of the printed value, or "2 mm" in the unit of the compared values
+    )
+    least: str = (
+        ""  # smallest change that counts where the paper prints no size, for example "1 %" in the unit of the change
+    )
     found: str = ""  # our numbers
     verdict: str = ""  # a ``Verdict``; in a file only of a claim without a check
     detail: str = ""  # of the verdict, for example by how much a claim holds
@@ -48,7 +61,9 @@ class Difference:
     printed: str
     ours: str
     reason: str = ""
-    effect: str = ""  # of the difference, as a number
+    option: str = ""  # that selects the printed choice
+    effect: str = ""  # of the difference, as a number: the same result with the printed choice
+    cannot_run: str = ""  # why there is no such result
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,25 +74,94 @@ class ClaimsFile:
     differences: tuple[Difference, ...] = ()
 
 
+Rule = Callable[[Claim], tuple[Verdict, str]]
+"""Verdict and its detail from what a claim states."""
+
+
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Verdict on a claim, and the values of the fields in its texts."""
+    """Verdict on a claim or the rule that gives it, and the values of the fields in its texts."""
 
-    verdict: Verdict
+    verdict: Verdict | Rule
     values: Mapping[str, Any]
 
     def apply(self, claim: Claim) -> Claim:
-        """Return the claim with this verdict; the detail of a claim that does not hold is dropped."""
+        """Return the claim with this verdict; the text of the detail of a claim that does not hold is dropped."""
+        verdict, note = (self.verdict, "") if isinstance(self.verdict, Verdict) else self.verdict(claim)
         texts = {name: text.format_map(self.values) for name, text in asdict(claim).items()}
-        detail = "" if self.verdict is Verdict.FAILS else texts["detail"]
-        return replace(claim, **{**texts, "verdict": self.verdict, "detail": detail})
+        detail = "" if verdict is Verdict.FAILS else texts["detail"]
+        return replace(claim, **{**texts, "verdict": verdict, "detail": f"{detail} {note}".strip()})
 
 
 def decide(verdict: bool | Verdict, **values: Any) -> Check:
-    """Return a check whose verdict is given, or whether the claim holds."""
+    """Return a check whose verdict is given, or whether the claim holds; the claim states its criterion."""
     if not isinstance(verdict, Verdict):
         verdict = Verdict.HOLDS if verdict else Verdict.FAILS
     return Check(verdict, values)
+
+
+def compare_levels(printed: ArrayLike, ours: ArrayLike, **values: Any) -> Check:
+    """Return a check of values without a direction: the claim holds if all of ours are within its tolerance."""
+
+    def rule(claim: Claim) -> tuple[Verdict, str]:
+        within = _find_within(claim, printed, ours)
+        return (Verdict.HOLDS if within.all() else Verdict.FAILS), _describe_sizes(within, printed, ours)
+
+    return Check(rule, values)
+
+
+def compare_changes(printed: ArrayLike, ours: ArrayLike, **values: Any) -> Check:
+    """Return a check of changes, whose signs are directions.
+
+    The claim holds if all of ours are within its tolerance. Otherwise its direction holds if all have the printed sign.
+    """
+
+    def rule(claim: Claim) -> tuple[Verdict, str]:
+        within = _find_within(claim, printed, ours) & (np.sign(ours) == np.sign(printed))
+        if within.all():
+            return Verdict.HOLDS, _describe_sizes(within, printed, ours)
+        same = (np.sign(ours) == np.sign(printed)).all()
+        return (Verdict.SIZE_DIFFERS if same else Verdict.FAILS), _describe_sizes(within, printed, ours)
+
+    return Check(rule, values)
+
+
+def require_change(ours: ArrayLike, **values: Any) -> Check:
+    """Return a check of a claim that prints a direction without a size.
+
+    It holds if all of our changes, positive in the claimed direction, are at least as large as the claim's ``least``.
+    """
+
+    def rule(claim: Claim) -> tuple[Verdict, str]:
+        least, _ = _parse_size(claim.least)
+        return (Verdict.HOLDS if (np.asarray(ours) >= least).all() else Verdict.FAILS), ""
+
+    return Check(rule, values)
+
+
+def require_significance(check: Check, test: str, p: float) -> Check:
+    """Return a check whose verdict is "not shown" unless the p-value of a test, two-sided, excludes chance."""
+    if p < SIGNIFICANT:
+        return check
+    return Check(lambda _: (Verdict.NOT_SHOWN, f"({test}, p = {p:.2g})"), check.values)
+
+
+def _parse_size(text: str) -> tuple[float, str]:
+    """Return the number and the unit of a text such as "5 %"; raises ValueError without a number."""
+    number, _, unit = text.partition(" ")
+    return float(number), unit
+
+
+def _find_within(claim: Claim, printed: ArrayLike, ours: ArrayLike) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    size, unit = _parse_size(claim.tolerance)
+    scale = np.abs(printed) / 100 if unit == "%" else 1.0
+    return np.atleast_1d(np.abs(np.subtract(ours, printed)) <= size * scale)
+
+
+def _describe_sizes(within: np.ndarray[Any, np.dtype[np.bool_]], printed: ArrayLike, ours: ArrayLike) -> str:
+    if within.size > 1:
+        return f"({within.sum()} of {within.size} within the tolerance)"
+    return "" if within.all() else f"(printed {float(np.squeeze(printed)):z.4g}, here {float(np.squeeze(ours)):z.4g})"
 
 
 def read_printed(cls: Callable[..., T], file: str) -> T:
@@ -110,7 +194,7 @@ def make_claims_table(claims: Iterable[Claim]) -> Table:
             "where": claim.where,
             "claim": claim.text,
             "printed": claim.printed,
-            "decided by": claim.criterion,
+            "decided by": describe_criterion(claim),
             "found here": claim.found,
             "verdict": f"{claim.verdict} {claim.detail}".rstrip(),
         }
@@ -119,9 +203,35 @@ def make_claims_table(claims: Iterable[Claim]) -> Table:
     return _make_table("claims", rows)
 
 
-def make_differences_table(differences: Iterable[Difference], values: Mapping[str, Any]) -> Table:
-    """Return the table of differences, with values of the report."""
-    rows = [{name: text.format_map(values) for name, text in asdict(row).items()} for row in differences]
+def describe_criterion(claim: Claim) -> str:
+    """Return what decides about a claim: its criterion, tolerance and least change."""
+    parts = [
+        claim.criterion,
+        claim.tolerance and f"within {claim.tolerance}",
+        claim.least and f"at least {claim.least}",
+    ]
+    return "; ".join(part for part in parts if part)
+
+
+def fill_differences(differences: Iterable[Difference], values: Mapping[str, Any]) -> list[Difference]:
+    """Return differences with values of the report in their texts."""
+    filled = ({name: text.format_map(values) for name, text in asdict(row).items()} for row in differences)
+    return [Difference(**texts) for texts in filled]
+
+
+def make_differences_table(differences: Iterable[Difference]) -> Table:
+    """Return the table of differences, whose texts are complete."""
+    rows = [
+        {
+            "where": row.where,
+            "printed": row.printed,
+            "ours": row.ours,
+            "reason": row.reason,
+            "printed choice by": row.option,
+            "effect": row.effect or (row.cannot_run and f"The printed choice cannot run: {row.cannot_run}"),
+        }
+        for row in differences
+    ]
     return _make_table("differences", rows)
 
 

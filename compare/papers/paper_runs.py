@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -44,11 +44,13 @@ class Runner:
         folder: of the reproduction.
         progress: receives a line for each run and each computation.
         jobs: worker processes; 1 runs in this process.
+        records: of all tasks, filled by ``run_tasks``.
     """
 
     folder: Path
     progress: Progress
     jobs: int
+    records: list[RunRecord] = field(default_factory=list)
 
     def run_tasks(self, tasks: Iterable[Task], run: Run = run_task) -> Runs:
         """Run tasks with different titles by a function that performs one run, and return their records.
@@ -71,6 +73,7 @@ class Runner:
                 file = locate_record(self.folder, task)
                 raise InputError(f"{file.parent.name}/{file.stem} {record.status}; fix this and delete {str(file)!r}")
             runs.setdefault((record.problem, record.solver), []).append(record)
+        self.records.extend(records)
         return runs
 
     def compute(self, computations: Sequence[Computation], code: Sequence[ModuleType]) -> dict[str, Any]:

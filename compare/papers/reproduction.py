@@ -3,13 +3,16 @@
 A reproduction runs what a paper ran, checks its claims, and writes tables, figures and a report. Its text is a template in
 Markdown (see ``compare.report.template``) with places for values, tables and figures; ``{claims}`` and ``{differences}`` are the
 tables of ``<paper>_claims.toml``. To add a claim, add it to that file, and a function with its id to ``checks`` if our numbers
-decide it; else the file gives ``found`` and ``verdict``.
+decide it; else the file gives ``found`` and ``verdict``. ``summary.json`` has both tables and what computed them: its copy from a
+full reproduction, ``docs/papers/<paper>.json``, is what the documentation shows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -20,18 +23,23 @@ from compare.papers.claims import (
     Check,
     Claim,
     ClaimsFile,
+    Difference,
+    fill_differences,
     make_claims_table,
     make_differences_table,
     read_claims,
     read_tables,
 )
 from compare.papers.paper_runs import Effort, Runner
-from compare.report.document import Rows, Table
+from compare.report.document import Rows, Section, Table, text_table
+from compare.report.provenance import format_settings, make_session_section, make_solver_table
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
+from compare.study.manifest import Session
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.decoding import decode
-from nlp_gait.files import make_writable_folder
+from nlp_gait.decoding import decode, decode_value
+from nlp_gait.errors import InputError
+from nlp_gait.files import convert_errors, make_writable_folder, read_json, write_json
 from nlp_gait.progress import Progress
 
 if TYPE_CHECKING:
@@ -39,6 +47,11 @@ if TYPE_CHECKING:
 
 E = TypeVar("E", bound=Effort)
 F = TypeVar("F")
+SESSIONS, SUMMARY = "sessions.json", "summary.json"
+QUICK = (
+    "Quick run: the fewest runs, points and evaluations that fill every table. Statistics, medians and the verdicts that rest on "
+    "them are not those of the full reproduction."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +77,9 @@ class Reproduction(Generic[E, F]):
         """Claims of the paper, and our differences."""
         return read_claims(f"{self.name}/{self.name}_claims.toml")
 
-    def reproduce(self, out: Path, effort: E, progress: Progress, jobs: int | None = None) -> F:
+    def reproduce(
+        self, out: Path, effort: E, progress: Progress, jobs: int | None = None, command: str = "python"
+    ) -> F:
         """Write the report (HTML, Markdown), tables (CSV) and figures (PNG, SVG), and return the findings.
 
         Args:
@@ -72,14 +87,19 @@ class Reproduction(Generic[E, F]):
             effort: how much is computed.
             progress: receives a line for each run, each step and the report, ``effort.steps`` times.
             jobs: worker processes; None for one on each core.
+            command: command line, for the report.
 
         Raises:
             OutputError: the folder cannot be written to.
+            InputError: its list of sessions is damaged.
         """
-        folder = make_writable_folder(out)
-        findings = self.run(Runner(folder=folder, progress=progress, jobs=jobs or available_cores()), effort)
+        folder, jobs = make_writable_folder(out), jobs or available_cores()
+        sessions = [*read_sessions(folder), Session.begin(command, str(jobs))]
+        write_json(folder / SESSIONS, [asdict(session) for session in sessions])
+        runner = Runner(folder=folder, progress=progress, jobs=jobs)
+        findings = self.run(runner, effort)
         progress("figures, tables and report")
-        self.write_report(folder, findings)
+        self.write_report(folder, findings, effort, runner, sessions)
         return findings
 
     def check_claims(self, findings: F) -> dict[str, Claim]:
@@ -89,11 +109,11 @@ class Reproduction(Generic[E, F]):
             for name, claim in self.printed.claims.items()
         }
 
-    def write_report(self, folder: Path, findings: F) -> None:
-        """Write the report, tables and figures."""
+    def write_report(self, folder: Path, findings: F, effort: E, runner: Runner, sessions: Sequence[Session]) -> None:
+        """Write the report, tables, figures and ``summary.json``."""
         template = resources.files("compare.papers") / self.name / f"{self.name}_report.md"
-        values = self.values(findings)
-        claims = make_claims_table(self.check_claims(findings).values())
+        values, claims = self.values(findings), self.check_claims(findings)
+        differences = fill_differences(self.printed.differences, values)
         with style():
             figures = self.figures(findings)
         document = fill_template(
@@ -101,7 +121,52 @@ class Reproduction(Generic[E, F]):
             values=values,
             tables=self.tables(findings),
             figures=figures,
-            whole_tables=[claims, make_differences_table(self.printed.differences, values)],
+            whole_tables=[make_claims_table(claims.values()), make_differences_table(differences)],
+        )
+        quick = effort == self.quick
+        provenance = Section(
+            title="Versions, machine, seeds and settings",
+            parts=(
+                text_table(
+                    ("effort", "value"), [(k, format_settings(v)) for k, v in asdict(effort).items()], prose=True
+                ),
+                make_solver_table(runner.records),
+                *(make_session_section(k, session) for k, session in enumerate(sessions, start=1)),
+            ),
+        )
+        document = replace(
+            document,
+            title=f"{document.title} (quick)" if quick else document.title,
+            verdict=[*([QUICK] if quick else []), *count_verdicts(claims.values())],
+            parts=(*document.parts, provenance),
         )
         write_document(folder, document)
         write_parts(folder, self.csv_tables(findings))
+        write_json(folder / SUMMARY, _summarise(quick, sessions[-1], claims, differences))
+
+
+def read_sessions(folder: Path) -> list[Session]:
+    """Return the earlier sessions of a folder; raises InputError if their file is damaged."""
+    path = folder / SESSIONS
+    if not os.path.lexists(path):
+        return []
+    with convert_errors(f"{str(path)!r} is damaged", InputError, "delete it; the results stay valid"):
+        return list(decode_value(tuple[Session, ...], read_json(path, "sessions"), "sessions"))
+
+
+def count_verdicts(claims: Iterable[Claim]) -> list[str]:
+    """Return a sentence with the number of claims by verdict; nothing without claims."""
+    counts = Counter(claim.verdict for claim in claims)
+    words = ", ".join(f'{count} "{verdict}"' for verdict, count in counts.items())
+    return [f"{counts.total()} claims of the paper were checked: {words}."] if counts else []
+
+
+def _summarise(
+    quick: bool, session: Session, claims: Mapping[str, Claim], differences: Sequence[Difference]
+) -> dict[str, Any]:
+    return {
+        "effort": "quick" if quick else "full",
+        "session": asdict(session),
+        "claims": {name: asdict(claim) for name, claim in claims.items()},
+        "differences": [asdict(row) for row in differences],
+    }

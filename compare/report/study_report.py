@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,9 +12,10 @@ from compare.analysis.verdict import write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.document import Document, Figure, Section, text_table
 from compare.report.problem_section import HOW, problem_section
+from compare.report.provenance import format_settings, make_session_section
 from compare.report.writing import write_document
 from compare.study.description import describe_solver, list_described_names
-from compare.study.manifest import Manifest, Session, read_manifest
+from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
 from compare.study.record_files import read_records
 from compare.study.simulations import SimulatedGait, load_simulations
@@ -77,7 +77,7 @@ def _make_method_section(comparisons: Sequence[Comparison], manifest: Manifest, 
         parts=(
             _counting(comparisons, weighting),
             _solver_settings(comparisons),
-            *(_session(number, session) for number, session in enumerate(manifest.sessions, start=1)),
+            *(make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)),
         ),
     )
 
@@ -107,35 +107,19 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
             settings = next((r.settings for r in solver.records if r.settings), {})
             seeds = f"{solver.records[0].seed} to {solver.records[-1].seed}"
             what = describe_solver(solver.name).title if solver.name in list_described_names() else "-"
-            rows.append((comparison.problem, solver.name, seeds, _plain(settings), what))
+            rows.append((comparison.problem, solver.name, seeds, format_settings(settings), what))
         problem = comparison.records[0].definition.get("problem", {})
         rows.append(
             (
                 comparison.problem,
                 "(problem)",
                 "-",
-                _plain({**problem.get("options", {}), **problem.get("parameters", {})}),
+                format_settings({**problem.get("options", {}), **problem.get("parameters", {})}),
                 "-",
             )
         )
     header = ("problem", "solver", "seeds", "settings", "what")
     return Section(title="Settings and seeds", parts=(text_table(header, rows, prose=True),))
-
-
-def _session(number: int, session: Session) -> Section:
-    rows = [
-        ("command", session.command),
-        ("started", session.started),
-        *session.machine.items(),
-        ("workers", session.jobs),
-        ("compiled objective", session.kernel),
-        ("versions", ", ".join(f"{name} {version}" for name, version in session.versions.items())),
-    ]
-    return Section(title=f"Session {number}", parts=(text_table(("what", "value"), rows, prose=True),))
-
-
-def _plain(settings: object) -> str:
-    return json.dumps(settings, sort_keys=True).replace('"', "").strip("{}")
 
 
 def _write_csv_files(folder: Path, records: Sequence[RunRecord]) -> list[Path]:

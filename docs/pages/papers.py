@@ -1,0 +1,56 @@
+"""Claims of the papers and our differences, a page for each paper, from the recorded reproductions in ``docs/papers``.
+
+A record is the ``summary.json`` of a full ``nlp-gait reproduce PAPER --out DIR``: copy it to ``docs/papers/PAPER.json``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from compare.papers.claims import Claim, Difference, make_claims_table, make_differences_table
+from compare.papers.reproduction import count_verdicts
+from compare.report.document import Table
+from docs.pages.markdown import literal, page, table, write_all
+
+RECORDS = Path(__file__).parents[1] / "papers"
+PAPERS = ("nao", "walk12", "stairs")
+
+
+def write(folder: Path) -> None:
+    """Write the tables of each paper, which ``docs/papers.md`` includes."""
+    write_all(folder / "papers", {f"{name}.md": paper_page(name) for name in PAPERS})
+
+
+def paper_page(name: str) -> str:
+    """Return the tables of a paper."""
+    path = RECORDS / f"{name}.json"
+    if not path.exists():
+        return page(f"No full reproduction is recorded yet: `nlp-gait reproduce {name} --out DIR` computes the tables.")
+    record = json.loads(path.read_text(encoding="utf-8"))
+    claims = [Claim(**claim) for claim in record["claims"].values()]
+    differences = [Difference(**row) for row in record["differences"]]
+    return page(
+        literal(" ".join([*count_verdicts(claims), _describe(record, name)])),
+        "### Claims",
+        _format(make_claims_table(claims)),
+        "### What is not as printed",
+        _format(make_differences_table(differences)),
+    )
+
+
+def _describe(record: dict[str, Any], name: str) -> str:
+    session = record["session"]
+    return (
+        f"Computed by `nlp-gait reproduce {name}{' --quick' if record['effort'] == 'quick' else ''}`, version "
+        f"{session['versions']['nlp-gait']}, on {session['started'][:10]}, {session['machine']['processor']}."
+    )
+
+
+def _format(found: Table) -> str:
+    def cells(row: Iterable[object]) -> list[str]:
+        return [literal(str(cell)) for cell in row]
+
+    return table(cells(found.columns), map(cells, found.rows))
