@@ -1,7 +1,7 @@
 """Documentation site: ``sphinx-build -W -b html docs OUT`` from the root, with the extra ``docs``; needs no network.
 
-What the program can say itself is made from it: ``docs/pages`` writes the pages of problems, papers, algorithms, commands and names
-to ``docs/generated``, and the gallery runs the examples.
+What the program can say itself is made from it: ``docs/pages`` writes the pages of problems, papers, algorithms, commands and
+names to ``docs/generated``, and the gallery runs the examples.
 """
 
 from __future__ import annotations
