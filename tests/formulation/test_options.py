@@ -32,7 +32,6 @@ OTHER: dict[str, Any] = {
     "duration_s": 3.0,
     "instance": "walk12-w100",
 }
-QUICK = ("walk12", "nao-ssp")
 
 
 def defaults(name: str) -> dict[str, Any]:
@@ -49,39 +48,46 @@ def others(name: str) -> dict[str, Any]:
     return found
 
 
-def task(name: str, options: Mapping[str, Any]) -> Task:
+def make_task(name: str, options: Mapping[str, Any]) -> Task:
     return Task(problem=ProblemSpec(name=name, options=options), solver="ipopt")
 
 
 @pytest.mark.parametrize(
-    ("name", "option", "value"),
-    [
-        pytest.param(name, *case, id=f"{name} {case[0]}", marks=[] if name in QUICK else [pytest.mark.slow])
-        for name in PROBLEMS
-        for case in others(name).items()
-    ],
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] if name.startswith("humanoid-") else []) for name in PROBLEMS],
 )
-def test_every_option_is_recorded(name: str, option: str, value: Any) -> None:
-    """With all that was asked for; equal tasks of a study have equal definitions, and this one is not the default's."""
-    asked = task(name, {option: value})
+def test_every_option_is_recorded(name: str) -> None:
+    """With all the others; loading the recorded ones gives the same variables, grid and parameters."""
+    for option, value in others(name).items():
+        problem = load(name, **{option: value})
+        recorded_values, wanted = defaults(name) | dict(problem.options), defaults(name) | {option: value}
+        if option != "samples_per_interval":  # which follows from the trajectory
+            recorded_values.pop("samples_per_interval", None), wanted.pop("samples_per_interval", None)
+        assert recorded_values == wanted
+        again = load(problem.name, **problem.options)
+        assert again.options == problem.options
+        assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
+
+
+@pytest.mark.parametrize("option", others("walk12"))
+def test_definitions_of_tasks_depend_on_each_option(option: str) -> None:
+    """Equal tasks of a study have equal definitions, and this one is not the default's."""
+    asked = make_task("walk12", {option: others("walk12")[option]})
     problem = asked.problem.load()
-    recorded_values, wanted = defaults(name) | dict(problem.options), defaults(name) | {option: value}
-    if option != "samples_per_interval":  # which follows from the trajectory
-        recorded_values.pop("samples_per_interval", None), wanted.pop("samples_per_interval", None)
-    assert recorded_values == wanted
-    recorded = task(problem.name, problem.options)
-    assert recorded.definition() == asked.definition() != task(name, {}).definition()
-    again = recorded.problem.load()
-    assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
+    recorded = make_task(problem.name, problem.options)
+    assert recorded.definition() == asked.definition() != make_task("walk12", {}).definition()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_recorded_options_make_the_same_problem(name: str) -> None:
-    """With no option at its default: grid, rows, and every exact value at a point off the middle."""
-    problem = load(name, **others(name))
-    again = load(problem.name, **problem.options)
+    """With no option at its default: grid, definitions of tasks, rows, and every exact value at a point off the middle."""
+    asked = make_task(name, others(name))
+    problem = asked.problem.load()
+    recorded = make_task(problem.name, problem.options)
+    again = recorded.problem.load()
     assert (again.options, again.grid) == (problem.options, problem.grid)
+    assert recorded.definition() == asked.definition() != make_task(name, {}).definition()
     assert build_exact_model(again).row_names == build_exact_model(problem).row_names
     x = problem.lower + 0.4 * (problem.upper - problem.lower)
     here, there = evaluated(problem, x), evaluated(again, x)
