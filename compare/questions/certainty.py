@@ -25,9 +25,10 @@ from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.bounds import has_power_form
-from nlp_gait.proofs.branch_and_bound import Certificate, certify
-from nlp_gait.proofs.certificate import hash_code, make_certificate_file
+from nlp_gait.proofs.bounds import has_power_form, make_bounds
+from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
+from nlp_gait.proofs.certificate import make_certificate_file
+from nlp_gait.proofs.checkpoint import hash_code
 
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4
@@ -109,7 +110,7 @@ class Certainty(Question[Evidence]):
 
     starts: int  #: of IPOPT
     evaluations: int  #: of CMA-ES; 0 for none
-    tolerance: float = 0.01  #: of the proof, relative
+    tolerance: float = TOLERANCE  #: of the proof, relative
     time_limit_s: float = 1800.0  #: of the proof [s]; 0 for none
     seed: int = 0  #: of starts and search
 
@@ -120,9 +121,9 @@ class Certainty(Question[Evidence]):
             InputError: tolerance or time limit are not allowed.
             SearchError: CMA-ES is requested and not installed.
         """
-        if not (0.0 < self.tolerance < math.inf and 0.0 <= self.time_limit_s < math.inf):
+        if not (0.0 < self.tolerance < 1.0 and 0.0 <= self.time_limit_s < math.inf):
             raise InputError(
-                "tolerance must be positive and finite, the time limit finite and >= 0 s; "
+                "the tolerance must be between 0 and 1, the time limit finite and >= 0 s; "
                 f"got {self.tolerance}, {self.time_limit_s} s"
             )
         if self.evaluations:
@@ -158,7 +159,7 @@ class Certainty(Question[Evidence]):
             search = work.compute(LongSearch, "cma-{key}", inputs, function)
             work.progress("long search")
         if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
-            inputs = {**identity, **limits, "proof_code_sha256": hash_code(problem)}
+            inputs = {**identity, **limits, "proof_code_sha256": hash_code(make_bounds(problem))}
             certificate = work.compute(Certificate, "certificate-{key}", inputs, prove)
         yield Evidence(
             problem=problem,

@@ -12,27 +12,25 @@ Source:
 from __future__ import annotations
 
 import time
-import zipfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.errors import InputError
-from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.bounds import Bounds, make_bounds
-from nlp_gait.proofs.boxes import Numbers, halve
+from nlp_gait.proofs.boxes import halve
+from nlp_gait.proofs.checkpoint import Tree, hash_code, read_checkpoint, write_checkpoint
 
 # Number of boxes that are halved together, at least: this, or one in SHARE of the open ones, so that sorting costs little.
 BATCH, SHARE = 1024, 8
 CHECKPOINT_S = 30.0
+TOLERANCE = 1e-6  # six digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,28 +55,11 @@ class Certificate:
         return abs(self.bound - self.objective) / abs(self.objective)
 
 
-@dataclass(kw_only=True)
-class _Tree:
-    """Open boxes (P, n, 2), each with a lower bound of its cost, the next cut and its depth; and the work so far."""
-
-    boxes: Array
-    lowest: Array
-    cut: Numbers
-    depth: Array
-    enclosed: int = 1
-    time_s: float = 0.0
-    cpu_s: float = 0.0
-
-    def estimate_share_left(self) -> float:
-        """Return the open share of the tree, as if both halves of a box were equal work."""
-        return float(np.exp2(-self.depth.astype(float)).sum())
-
-
 def certify(
     problem: GaitProblem,
     incumbent: Array,
     *,
-    tolerance: float = 0.01,
+    tolerance: float = TOLERANCE,
     time_limit_s: float = 300.0,
     progress: Progress = ignore_progress,
     checkpoint: Path | None = None,
@@ -91,15 +72,18 @@ def certify(
         tolerance: relative distance of bound and objective at which to stop.
         time_limit_s: wall time after which the bound so far is returned [s].
         progress: receives the number of boxes, the bound in the problem's sense, and the share of the tree that is left.
-        checkpoint: file with the open boxes, written every half minute and at the end; a killed proof continues from it.
+        checkpoint: file with the open boxes, written every half minute and at the end; a killed proof continues from it. A
+            proof starts again, and reports it, if other code made the file.
 
     Raises:
-        InputError: the incumbent is not feasible, the tolerance or the time limit is not positive, or the checkpoint belongs to
-            another problem, incumbent or tolerance.
+        InputError: the incumbent is not feasible, tolerance or time limit are not positive, or the checkpoint is damaged or
+            belongs to another problem, incumbent or tolerance.
         CompilerError: there is no compiler, or it fails.
     """
-    if not (tolerance > 0.0 and time_limit_s > 0.0):
-        raise InputError(f"tolerance and time limit must be positive, got {tolerance}, {time_limit_s} s")
+    if not (0.0 < tolerance < 1.0 and time_limit_s > 0.0):
+        raise InputError(
+            f"the tolerance must be between 0 and 1, the time limit positive; got {tolerance}, {time_limit_s} s"
+        )
     x = problem.check_x(incumbent)
     at = build_exact_model(problem).at(x, problem.p)
     if not at.violation <= FEASIBILITY_TOLERANCE:
@@ -109,10 +93,15 @@ def certify(
     identity = hash_json(
         {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()}
     )
-    tree = _read_checkpoint(checkpoint, identity)
+    code = hash_code(bounds)
+    tree = None
+    if checkpoint is not None and checkpoint.exists():
+        tree = read_checkpoint(checkpoint, identity, code, bounds.root)
+        if tree is None:
+            progress(f"checkpoint {str(checkpoint)!r} was made by other code; the proof starts again")
     if tree is None:
         whole = bounds.prune(bounds.root, target)
-        tree = _Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
+        tree = Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
     saved, deadline = started, started + time_limit_s
     started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
 
@@ -127,10 +116,10 @@ def certify(
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
             saved = time.perf_counter()
             tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
-            _write_checkpoint(checkpoint, identity, tree)
+            write_checkpoint(checkpoint, identity, code, tree)
     tree.time_s, tree.cpu_s = time.perf_counter() - started, time.process_time() - used
     if checkpoint is not None:
-        _write_checkpoint(checkpoint, identity, tree)
+        write_checkpoint(checkpoint, identity, code, tree)
     return Certificate(
         objective=problem.objective.sign * at.cost,
         bound=compute_bound(),
@@ -149,7 +138,7 @@ def target_cost(cost: float, tolerance: float) -> float:
     return cost - tolerance * abs(cost)
 
 
-def _halve_best(tree: _Tree, bounds: Bounds, target: float) -> None:
+def _halve_best(tree: Tree, bounds: Bounds, target: float) -> None:
     order = np.argsort(tree.lowest, kind="stable")
     batch = max(BATCH, len(order) // SHARE)
     chosen, rest = order[:batch], order[batch:]
@@ -162,25 +151,3 @@ def _halve_best(tree: _Tree, bounds: Bounds, target: float) -> None:
     tree.lowest = np.concatenate([tree.lowest[rest], np.maximum(found.lowest, inherited)])
     tree.cut = np.concatenate([tree.cut[rest], found.cut])
     tree.depth = np.concatenate([tree.depth[rest], depth])
-
-
-def _write_checkpoint(path: Path, identity: str, tree: _Tree) -> None:
-    parts: Mapping[str, Any] = vars(tree)
-    with replace_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, identity=np.array(identity), **parts)
-
-
-def _read_checkpoint(path: Path | None, identity: str) -> _Tree | None:
-    if path is None or not path.exists():
-        return None
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            parts = dict(stored)
-        found = str(parts.pop("identity"))
-        numbers = {name: parts.pop(name).item() for name in ("enclosed", "time_s", "cpu_s")}
-        tree = _Tree(**parts, **numbers)
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(f"checkpoint {str(path)!r} is damaged: {error}; delete it to start again") from error
-    if found != identity:
-        raise InputError(f"checkpoint {str(path)!r} belongs to another proof; delete it, or name another file")
-    return tree

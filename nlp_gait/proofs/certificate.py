@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -14,17 +12,17 @@ from typing import Any, Literal
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH, hash_json, identify_problem
+from nlp_gait.backends.identity import HASH, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json
 from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs import affine, bounds, boxes, branch_and_bound, quadratic, quadratic_tape
-from nlp_gait.proofs.bounds import has_power_form, make_bounds
+from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.boxes import halve
 from nlp_gait.proofs.branch_and_bound import Certificate, target_cost
+from nlp_gait.proofs.checkpoint import hash_code
 from nlp_gait.user_code import resolve_code
 
 CERTIFICATES = Path(str(files("nlp_gait.proofs") / "certificates"))
@@ -32,8 +30,6 @@ PATHS = 200
 DEEPEST_PATH = 150
 # Relative difference of an objective that is computed on another machine.
 SAME_VALUE = 1e-9
-# Modules that decide what remains of a box.
-CODE = (affine, quadratic, quadratic_tape, boxes, bounds, branch_and_bound)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +59,9 @@ class Check:
 
 def make_certificate_file(problem: GaitProblem, certificate: Certificate) -> CertificateFile:
     """Return the certificate of a problem with its problem and code."""
-    return CertificateFile(problem=identify_problem(problem), code_sha256=hash_code(problem), certificate=certificate)
+    return CertificateFile(
+        problem=identify_problem(problem), code_sha256=hash_code(make_bounds(problem)), certificate=certificate
+    )
 
 
 def read_certificate(path: Path) -> CertificateFile:
@@ -74,20 +72,21 @@ def read_certificate(path: Path) -> CertificateFile:
 
 
 @cache
-def _load_bounds() -> Mapping[str, float]:
-    """Read the proven bounds closest to their incumbents, by the hash of the problem."""
-    found: dict[str, tuple[float, float]] = {}
-    for path in CERTIFICATES.glob("*.json"):
-        raw = json.loads(path.read_text(encoding="utf-8"))
-        proof, problem = raw["certificate"], raw["problem"][HASH]
-        gap = abs(proof["bound"] - proof["objective"])
-        found[problem] = min(found.get(problem, (gap, proof["bound"])), (gap, proof["bound"]))
-    return {problem: bound for problem, (_, bound) in found.items()}
+def load_certificates() -> Mapping[str, CertificateFile]:
+    """Read the shipped certificates by file name without suffix: an instance of GaitBench, or ``walk12-lambda-LAMBDA``."""
+    return {path.stem: read_certificate(path) for path in sorted(CERTIFICATES.glob("*.json"))}
+
+
+def find_certificate(problem: Mapping[str, Any]) -> CertificateFile | None:
+    """Return the shipped certificate of a problem with the smallest gap, see ``identify_problem``; None if there is none."""
+    found = [file for file in load_certificates().values() if file.problem[HASH] == problem.get(HASH)]
+    return min(found, key=lambda file: file.certificate.gap, default=None)
 
 
 def proven_bound(problem: Mapping[str, Any]) -> float | None:
     """Return the objective that no feasible point of a problem betters; None without a shipped certificate."""
-    return _load_bounds().get(str(problem.get(HASH, "")))
+    found = find_certificate(problem)
+    return None if found is None else found.certificate.bound
 
 
 def check_certificate(file: CertificateFile, *, paths: int = PATHS, seed: int = 0) -> Check:
@@ -104,7 +103,7 @@ def check_certificate(file: CertificateFile, *, paths: int = PATHS, seed: int = 
     path, weight, sizes, dropped = origin, np.ones(len(origin)), np.ones(paths), paths - len(origin)
     for depth in range(DEEPEST_PATH):
         if not len(path):
-            same = file.code_sha256 == hash_code(problem)
+            same = file.code_sha256 == hash_code(bounds)
             return Check(paths=paths, pieces=dropped, deepest=depth, boxes=float(sizes.mean()), same_code=same)
         sizes[path] += 2.0 * weight
         found = bounds.prune(halve(open_, cut), target)
@@ -152,13 +151,3 @@ def _load_problem(description: Mapping[str, Any]) -> GaitProblem:
             f"problem {problem.name!r} has changed since the certificate was made; rerun `nlp-gait certainty` on it"
         )
     return problem
-
-
-def hash_code(problem: GaitProblem) -> str:
-    """Return the hash of all code that decides what remains of a box, including that of the problem's least-power form."""
-    sources = [Path(inspect.getfile(module)) for module in CODE]
-    sources += [affine.NATIVE / name for name in (*affine.AFFINE_SOURCES, *quadratic.QUADRATIC_SOURCES)]
-    if has_power_form(problem):
-        assert problem.power_form is not None  # for the type checker
-        sources += sorted(Path(inspect.getfile(problem.power_form)).parent.glob("*.py"))
-    return hash_json([path.read_text(encoding="utf-8") for path in sources])

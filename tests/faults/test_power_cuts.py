@@ -175,7 +175,7 @@ ALLOWED = {
     "compare/drawing/figures.py",
     "compare/drawing/notebook_figure.py",  # into memory
     "compare/study/store.py",
-    "nlp_gait/proofs/branch_and_bound.py",
+    "nlp_gait/proofs/checkpoint.py",
     "nlp_gait/processes.py",  # /dev/null
 }
 WRITING = ("write_text", "write_bytes", "savefig", "savez", "savez_compressed", "replace", "rename", "mkdir", "touch")

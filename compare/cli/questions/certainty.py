@@ -22,7 +22,7 @@ def certainty(
     evaluations: Annotated[
         int, typer.Option(min=0, max=10**12, help="Budget of one long CMA-ES with restarts; 0 for none.")
     ] = 1_000_000,
-    tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 0.01,
+    tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 1e-6,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables and NAO's phases; 0 for none.")
     ] = 1800.0,

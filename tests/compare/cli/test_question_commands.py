@@ -87,7 +87,7 @@ def test_a_certificate_without_time_for_a_finite_bound_says_so(tmp_path: Path) -
 @pytest.mark.parametrize("wrong", ["0", "-1", "nan", "inf"])
 def test_certainty_refuses_a_tolerance_before_the_work(wrong: str, tmp_path: Path) -> None:
     error = one_sentence(*CERTAINTY, "--tolerance", wrong, "--out", tmp_path)
-    assert "tolerance must be positive and finite" in error and wrong in error
+    assert "tolerance must be between 0 and 1" in error and wrong in error
     assert not list(tmp_path.rglob("*.json"))
 
 
