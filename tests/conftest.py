@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
 from pathlib import Path
@@ -21,8 +22,9 @@ from tests.extras import skip_without_extra
 settings.register_profile("reproducible", derandomize=True, deadline=None)
 settings.load_profile("reproducible")
 
-# Else each worker and each process that a test starts compiles every module again.
+# Else each worker and each process that a test starts compiles every module again, and pytest rewrites every test again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # A shell ignores Ctrl-C for what it runs in the background, and so would all that the tests of it start.
 signal.signal(signal.SIGINT, signal.default_int_handler)

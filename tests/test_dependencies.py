@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -60,16 +61,27 @@ def modules(package: str) -> list[str]:
     return [".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in paths]
 
 
-def parse(module: str) -> ast.Module:
+@cache
+def read_nodes(path: Path) -> tuple[ast.Import | ast.ImportFrom | ast.Constant | ast.Call, ...]:
+    """What the tests look at in a file: imports, texts that name a module, and calls of ``import_module``."""
+    return tuple(
+        node
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        or (isinstance(node, ast.Constant) and isinstance(node.value, str) and PLACE.fullmatch(node.value))
+        or (isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module")
+    )
+
+
+def nodes_of(module: str) -> tuple[ast.Import | ast.ImportFrom | ast.Constant | ast.Call, ...]:
     path = ROOT.joinpath(*module.split("."))
-    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return read_nodes(path / "__init__.py" if path.is_dir() else path.with_suffix(".py"))
 
 
 def imports(module: str) -> Iterator[str]:
     """Dotted names that a module imports anywhere in its text, relative ones resolved."""
     is_package = ROOT.joinpath(*module.split(".")).is_dir()
-    for node in ast.walk(parse(module)):
+    for node in nodes_of(module):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -80,9 +92,7 @@ def imports(module: str) -> Iterator[str]:
 
 def named_modules(module: str) -> Iterator[str]:
     """What a module names in texts as ``"package.module"`` or ``"package.module:object"``."""
-    for node in ast.walk(parse(module)):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and PLACE.fullmatch(node.value):
-            yield node.value.replace(":", ".")
+    return (str(node.value).replace(":", ".") for node in nodes_of(module) if isinstance(node, ast.Constant))
 
 
 def within(name: str, *packages: str) -> bool:
@@ -125,11 +135,9 @@ def test_no_file_is_imported_by_its_own_name_as_a_text() -> None:
     calls = [
         f"{module}: import_module({node.args[0].value!r})"
         for module in ALL
-        for node in ast.walk(parse(module))
-        if isinstance(node, ast.Call)
-        and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module"
-        and isinstance(node.args[0], ast.Constant)
-        and within(node.args[0].value, *PACKAGES)
+        for node in nodes_of(module)
+        if isinstance(node, ast.Call) and isinstance(node.args[0], ast.Constant)
+        if within(str(node.args[0].value), *PACKAGES)
     ]
     assert not calls
 

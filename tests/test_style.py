@@ -53,6 +53,8 @@ def find_words(text: str) -> list[str]:
 
 def find_participles(text: str) -> list[str]:
     """Functions and methods named by a bare participle; properties may be nouns or adjectives."""
+    if not re.search(rf"def\s+{PARTICIPLE.pattern}\s*[(\[]", text):  # parsing is slow
+        return []
     functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
     return [
         f"{node.lineno}: {node.name}"

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
@@ -32,6 +31,8 @@ def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
     Raises:
         InputError: the problem has no time histories, or the period is not a whole number of milliseconds >= 1.
     """
+    from scipy.interpolate import CubicSpline  # takes as long to import as all the rest of a command
+
     if isinstance(period_ms, bool) or not isinstance(period_ms, int) or period_ms < 1:
         raise InputError(f"the period must be a whole number of milliseconds >= 1, got {period_ms!r}")
     signals = sample_finely(result)
