@@ -18,6 +18,8 @@ from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import make_skeleton
 from nlp_gait.robots import Robot
+from nlp_gait.robots.tree import tree_from
+from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
 
@@ -80,6 +82,8 @@ class Body(ABC):
     length_scale: float = 1.0  # lengths relative to NAO's
     time_scale: float = 1.0  # times and velocities relative to NAO's
     torque_scale: float = 1.0  # torques relative to NAO's
+    # Joints of arms that the legs do not carry: each arm is a chain of its own on a torso at rest
+    separate_joints: tuple[str, ...] = ()
 
     @property
     def robot(self) -> Robot:
@@ -90,6 +94,27 @@ class Body(ABC):
     def weight(self) -> float:
         """Of the whole robot [N]."""
         return self.robot.mass_kg * self.gravity
+
+    def compute_torques(
+        self,
+        fixed_link: str,
+        joints: Sequence[str],
+        motions: Mapping[str, Motion],
+        shares: Mapping[str, SX] | None = None,
+    ) -> tuple[dict[str, SX], Wrench]:
+        """Return the torques of the joints above a fixed link, and the wrench on it; see ``newton_euler``."""
+
+        def solve(link: str, names: Sequence[str]) -> tuple[dict[str, SX], Wrench]:
+            tree = tree_from(self.robot, link, names)
+            return newton_euler(tree, q, qd, qdd, self.gravity, shares, self.upright)
+
+        q, qd, qdd = ({name: motion[order] for name, motion in motions.items()} for order in range(3))
+        torques, wrench = solve(fixed_link, joints)
+        arms = [name for name in joints if name in self.separate_joints]
+        if arms:
+            legs = [name for name in joints if name not in arms]
+            torques = solve(self.robot.root, arms)[0] | solve(fixed_link, legs)[0]
+        return torques, wrench
 
     def ankle(self, side: str) -> tuple[float, float]:
         """Return the place of an ankle above its foot ``"L"`` or ``"R"``: across the walking direction, and its height [m]."""

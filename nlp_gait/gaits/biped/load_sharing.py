@@ -194,17 +194,16 @@ def make_planned_loads(body: Body) -> Loader:
 
 def make_divided_loads(body: Body, rule: Division) -> Loader:
     """Return a function of the torques of each half from its own foot, and the combined ZMP of both feet."""
-    robot, gravity, weight = body.robot, body.gravity, body.weight
-    trees = {side: tree_from(robot, robot.feet[foot].link, body.leg_joints[side]) for side, foot in BOTH_FEET.items()}
+    robot, weight = body.robot, body.weight
 
     def loads(now: Instant) -> Instant:
-        q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
         shares = torso_shares(now.hip[1], rule, body.feet_y)
         torques: dict[str, SX] = {}
         zmps, ground_loads, wrenches = [], [], {}
-        for side, tree in trees.items():
-            own, wrench = newton_euler(tree, q, qd, qdd, gravity, {robot.root: shares[side]}, body.upright)
-            height = robot.feet[BOTH_FEET[side]].ankle_height_m
+        for side, name in BOTH_FEET.items():
+            foot = robot.feet[name]
+            own, wrench = body.compute_torques(foot.link, body.leg_joints[side], now.joints, {robot.root: shares[side]})
+            height = foot.ankle_height_m
             offset = zmp_of_wrench(wrench, height, weight)
             wrenches[side] = shift_down(wrench, height)
             torques |= own

@@ -16,9 +16,7 @@ from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.samples import Instant, Loader
 from nlp_gait.robots import Foot
-from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
-from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, parabola_lift, stack
 
@@ -134,12 +132,10 @@ def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, 
 
 def make_single_support_loads(body: Body) -> Loader:
     """Return a function of the torques from the left foot, which supports the robot, and of the ZMP under it."""
-    robot, foot = body.robot, body.robot.feet["left"]
-    tree = tree_from(robot, foot.link)
+    foot = body.robot.feet["left"]
 
     def loads(now: Instant) -> Instant:
-        q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
-        torques, wrench = newton_euler(tree, q, qd, qdd, body.gravity, upright=body.upright)
+        torques, wrench = body.compute_torques(foot.link, tuple(body.robot.joints), now.joints)
         offset = zmp_of_wrench(wrench, foot.ankle_height_m, body.weight)
         wrenches = {"L": shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
         return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)

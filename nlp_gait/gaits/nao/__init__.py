@@ -16,5 +16,7 @@ Options that the problems share:
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
                            cubics, 4 with splines and with planned loads, which would otherwise bend between the samples
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
+    arms                   carried by the legs, or separate: in the torques the legs carry a torso without arms, and each arm
+                           moves on a torso at rest; the ZMP is that of all links
     motors                 features of the real motors, separated by commas, see ``gaits.biped.motors``; none by default
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from casadi import DM, MX, SX, cos, fmax, vertcat, vertsplit
@@ -16,6 +17,7 @@ from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndInde
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao.joints import (
+    ARM_JOINTS,
     HELD_ARM_ANGLES,
     JOINTS,
     KNEES,
@@ -31,6 +33,8 @@ from nlp_gait.robots.tree import partner, point_masses, weld
 from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
+
+Arms = Literal["carried", "separate"]
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 
@@ -243,10 +247,11 @@ class NaoBody(Body):
         return make_skeleton(self.full)
 
 
-def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -> NaoBody:
+def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", arms: Arms = "carried") -> NaoBody:
     """Return NAO, or a robot of its build by name or file, as its gaits take it.
 
-    Without rotational inertia every link is a point mass; for the motors see ``gaits.biped.motors``.
+    Arms are carried by the legs, or ``"separate"``: legs and torso are a chain without them, as the paper describes it. Without
+    rotational inertia every link is a point mass; for the motors see ``gaits.biped.motors``.
 
     Raises:
         InputError: the robot or its motors do not suit the NAO problems.
@@ -270,6 +275,7 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "") -
         gravity=GRAVITY,
         feet_y=(left.hip_m[1], right.hip_m[1]),
         leg_length_m=leg_length,
+        separate_joints=tuple(side + joint for side in "LR" for joint in ARM_JOINTS) if arms == "separate" else (),
         hip_height_m=(
             round(ground + LEAST_HEIGHT_SHARE * leg_length, 3),
             round(ground + GREATEST_HEIGHT_SHARE * leg_length, 3),

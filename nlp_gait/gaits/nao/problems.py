@@ -24,7 +24,7 @@ from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_loa
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.single_support import place_stance, plan_single_support
-from nlp_gait.gaits.nao.body import ARM_SWING, make_nao
+from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
 from nlp_gait.gaits.nao.joints import check_step_length
 from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
@@ -44,6 +44,7 @@ def nao_ssp(
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
+    arms: Arms = "carried",
 ) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length.
 
@@ -51,9 +52,10 @@ def nao_ssp(
         Gupta, Pratihar, Deb (2023), sections 3.1 and 4.1.
     """
     check_step_length(step_length_m)
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
     power_form = None
-    if (derivatives, trajectory, objective, motors) == FORM_OPTIONS and samples_per_interval < 2:
+    paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and arms == "carried"
+    if paper and samples_per_interval < 2:
         stance = place_stance(body, step_length_m)
         power_form = power_form_maker(
             body.robot, partial(single_support_instants, body.robot, *stance, ARM_SWING["ssp"])
@@ -76,6 +78,7 @@ def nao_dsp(
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
+    arms: Arms = "carried",
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
     """Double support of NAO.
@@ -87,10 +90,14 @@ def nao_dsp(
         Gupta, Pratihar, Deb (2023), sections 3.2 and 4.2.
     """
     check_step_length(step_length_m)
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
+    if torso_share == "free" and arms != "carried":
+        raise InputError(
+            f"arms={arms!r} does not go with torso_share='free', where the legs carry all; choose arms='carried'"
+        )
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
     power_form = None
-    paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and samples_per_interval < 2
-    if paper and torso_share != "free":
+    paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and arms == "carried"
+    if paper and samples_per_interval < 2 and torso_share != "free":
         soles = place_soles(body, step_length_m)
         places = (soles, hip_ends(body, soles), ARM_SWING["dsp"])
         power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))

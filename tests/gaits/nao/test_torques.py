@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from importlib import resources
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
@@ -139,3 +144,30 @@ def test_power_of_the_signals_is_the_objective(name: str) -> None:
         power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
         cost = evaluated(problem, x).cost
         assert cost == pytest.approx(power, rel=1e-12)  # the same sums in another order
+
+
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
+def test_separate_arms_load_no_leg_and_move_on_a_torso_at_rest(name: str, tmp_path: Path) -> None:
+    """The legs' torques are those of a robot with arms of a milligram; the arms' are those of arms that a still torso carries."""
+    data = json.loads((resources.files("nlp_gait.robots") / "data" / "nao-v5.json").read_text(encoding="utf-8"))
+    arm = ("Shoulder", "Bicep", "Elbow", "ForeArm")
+    for link in ("l_wrist", "r_wrist", *(side + part for side in "LR" for part in arm)):
+        data["links"][link] |= {"mass_kg": 1e-6, "inertia_com_kgm2": [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]}
+    light = tmp_path / "light-arms.json"
+    light.write_text(json.dumps(data))
+    x, robot = np.array(FEASIBLE[name]), load_robot("nao-v5")
+    separate, armless = (load(name, **options).signals(x) for options in ({"arms": "separate"}, {"robot": str(light)}))
+    legs = [k for k, joint in enumerate(separate.joints) if "Hip" in joint or "Knee" in joint or "Ankle" in joint]
+    tau = separate.arrays["tau"]
+    np.testing.assert_allclose(tau[:, legs], armless.arrays["tau"][:, legs], atol=1e-5)
+    np.testing.assert_allclose(separate.arrays["zmp"], load(name).signals(x).arrays["zmp"], atol=TORQUE_TOLERANCE_NM)
+    oracle = stand(floating_model(robot), "torso", np.zeros(3), *at(separate, 3), GRAVITY)
+    arms = [k for k in range(len(separate.joints)) if k not in legs]
+    np.testing.assert_allclose(
+        tau[3, arms], [oracle.torques[separate.joints[k]] for k in arms], atol=TORQUE_TOLERANCE_NM
+    )
+
+
+def test_separate_arms_do_not_go_with_a_planned_load() -> None:
+    with pytest.raises(InputError, match="arms='separate' does not go with torso_share='free'"):
+        load("nao-dsp", arms="separate", torso_share="free")
