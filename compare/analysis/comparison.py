@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import median
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from compare.analysis.statistics.run_length import (
 )
 from compare.study.definition import describe_edition, select_shared
 from compare.study.record import RunRecord
+from compare.study.references import BETTER, Reference, find_reference
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
@@ -78,7 +78,9 @@ class Comparison:
 
     problem: str
     objective: Objective
-    reference: float  #: best known objective, from which gaps are measured; NaN if nothing feasible was found
+    #: Best known objective, from which gaps are measured: the shipped one, else the best of these runs; NaN without either
+    reference: float
+    known: Reference  #: the shipped value with its proven bound, and the source of ``reference`` in words
     weighting: Weighting
     solvers: tuple[SolverRuns, ...]
 
@@ -88,42 +90,46 @@ class Comparison:
         return [record for solver in self.solvers for record in solver.records]
 
     @cached_property
-    def reference_holder(self) -> RunRecord | None:
-        """Run that found the best known objective."""
+    def best(self) -> RunRecord | None:
+        """Best feasible run of all solvers; None without one."""
         feasible = [record for record in self.records if record.verdict.feasible]
         return min(feasible, key=lambda r: self.objective.sign * r.verdict.objective, default=None)
+
+    @property
+    def better(self) -> RunRecord | None:
+        """Best run if it is better than the shipped best known value; else None."""
+        best = self.best
+        return best if best is not None and self.known.is_beaten_by(best.verdict.objective, self.objective) else None
 
     def value(self, cost: float) -> float:
         """Return a cost as an objective in the problem's sense."""
         return self.objective.sign * cost
 
     def gap(self, cost: float) -> float:
-        """Return the relative distance of a cost from the best known objective."""
-        return relative_gap(self.value(cost), self.reference, self.objective)
+        """Return the relative distance of a cost from the best known objective; 0 if better within the feasibility tolerance."""
+        gap = relative_gap(self.value(cost), self.reference, self.objective)
+        return 0.0 if -BETTER <= gap < 0.0 else gap
 
 
 def compare_problems(
     records: Sequence[RunRecord],
     weighting: Weighting = DEFAULT_WEIGHTING,
-    references: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Comparison]:
     """Return one comparison per problem among records, in their order; InputError if runs disagree on a problem's objective.
 
-    ``references`` are the objectives from which gaps are measured, by problem; by default the best of its records.
+    Gaps are measured from the shipped best known value of exactly this problem, else from the best of the records.
     """
     problems = dict.fromkeys(record.problem for record in records)
-    return [
-        _comparison(name, [r for r in records if r.problem == name], weighting, references.get(name))
-        for name in problems
-    ]
+    return [_comparison(name, [r for r in records if r.problem == name], weighting) for name in problems]
 
 
-def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting, known: float | None) -> Comparison:
+def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting) -> Comparison:
     objective = read_objective(records[0])
     for record in records:
         if read_objective(record) != objective:
             raise InputError(f"records of {problem!r} disagree on the objective: {record.solver}, run {record.run}")
-    reference = find_best_known(records, objective) if known is None else known
+    known = find_reference(records[0].definition["problem"])
+    reference = find_best_known(records, objective) if known.objective is None else known.objective
     solvers = []
     for name in dict.fromkeys(record.solver for record in records):
         runs = tuple(sorted((r for r in records if r.solver == name), key=lambda r: r.run))
@@ -137,7 +143,12 @@ def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting
         )
     solvers.sort(key=lambda s: (s.median_cost, min(s.costs), s.name))
     return Comparison(
-        problem=problem, objective=objective, reference=reference, weighting=weighting, solvers=tuple(solvers)
+        problem=problem,
+        objective=objective,
+        reference=reference,
+        known=known,
+        weighting=weighting,
+        solvers=tuple(solvers),
     )
 
 

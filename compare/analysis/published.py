@@ -28,7 +28,7 @@ def make_published_rows(comparison: Comparison) -> tuple[tuple[str, ...], list[t
 
     Only problems with default parameters are compared.
     """
-    record = comparison.reference_holder
+    record = comparison.best
     if record is None:
         return None
     problem = str(record.definition.get("problem", {}).get("name"))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.solver_table import count, percent
 from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
+from compare.analysis.statistics.run_length import relative_gap
 from compare.analysis.units import join_words, with_unit
 from compare.study.record import RunRecord
+from compare.study.references import OWN, Reference
 from compare.study.task import FUNCTION
-from nlp_gait.proofs.certificate import proven_bound
+from nlp_gait.formulation import Objective
 
 # A run with at most this gap has found the best known value.
 FOUND = 1e-6
@@ -87,12 +88,21 @@ def write_verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
     )
 
 
+def describe_best_known(comparison: Comparison) -> str:
+    """Return the best known value, its source, and what is proven, for a line on a terminal."""
+    if not math.isfinite(comparison.reference):
+        return "no feasible point was found"
+    best = f"best known {with_unit(comparison.reference, comparison.objective.unit)} ({comparison.known.source})"
+    return "; ".join(filter(None, (best, describe_proof(comparison), describe_better(comparison))))
+
+
 def _describe_best_known(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
-    best, words = with_unit(comparison.reference, comparison.objective.unit), describe_proof(comparison)
-    text = f"on {comparison.problem} {comparison.objective.name} {best}, reached to 1e-6 by {join_words(finders) or 'one run'}"
-    return text + (f", and {words}" if words else "")
+    best = with_unit(comparison.reference, comparison.objective.unit)
+    reached = f"reached to 1e-6 by {join_words(finders)}" if finders else "not reached to 1e-6"
+    text = f"on {comparison.problem} {comparison.objective.name} {best} ({comparison.known.source}), {reached}"
+    return ", and ".join(filter(None, (text, describe_proof(comparison), describe_better(comparison))))
 
 
 def _distance(comparison: Comparison) -> str:
@@ -121,16 +131,34 @@ def _cost(comparison: Comparison) -> str:
 
 def describe_proof(comparison: Comparison) -> str:
     """Describe the proven bound of a comparison's problem, see ``describe_bound``."""
-    holder = comparison.reference_holder
-    if holder is None:
-        return ""
-    return describe_bound(holder.definition["problem"], comparison.reference, comparison.objective.unit)
+    bound = comparison.known.bound
+    return "" if bound is None else describe_bound(bound, comparison.reference, comparison.objective.unit)
 
 
-def describe_bound(problem: Mapping[str, Any], best: float, unit: str) -> str:
-    """Describe the shipped bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``; empty without one."""
-    bound = proven_bound(problem)
-    if bound is None:
+def describe_better(comparison: Comparison) -> str:
+    """Say that a run is better than the shipped best known value; empty if none is."""
+    run = comparison.better
+    if run is None:
         return ""
+    value, gap = run.verdict.objective, relative_gap(run.verdict.objective, comparison.reference, comparison.objective)
+    found = f"{with_unit(value, comparison.objective.unit)} by {run.solver}, run {run.run}"
+    return f"a new best known value was found: {found}, {-100 * gap:.2g} % better than the shipped one"
+
+
+def describe_value(known: Reference, value: float, objective: Objective) -> str:
+    """Compare a feasible objective with the shipped best known value in one sentence; without one, say so."""
+    if known.objective is None:
+        return f"Best known value: {known.source.removeprefix(OWN)[2:]}"
+    best = f"{with_unit(known.objective, objective.unit)} ({known.source})"
+    if known.is_beaten_by(value, objective):
+        gap = -relative_gap(value, known.objective, objective)
+        return (
+            f"A new best known value: {100 * gap:.2g} % better than the best known {best}; please contribute the point"
+        )
+    return f"Best known value: {best}; this point is {percent(max(relative_gap(value, known.objective, objective), 0.0))} from it"
+
+
+def describe_bound(bound: float, best: float, unit: str) -> str:
+    """Describe a proven bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``."""
     gap = 100 * abs(bound - best) / abs(best)
     return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,6 @@ from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_ra
 from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import load_baseline
 from compare.study.record import RunRecord
-from nlp_gait import gaitbench
 
 ALPHA = 0.05
 # Relative gap below which two results are equal; also COCO's precision.
@@ -93,14 +92,8 @@ class Leaderboard:
 def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = ()) -> Leaderboard:
     """Rank the solvers of the baseline and of further records; raises InputError for an instance without baseline."""
     everything = [record for id in instances for record in (*load_baseline(id), *records) if record.problem == id]
-    comparisons = tuple(compare_problems(everything, references=load_references(instances)))
+    comparisons = tuple(compare_problems(everything))
     return Leaderboard(comparisons=comparisons, standings=tuple(_standings(comparisons)))
-
-
-def load_references(instances: Sequence[str]) -> Mapping[str, float]:
-    """Return the best known objective of each instance, in its problem's sense."""
-    loaded = {id: gaitbench.load(id) for id in instances}
-    return {id: instance.gait_problem.objective.sign * instance.best_known for id, instance in loaded.items()}
 
 
 def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:

@@ -175,7 +175,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Print the table of solvers for each problem, titled by the problem unless a title is given."""
     from compare.analysis.comparison import compare_problems
     from compare.analysis.solver_table import HEADER, find_failures, format_cells, summarise
-    from compare.analysis.verdict import describe_proof
+    from compare.analysis.verdict import describe_best_known
 
     for comparison in compare_problems(records):
         rows = [format_cells(summary, comparison) for summary in summarise(comparison)]
@@ -189,8 +189,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
-        if words := describe_proof(comparison):
-            stdout.print(f"{comparison.problem}: {words}", soft_wrap=True)
+        stdout.print(f"{comparison.problem}: {describe_best_known(comparison)}", soft_wrap=True)
     stdout.print(HOW_TO_READ)
 
 

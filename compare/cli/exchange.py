@@ -74,14 +74,11 @@ def logs(
     Example: `nlp-gait logs results --to logs --format ioh`
     """
     from compare.analysis.comparison import compare_problems
-    from compare.bench.leaderboard import load_references
     from compare.logs import write_coco, write_ioh
     from compare.study.record_files import read_records
-    from nlp_gait import gaitbench
 
     records = read_records(folder)
-    instances = [id for id in gaitbench.names() if any(record.problem == id for record in records)]
-    comparisons = compare_problems(records, references=load_references(instances))
+    comparisons = compare_problems(records)
     written = (write_ioh if form == "ioh" else write_coco)(comparisons, to)
     data = {"problems": [comparison.problem for comparison in comparisons], "runs": len(records)}
     print_result(

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from compare.analysis.units import with_unit
-from compare.analysis.verdict import describe_bound
+from compare.analysis.verdict import describe_value
 from compare.cli.command import command
 from compare.cli.common import (
     end_interrupted,
@@ -26,7 +26,6 @@ from compare.cli.common import (
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, parse_x
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.solution import Solution
-from nlp_gait.proofs.certificate import proven_bound
 
 
 @command
@@ -55,6 +54,7 @@ def solve(
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
     import nlp_gait
+    from compare.study.references import find_reference
     from nlp_gait.backends.solvers import registry
     from nlp_gait.files import replace_nan, write_json
     from nlp_gait.proofs.guarantee import guarantee
@@ -77,11 +77,13 @@ def solve(
             )
         )
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
-    definition = identify_problem(loaded)
+    known = find_reference(identify_problem(loaded))
     data = {
         **solution.to_json(),
         "guaranteed": None if proven is None else asdict(proven),
-        "proven_bound": proven_bound(definition),
+        "proven_bound": known.bound,
+        "best_known": known.objective,
+        "best_known_source": known.source,
     }
     try:  # write before printing: a broken pipe must not lose the file
         if target is not None:
@@ -93,8 +95,8 @@ def solve(
             _print(solution)
             if proven is not None:
                 stdout.print(f"Guaranteed: {proven}", soft_wrap=True)
-                if words := describe_bound(definition, solution.objective, solution.objective_unit):
-                    stdout.print(f"Optimum: {words}", soft_wrap=True)
+            if solution.feasible:
+                stdout.print(describe_value(known, solution.objective, loaded.objective), soft_wrap=True)
             if target is not None and target.exists():
                 print_written(target)
     if stopped:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from compare.analysis.better import write_better_points
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.statistics.run_length import Weighting
@@ -38,6 +39,7 @@ def write_report(
     """Write the report with stored simulations, the figures as PNG and SVG, and optionally CSV files; return all paths."""
     simulated = load_simulations(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, simulated))
+    written += write_better_points(folder, compare_problems(records))
     if as_csv:
         written += _write_csv_files(folder, records)
     return written

@@ -1,25 +1,88 @@
-"""Reports mention a certificate with its problem, and with no other."""
+"""Gaps are measured from the shipped best known value of exactly this problem, with its bound and its source in words."""
 
 from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 import nlp_gait
-from compare.analysis.verdict import describe_bound
+from compare.analysis import comparison as comparisons
+from compare.analysis.better import write_better_points
+from compare.analysis.comparison import Comparison, compare_problems
+from compare.analysis.verdict import describe_best_known, describe_better, describe_value, write_verdict
+from compare.study.record import RunRecord
+from compare.study.references import Reference, find_reference
+from compare.study.run_study import Study, run_study
+from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import identify_problem
-from nlp_gait.proofs.certificate import proven_bound
+from nlp_gait.formulation.result import load_result
 
 
-def test_the_closest_of_several_proofs_is_used() -> None:
-    walk = identify_problem(nlp_gait.load("walk12").with_values(**{"lambda": 1.0}))  # proven to 1 % and to 0.1 %
-    assert proven_bound(walk) == pytest.approx(1.063938 * 1.001, rel=1e-5)
-    phase = identify_problem(nlp_gait.load("nao-ssp"))
-    assert proven_bound(phase) == pytest.approx(0.845869 * 0.99, rel=1e-5)
-    assert describe_bound(phase, 0.854, "W") == "no feasible point is better than 0.837410 W, 1.9 % from it (proven)"
+@pytest.fixture(scope="module")
+def runs() -> list[RunRecord]:
+    """Two short runs of a search without IPOPT."""
+    spec = ProblemSpec(name="walk12", values={"lambda": 0.4})
+    tasks = [Task(problem=spec, solver="pso", stop=Stop(evaluations=300), run=run) for run in range(2)]
+    return run_study(Study(tasks=tuple(tasks)))
 
 
-@pytest.mark.parametrize("change", [{"reach_margin": 0.02}, {"hip_height_m.upper": 0.3}])
-def test_nothing_is_proven_of_another_problem(change: dict[str, float]) -> None:
-    problem = nlp_gait.load("nao-ssp")
-    assert proven_bound(identify_problem(problem.with_values(**change))) is None
-    assert describe_bound(identify_problem(problem.with_values(**change)), 1.0, "W") == ""
+def compare_with(known: Reference, runs: list[RunRecord], monkeypatch: pytest.MonkeyPatch) -> Comparison:
+    monkeypatch.setattr(comparisons, "find_reference", lambda problem: known)
+    return compare_problems(runs)[0]
+
+
+def test_a_study_without_ipopt_is_measured_from_the_shipped_value(runs: list[RunRecord]) -> None:
+    (comparison,) = compare_problems(runs)
+    assert comparison.reference == pytest.approx(0.9222361276)
+    assert comparison.best is not None
+    own = comparison.best.verdict.objective
+    assert comparison.gap(-own) == pytest.approx((comparison.reference - own) / comparison.reference)
+    assert "shipped, proven to" in write_verdict([comparison])[0]
+    assert "no feasible point is better than" in describe_best_known(comparison)
+    assert describe_better(comparison) == ""
+
+
+def test_a_better_run_is_said_to_be_better_and_offered(
+    runs: list[RunRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    comparison = compare_with(Reference(objective=0.5, source="shipped, best of 2 starts"), runs, monkeypatch)
+    assert "a new best known value was found" in describe_better(comparison)
+    assert comparison.gap(comparison.solvers[0].costs[0]) < 0.0
+    (path,) = write_better_points(tmp_path, [comparison])
+    written = load_result(path)
+    assert comparison.best is not None and written.problem.by_name(written.x) == comparison.best.x
+    assert json.loads(path.read_text())["best_known_before"]["objective"] == 0.5
+
+
+def test_a_record_that_only_claims_to_be_better_is_not_offered(
+    runs: list[RunRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forged = [replace(r, verdict=replace(r.verdict, objective=0.99)) for r in runs]
+    comparison = compare_with(Reference(objective=0.95), forged, monkeypatch)
+    assert comparison.better is not None and write_better_points(tmp_path, [comparison]) == []
+
+
+def test_less_than_the_tolerance_is_no_gain(runs: list[RunRecord], monkeypatch: pytest.MonkeyPatch) -> None:
+    best = max(r.verdict.objective for r in runs)
+    comparison = compare_with(Reference(objective=best * (1 - 5e-7)), runs, monkeypatch)
+    assert comparison.better is None and comparison.gap(-best) == 0.0
+
+
+def test_without_a_shipped_value_the_best_of_the_study_is_the_reference(
+    runs: list[RunRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    comparison = compare_with(Reference(), runs, monkeypatch)
+    assert comparison.reference == max(r.verdict.objective for r in runs)
+    assert "the best of this study" in describe_best_known(comparison)
+
+
+def test_a_single_value_is_compared_with_the_shipped_one() -> None:
+    phase = nlp_gait.load("nao-ssp")
+    known, objective = find_reference(identify_problem(phase)), phase.objective
+    assert describe_value(known, 0.8543274, objective).endswith("this point is 1.0000 % from it")
+    assert "contribute" in describe_value(known, 0.84, objective)
+    other = find_reference(identify_problem(phase.with_values(reach_margin=0.02)))
+    assert describe_value(other, 0.84, objective) == "Best known value: none is shipped for these settings"

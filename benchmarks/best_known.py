@@ -1,0 +1,108 @@
+"""Collect the best known value of every problem and instance: ``python -m benchmarks.best_known``.
+
+Sources are the facts of GaitBench, the certificates, ``docs/difficulty.json`` and the files ``better-*.json`` given as arguments.
+Every point is evaluated again; of equal problems the best point is kept. The result is ``compare/study/best_known.json``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import compare.study
+from benchmarks.difficulty import difficulties
+from nlp_gait import gaitbench
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.files import read_json, write_json
+from nlp_gait.formulation import GaitProblem, load
+from nlp_gait.formulation.result import load_result
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.proofs.certificate import CERTIFICATES, proven_bound, read_certificate
+
+FILE = Path(str(compare.study.__file__)).with_name("best_known.json")
+# A point with a violation below the tolerance may be better than the optimum by about this, relatively.
+ALIKE = 1e-6
+
+
+class Found(NamedTuple):
+    """A point and who found it."""
+
+    problem: GaitProblem
+    x: Sequence[float]
+    found_by: str
+    proven_as: str = ""
+
+
+def from_gaitbench() -> Iterator[Found]:
+    """Yield the instances; their points have no violation at all, so they come first."""
+    for id in gaitbench.names():
+        instance = gaitbench.load(id)
+        evidence, definition = instance.evidence, instance.definition
+        runs = evidence.cma_runs
+        found_by = f"{evidence.starts} start{'s' * (evidence.starts > 1)} of IPOPT"
+        fixed = load(definition.problem, **definition.options).with_values(**definition.values).fix(**definition.held)
+        proven_as = identify_problem(fixed)[HASH] if definition.held else ""
+        yield Found(
+            instance.gait_problem,
+            instance.best_x.tolist(),
+            found_by + f" and {runs} long runs of CMA-ES" * (runs > 0),
+            proven_as if proven_bound({HASH: proven_as}) is not None else "",
+        )
+
+
+def from_certificates() -> Iterator[Found]:
+    """Yield the problems of the certificates."""
+    for path in sorted(CERTIFICATES.glob("*.json")):
+        file = read_certificate(path)
+        stored = file.problem
+        problem = load(stored["name"], **stored["options"]).with_values(**stored["parameters"])
+        yield Found(problem, file.certificate.x, "the starts of its certificate")
+
+
+def from_difficulty() -> Iterator[Found]:
+    """Yield the problems with their defaults."""
+    for name, found in difficulties().items():
+        runs = [f"{solver.runs} runs of {title}" for title, solver in found.solvers.items()]
+        yield Found(load(name), list(found.best.x.values()), ", ".join(runs))
+
+
+def from_files() -> Iterator[Found]:
+    """Yield the contributed points, see ``compare.analysis.better``."""
+    for path in sys.argv[1:]:
+        result, found_by = load_result(Path(path)), read_json(Path(path), "result")["found_by"]
+        yield Found(result.problem, result.x.tolist(), f"{found_by['solver']}, seed {found_by['seed']}")
+
+
+def main() -> None:
+    """Write the file."""
+    best: dict[str, tuple[float, dict[str, Any]]] = {}
+    described: dict[str, dict[str, Any]] = {}
+    for problem, x, found_by, proven_as in (*from_gaitbench(), *from_certificates(), *from_difficulty(), *from_files()):
+        if len(x) != len(problem.names):
+            print(f"{problem.address}: the point has {len(x)} values instead of {len(problem.names)}")
+            continue
+        values = build_exact_model(problem).at(np.array(x), problem.p)
+        if not values.violation <= FEASIBILITY_TOLERANCE:
+            print(f"{problem.address}: the point found by {found_by} is infeasible by {values.violation:.3g}")
+            continue
+        description = identify_problem(problem)
+        objective = problem.objective.sign * values.cost
+        key, before = description[HASH], best.get(description[HASH])
+        described[json.dumps(description, sort_keys=True)] = description
+        if before is None or values.cost < before[0] - ALIKE * abs(before[0]):
+            best[key] = (
+                values.cost,
+                {"objective": objective, "x": list(x), "found_by": found_by, "proven_as": proven_as},
+            )
+            print(f"{problem.address} {dict(problem.values)}: {objective:.9g}, was {before}")
+    write_json(FILE, [{"problem": known, **best[known[HASH]][1]} for known in described.values()])
+
+
+if __name__ == "__main__":
+    main()

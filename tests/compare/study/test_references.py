@@ -1,0 +1,66 @@
+"""Shipped best known values: each is found by its problem, follows from its point, and has the bound of its certificate."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import nlp_gait
+from compare.study import references
+from compare.study.references import Reference, find_reference, load_shipped
+from nlp_gait import gaitbench
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.gaitbench.facts import load_facts
+from nlp_gait.proofs.certificate import CERTIFICATES
+
+
+def of_instance(id: str) -> Reference:
+    return find_reference(identify_problem(gaitbench.load(id).gait_problem))
+
+
+def test_every_certificate_belongs_to_a_shipped_value() -> None:
+    known = {entry.proven_as or entry.problem.sha256 for entry in load_shipped()}
+    for path in CERTIFICATES.glob("*.json"):
+        assert json.loads(path.read_text())["problem"][HASH] in known, path.name
+
+
+@pytest.mark.parametrize("id", ["ssp-v5-time10", "ssp-v5-lift24", "ssp-v5-time20", "dsp-v5", "walk12-w015"])
+def test_an_instance_has_its_proof_also_where_it_holds_variables_constant(id: str) -> None:
+    known = of_instance(id)
+    assert known.objective is not None and known.bound is not None and known.source.startswith("shipped, proven to ")
+    assert abs(known.bound - known.objective) / known.objective < 0.0101
+    instance = gaitbench.load(id)
+    values = build_exact_model(instance.gait_problem).at(known.x, instance.gait_problem.p)
+    assert abs(values.cost) == pytest.approx(known.objective, rel=1e-9)
+    assert values.violation <= FEASIBILITY_TOLERANCE
+
+
+def test_the_suite_and_the_shipped_values_agree() -> None:
+    by_instance = {str(s.problem.options["instance"]): s for s in load_shipped() if "instance" in s.problem.options}
+    for id, facts in load_facts().items():
+        assert abs(by_instance[id].objective) == pytest.approx(abs(facts.best_known), rel=2e-6), id
+
+
+def test_other_settings_have_no_reference() -> None:
+    phase = nlp_gait.load("nao-ssp")
+    for change in ({"reach_margin": 0.02}, {"hip_height_m.upper": 0.3}):
+        known = find_reference(identify_problem(phase.with_values(**change)))
+        assert known == Reference(source="the best of this study; none is shipped for these settings")
+    assert "for this problem" in find_reference({"name": "mine", HASH: "0"}).source
+
+
+def test_a_problem_with_another_hash_must_have_the_shipped_value_at_the_shipped_point(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    described = {**identify_problem(nlp_gait.load("walk12")), HASH: "of another version of CasADi"}
+    known = find_reference(described)
+    assert known.objective == pytest.approx(0.97083854787)
+    changed = tuple(replace(entry, objective=entry.objective * (1 + 1e-8)) for entry in load_shipped())
+    monkeypatch.setattr(references, "load_shipped", lambda: changed)
+    references._find_by_settings.cache_clear()
+    assert find_reference(described).objective is None
+    references._find_by_settings.cache_clear()
