@@ -31,6 +31,11 @@ class Contact(NamedTuple):
     height: SX  #: above the ground [m]
     normal: SX  #: (n,) derivative of the height by the coordinates
     tangent: SX  #: (n,) derivative of the forward position by the coordinates
+    drift: SX = SX(2, 1)  #: (2,) velocity at rest, of a base that moves: up from the ground, and forward [m/s]
+
+    def velocity(self, rates: SX) -> tuple[SX, SX]:
+        """Return the speeds up from the ground and forward, at rates (n,) of the coordinates."""
+        return ca.dot(self.normal, rates) + self.drift[0], ca.dot(self.tangent, rates) + self.drift[1]
 
 
 class Equations(NamedTuple):
@@ -56,8 +61,7 @@ def implicit_equations(
     mass, force = motion
     k, c, mu = ground
     stiff = k * quantum**2 / 2 + c * quantum  # force that one unit of normal acceleration takes away
-    rates = [ca.dot(contact.normal, velocity) for contact in contacts]
-    slips = [ca.dot(contact.tangent, velocity) for contact in contacts]
+    rates, slips = ([contact.velocity(velocity)[i] for contact in contacts] for i in range(2))
     ahead = [contact.height + quantum * rate for contact, rate in zip(contacts, rates, strict=True)]
     depths = [YIELD_DEPTH * ca.tanh(-height / YIELD_DEPTH) for height in ahead]
     free = [k * depth - c * rate for depth, rate in zip(depths, rates, strict=True)]  # (eq. 33)

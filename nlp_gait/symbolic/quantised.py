@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
-from casadi import SX
+from casadi import DM, SX
 
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, implicit_equations
 from nlp_gait.symbolic.lagrange import EquationsOfMotion
@@ -22,6 +22,7 @@ class Controller(NamedTuple):
     proportional: SX  #: (n,) K_p [N m/rad]
     derivative: SX  #: (n,) K_d [N m s/rad]
     gravity_share: SX  #: compensated share of gravity; 0 as printed
+    joints: DM  #: (n, n) derivative of the controlled angles by the coordinates; invertible
 
 
 class QuantisedState(NamedTuple):
@@ -38,9 +39,10 @@ def advance(state: QuantisedState, acceleration: SX, quantum: float) -> Quantise
 
 
 def controller_torque(control: Controller, desired: QuantisedState, state: QuantisedState, gravity: SX) -> SX:
-    """Return the generalised torque (n,) (eqs. 50-52), with the compensated share of gravity."""
-    errors = control.proportional * (desired.q - state.q) + control.derivative * (desired.v - state.v)
-    return errors + control.gravity_share * gravity
+    """Return the torques (n,) on the controlled angles (eqs. 50-52), with the compensated share of gravity."""
+    e, rate = (control.joints @ (aim - now) for aim, now in zip(desired, state, strict=True))
+    balance = ca.sparsify(ca.inv(control.joints)).T @ gravity
+    return control.proportional * e + control.derivative * rate + control.gravity_share * balance
 
 
 def implicit_quantum(
@@ -58,16 +60,18 @@ def implicit_quantum(
     They are finite at every gain. The Coriolis matrix multiplies the rates at the end, too: as dM/dt - 2 C is skew, a free motion
     then loses kinetic energy to first order in the quantum, while links turn by less than a radian in a quantum. In a robot that
     collapses without damping, toes turn ten times faster, which a step of this length cannot resolve: such links are braked.
-    ``desired`` is at the end of the quantum dt [s], ``disturbance`` (n,) a generalised force.
+    ``desired`` is at the end of the quantum dt [s], ``disturbance`` (n,) torques on the controlled angles.
 
     Source:
         Bhardwaj et al., eqs. (46)-(52), taken at the end of the quantum.
     """
     coasting = advance(state, SX(state.q.shape[0], 1), quantum)
     stiffness = control.derivative * quantum + control.proportional * quantum**2 / 2
-    force = controller_torque(control, desired, coasting, motion.G) - motion.C @ state.v - motion.G + disturbance
+    torque = controller_torque(control, desired, coasting, motion.G) + disturbance
+    force = control.joints.T @ torque - motion.C @ state.v - motion.G
     brake = ca.diag(motion.M) * (quantum * state.v) ** BRAKE_POWER
-    mass = motion.M + quantum * motion.C + ca.diag(stiffness + brake)
+    held = control.joints.T @ ca.diag(stiffness) @ control.joints
+    mass = motion.M + quantum * motion.C + held + ca.diag(brake)
     return implicit_equations(Equations(mass, force - brake * state.v / quantum), state.v, contacts, ground, quantum)
 
 
@@ -87,9 +91,10 @@ def explicit_quantum(
     Source:
         Bhardwaj et al., eqs. (33)-(35), (46)-(52); ``desired`` at the start of the quantum, friction against the slip.
     """
-    force = controller_torque(control, desired, state, motion.G) - motion.C @ state.v - motion.G + disturbance
+    torque = controller_torque(control, desired, state, motion.G) + disturbance
+    force = control.joints.T @ torque - motion.C @ state.v - motion.G
     for contact in contacts:
-        rate, slip = ca.dot(contact.normal, state.v), ca.dot(contact.tangent, state.v)
+        rate, slip = contact.velocity(state.v)
         pressed = (contact.height <= 0) * (-ground.stiffness * contact.height - ground.damping * rate)  # (eq. 33)
         force += pressed * (contact.normal - ground.friction * ca.sign(slip) * contact.tangent)  # (eqs. 34, 35)
     return Equations(motion.M, force)

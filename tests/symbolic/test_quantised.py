@@ -23,9 +23,10 @@ AIM_Q, AIM_V, KP, KD, SHARE = (
     np.array([3.0, 4.0]),
     0.4,
 )
+JOINTS = np.array([[1.0, 0.0], [-1.0, 1.0]])  # the second angle is measured from the first link
 MOTION = EquationsOfMotion(ca.SX(M), ca.SX(C), ca.SX(G))
 STATE, AIM = QuantisedState(ca.SX(Q), ca.SX(V)), QuantisedState(ca.SX(AIM_Q), ca.SX(AIM_V))
-CONTROL = Controller(ca.SX(KP), ca.SX(KD), ca.SX(SHARE))
+CONTROL = Controller(ca.SX(KP), ca.SX(KD), ca.SX(SHARE), ca.DM(JOINTS))
 
 
 def numbers(expression: SX) -> Array:
@@ -34,13 +35,14 @@ def numbers(expression: SX) -> Array:
 
 def driving(q: Array, v: Array) -> Array:
     """Controller, Coriolis, gravity and disturbance at a state."""
-    return KP * (AIM_Q - q) + KD * (AIM_V - v) + SHARE * G - C @ v - G + DISTURBANCE
+    torque = KP * (JOINTS @ (AIM_Q - q)) + KD * (JOINTS @ (AIM_V - v)) + DISTURBANCE
+    return JOINTS.T @ torque + SHARE * G - C @ v - G
 
 
 @pytest.mark.parametrize(("rate", "kept"), [(1.0, 1.0), (10.0, 1.0 - 1e-8), (100.0, 0.5), (1000.0, 1e-8)])
 def test_a_free_link_keeps_its_rate_unless_it_turns_by_a_radian_in_a_quantum(rate: float, kept: float) -> None:
     motion = EquationsOfMotion(SX(0.3), SX(0.0), SX(0.0))
-    nothing, ground = Controller(SX(0), SX(0), SX(0)), Ground(SX(0), SX(0), SX(0))
+    nothing, ground = Controller(SX(0), SX(0), SX(0), ca.DM.eye(1)), Ground(SX(0), SX(0), SX(0))
     state = QuantisedState(SX(0.2), SX(rate))
     equations = implicit_quantum(motion, state, nothing, state, [], ground, SX(0), QUANTUM)
     following = advance(state, solve_definite(*equations), QUANTUM)

@@ -30,15 +30,34 @@ from nlp_gait.symbolic.quantised import (
 
 Scheme = Literal["implicit", "explicit"]
 InverseKinematics = Literal["closed-form", "network"]
+Coordinates = Literal["joint", "printed", "link"]
+Base = Literal["stance-ankle", "hip"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
-# Points that may touch the ground; the sixth of the paper, the stance ankle, is the base and never leaves it.
-CONTACTS = ("T", "S", "A", "S'", "T'")
+# Points that may touch the ground, all but the base: the stance ankle as base never leaves it.
+CONTACTS = ("T", "S", "A", "S'", "T'", "A'")
+BASES: Mapping[Base, str] = {"stance-ankle": "A'", "hip": "H"}
 N = len(LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
-# k_s, k_d and mu, share of gravity, amplitude of the disturbance. Nothing is ever differentiated with respect to it.
-GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
+# slope and the share of the links' spin in the ZMP. Nothing is ever differentiated with respect to it.
+GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1, "base": 6, "slope": 1, "spin": 1}
 TORSO = LINKS.index("UH")
+# Link from which the angle of another one is measured, the others' from the forward axis. Knees are as in (27), (28).
+_KNEES = {"KA": "HK", "K'A'": "HK'"}
+PREVIOUS: Mapping[Coordinates, Mapping[str, str]] = {
+    "joint": {**_KNEES, "AS": "KA", "ST": "AS", "A'S'": "K'A'", "S'T'": "A'S'"},
+    "printed": _KNEES,
+    "link": {},
+}
+
+
+def measure_joints(coordinates: Coordinates) -> DM:
+    """Return the matrix (9, 9) from link angles to the controlled angles."""
+    matrix = DM.eye(N)
+    for link, previous in PREVIOUS[coordinates].items():
+        matrix[LINKS.index(link), LINKS.index(previous)] = -1
+    return matrix
 
 
 class Rollout(NamedTuple):
@@ -46,8 +65,15 @@ class Rollout(NamedTuple):
 
     desired: MX  # (18, m) desired angles and rates
     state: MX  # (18, m) angles [rad] and rates [rad/s] of the nine links
-    torque: MX  # (9, m) generalised torques of the links [Nm]
+    torque: MX  # (9, m) torques on the controlled angles [Nm]
     zmp: MX  # (1, m) ahead of the stance ankle, on the virtual slope in double support [m]
+
+
+class QuantumInputs(NamedTuple):
+    """What a rollout needs besides gains and torso pitch; columns are quanta."""
+
+    desired: MX  # (18, m + 1) link angles and rates at the ends of all quanta
+    given: MX  # (n, m), see GIVEN
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,14 +84,22 @@ class ClosedLoop:
     scheme: Scheme  # of the quantised dynamics
     gains: int  # number of different K_p, and of different K_d: 1 or one for each link
     inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
+    coordinates: Coordinates = "joint"  # what the controller measures and drives
+    base: Base = "stance-ankle"  # pinned to its step; or the hip, on its planned curve
 
-    def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
-        """Return states, torques and ZMP for tuned K_p (gains,), K_d (gains,) >= 0 and desired torso pitch."""
+    @cached_property
+    def joints(self) -> DM:
+        """(9, 9) from link angles to the controlled angles."""
+        return measure_joints(self.coordinates)
+
+    def inputs(self, point: Point, ops: Nonsmooth) -> QuantumInputs:
+        """Return the desired motion and the other inputs of all quanta."""
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
-        desired = _make_desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        planned = _make_desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        desired, place, speed = ca.vertsplit(planned, [0, 2 * N, 2 * N + 2, 2 * N + 4])
         if self.inverse_kinematics == "network":
             desired = solve_legs_by_network(desired)
         constants = ca.vertcat(
@@ -74,14 +108,26 @@ class ClosedLoop:
             point["gravity_compensation"],
             point["disturbance_Nm"],
         )
-        aims = desired[:, 1:] if self.scheme == "implicit" else desired[:, :-1]
-        given = ca.vertcat(aims, DM(times[None, :-1]), ca.repmat(constants, 1, self.quanta))
+        acted = slice(1, None) if self.scheme == "implicit" else slice(None, -1)
+        base = ca.vertcat(place[:, :-1], speed[:, acted], (speed[:, 1:] - speed[:, :-1]) / QUANTUM)
+        on_slope = ca.fmax(DM(times[None, 1:]) < point["t2_s"], point["slope_in_single_support"])
+        given = ca.vertcat(
+            desired[:, acted],
+            DM(times[None, :-1]),
+            ca.repmat(constants, 1, self.quanta),
+            base if self.base == "hip" else DM(6, self.quanta),
+            stair.rise / stair.tread * on_slope,
+            ca.repmat(point["spin_in_zmp"], 1, self.quanta),
+        )
+        return QuantumInputs(desired, given)
+
+    def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
+        """Return states, torques and ZMP for tuned K_p (gains,), K_d (gains,) >= 0 and desired torso pitch."""
+        desired, given = self.inputs(point, ops)
         inputs = given, ca.repmat(tuned, 1, self.quanta)
-        initial = desired[:, 0]
-        states = ops.rollout(self.step, initial, *inputs)
-        before = ca.horzcat(initial, states[:, :-1])
-        slope = ca.repmat(stair.rise / stair.tread, 1, self.quanta) * (DM(times[None, 1:]) < point["t2_s"])
-        torque, zmp = self._outcome.map(self.quanta)(before, states, *inputs, slope)
+        states = ops.rollout(self.step, desired[:, 0], *inputs)
+        before = ca.horzcat(desired[:, 0], states[:, :-1])
+        torque, zmp = self.outcome.map(self.quanta)(before, states, *inputs)
         return Rollout(desired[:, 1:], states, torque, zmp)
 
     @cached_property
@@ -95,52 +141,57 @@ class ClosedLoop:
 
     def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
         """Return the equations of the acceleration within one quantum."""
-        q, v = state
-        found = points(toe_foot_biped().rods, q, SX(2, 1))
-        motion = biped_dynamics(toe_foot_biped().rods, GRAVITY, q, v, q)
+        (q, v), rods = state, toe_foot_biped().rods
+        place, speed, push = ca.vertsplit(parts["base"], [0, 2, 4, 6])
+        found = points(rods, q, place, BASES[self.base])
+        motion = biped_dynamics(rods, GRAVITY, q, v, q, BASES[self.base])
+        momentum = sum((rods[link].mass * middle for link, middle in centres(found).items()), SX(2, 1))
         stair = Stair(parts["size"][0], parts["size"][1])
         contacts = [
             Contact(
                 found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH),
                 ca.jacobian(found[name][1], q).T,
                 ca.jacobian(found[name][0], q).T,
+                speed[::-1],
             )
             for name in CONTACTS
+            if name != BASES[self.base]
         ]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
-        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
+        inertia = ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push  # of links that the base accelerates
+        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) - inertia
         if self.scheme == "implicit":
             return implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
         return explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
 
     @cached_property
-    def _outcome(self) -> ca.Function:
-        """Function of (state, next state, given, tuned, slope) to torques (9,) and ZMP, with a quantum's mean acceleration."""
+    def outcome(self) -> ca.Function:
+        """Function of (state, next state, given, tuned) to torques (9,) and ZMP, with a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
-        slope = SX.sym("slope")
-        rods = toe_foot_biped().rods
-        G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q).G
+        rods, base = toe_foot_biped().rods, BASES[self.base]
+        G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q, base).G
         acted = following if self.scheme == "implicit" else state
         torque = controller_torque(parts["control"], parts["desired"], acted, G)
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
-        for link, middle in centres(points(rods, state.q, SX(2, 1))).items():
+        place, push = parts["base"][:2], parts["base"][4:]
+        for link, middle in centres(points(rods, state.q, place, base)).items():
             rod = rods[link]
             velocity = ca.jtimes(middle, state.q, state.v)
-            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration)
-            spin = acceleration[LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
+            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
+            spin = parts["spin"] * acceleration[LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
             weight += rod.mass * (a[1] + GRAVITY)
             pull += rod.mass * a[0]
             moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
         least = LEAST_LOAD * toe_foot_biped().mass_kg * GRAVITY
-        zmp = moment / ca.fmax(weight - slope * pull, least)  # (eq. 49)
+        zmp = moment / ca.fmax(weight - parts["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
             "outcome",
-            [ca.vertcat(*state), ca.vertcat(*following), *inputs, slope],
+            [ca.vertcat(*state), ca.vertcat(*following), *inputs],
             ca.cse([torque, zmp]),
-            {"is_diff_in": [True, True, False, True, False]},
+            {"is_diff_in": [True, True, False, True]},
         )
 
     def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
@@ -151,13 +202,14 @@ class ClosedLoop:
         kp, kd, torso = ca.vertsplit(tuned, [0, self.gains, 2 * self.gains, 2 * self.gains + 1])
         each = N // self.gains
         aim = parts.pop("aim")
-        parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), parts.pop("gravity_share"))
+        share = parts.pop("gravity_share")
+        parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), share, self.joints)
         parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
         return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
 def _make_desired(ops: Nonsmooth) -> ca.Function:
-    """Return the function of (time, governing parameters with stair and reach margin) to the desired state (18,)."""
+    """Return the function of (time, governing parameters with stair and reach margin) to the desired state and the hip's (22,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)
@@ -165,7 +217,8 @@ def _make_desired(ops: Nonsmooth) -> ca.Function:
         toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
     )
     given = ca.vertcat(values, size, margin)
-    pose = ca.Function("pose", [s, passing, given], [link_angles(step.q.position), link_angles(step.q.velocity)])
+    motion = [link_angles(step.q.position), link_angles(step.q.velocity), step.hip.position, step.hip.velocity]
+    pose = ca.Function("pose", [s, passing, given], motion)
     time = SX.sym("time")
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])
     passed = (time - starts) / plan.durations

@@ -29,8 +29,13 @@ ENDS = {
     "A'S'": ("A'", "S'"),
     "S'T'": ("S'", "T'"),
 }
-# Links in the order in which they are reached from the stance ankle, and whether they are passed from their far end.
-_PATH = (("K'A'", -1), ("HK'", -1), ("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1), ("A'S'", 1), ("S'T'", 1))
+# Links in the order in which they are reached from a base, and whether they are passed from their far end.
+_SWING = (("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1))
+_FOOT = (("A'S'", 1), ("S'T'", 1))
+_PATHS: Mapping[str, tuple[tuple[str, int], ...]] = {
+    "A'": (("K'A'", -1), ("HK'", -1), *_SWING, *_FOOT),
+    "H": (*_SWING, ("HK'", 1), ("K'A'", 1), *_FOOT),
+}
 
 V = TypeVar("V", SX, np.ndarray)
 
@@ -49,24 +54,27 @@ def direction(link: str, angle: SX) -> SX:
     return ca.vertcat(ca.cos(angle), upward * ca.sin(angle))
 
 
-def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, ankle: SX) -> dict[str, SX]:
-    """Return positions of all joints and ends by name, (2,) each [m], from nine angles [rad] and the stance ankle A' (2,) [m]."""
-    return _sum_along_links(ankle, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
+def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
+    """Return positions of all joints and ends by name, (2,) each [m], from nine angles [rad] and the place of the base (2,) [m].
+
+    The base is the stance ankle A' or the hip H.
+    """
+    return _sum_along_links(base, place, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
 
 
-def _sum_along_links(base: V, along: Callable[[str], V]) -> dict[str, V]:
-    """Return sums along the links from the stance ankle to every point, by the point's name."""
-    found = {"A'": base}
-    for link, sense in _PATH:
+def _sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str, V]:
+    """Return sums along the links from the base to every point, by the point's name."""
+    found = {base: place}
+    for link, sense in _PATHS[base]:
         near, far = ENDS[link][::sense]
         found[far] = found[near] + sense * along(link)
     return found
 
 
-def _couplings(rods: Mapping[str, Rod]) -> np.ndarray:
+def _couplings(rods: Mapping[str, Rod], base: str) -> np.ndarray:
     """(9, 9) W [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, where u_i are the directions."""
     arms = _sum_along_links(
-        np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)]
+        base, np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)]
     )
     middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])
     return middles.T @ np.diag([rods[link].mass for link in LINKS]) @ middles
@@ -77,12 +85,14 @@ def centres(found: Mapping[str, SX]) -> dict[str, SX]:
     return {link: (found[a] + found[b]) / 2 for link, (a, b) in ENDS.items()}
 
 
-def biped_dynamics(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angles: SX) -> EquationsOfMotion:
-    """Return the equations of motion about a fixed stance ankle, with link angles (9,) [rad] as a function of q (n,)."""
+def biped_dynamics(
+    rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angles: SX, base: str = "A'"
+) -> EquationsOfMotion:
+    """Return the equations of motion about a fixed base (``points``), with link angles (9,) [rad] as a function of q (n,)."""
     spins = ca.jtimes(angles, q, qd)
     velocities = [ca.jtimes(direction(link, angles[i]), q, qd) for i, link in enumerate(LINKS)]
-    middles = centres(points(rods, angles, SX(2, 1)))
-    kinetic, potential, couplings = SX(0), SX(0), _couplings(rods)
+    middles = centres(points(rods, angles, SX(2, 1), base))
+    kinetic, potential, couplings = SX(0), SX(0), _couplings(rods, base)
     for i, link in enumerate(LINKS):
         moving = 0.5 * couplings[i, i] * ca.sumsqr(velocities[i])
         kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + moving  # (eqs. 36, 37)

@@ -27,13 +27,23 @@ from nlp_gait.formulation import (
     parameters,
 )
 from nlp_gait.gaits.stairs import stair
-from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, InverseKinematics, N, Rollout, Scheme
+from nlp_gait.gaits.stairs.closed_loop import (
+    QUANTUM,
+    Base,
+    ClosedLoop,
+    Coordinates,
+    InverseKinematics,
+    N,
+    Rollout,
+    Scheme,
+)
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-link"]
+ZmpRule = Literal["limits", "penalty"]
 
 # Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
 PLAN = {
@@ -67,7 +77,9 @@ PARAMETERS = (
     *parameters(
         stair.REACH_MARGIN,
         ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
-        ("zmp_weight", "1/m", 100.0, "cost of the mean distance of the ZMP from the supporting polygon", 0.0, inf),
+        ("zmp_weight", "1/m", 100.0, "worth of the ZMP margin, or cost of the ZMP outside the polygon", 0.0, inf),
+        ("spin_in_zmp", "1", 1.0, "share of the links' own angular momentum in the ZMP; 0 as printed", 0.0, 1.0),
+        ("slope_in_single_support", "1", 0.0, "share of the virtual slope there; 1 as printed", 0.0, 1.0),
         ("gravity_compensation", "1", 1.0, "share of gravity that the controller compensates; 0 as printed", 0.0, 1.0),
         ("disturbance_Nm", "N m", 1 / 70, "amplitude of the disturbance sin(2 t) on every link", -inf, inf),
         ("ground_stiffness_N_m", "N/m", 5e4, "k_s of a contact", 0.0, inf),
@@ -83,9 +95,13 @@ def stairs_track(
     gains: Gains = "scalar",
     scheme: Scheme = "implicit",
     inverse_kinematics: InverseKinematics = "closed-form",
+    coordinates: Coordinates = "joint",
+    base: Base = "stance-ankle",
+    zmp: ZmpRule = "limits",
+    tracking_limit: bool = True,
     duration_s: float = 3.5,
 ) -> GaitProblem:
-    """Return the closed loop over one planned step, with the stance ankle as base.
+    """Return the closed loop over one planned step.
 
     The plan is given by parameters; its torso pitch is a variable.
 
@@ -94,6 +110,11 @@ def stairs_track(
         scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
             quantum's pose within each evaluation (which makes one many times slower).
+        coordinates: what the controller measures and drives: joint angles and torques; as printed only the knees are joints
+            (27), (28), and other angles are those of links; or all angles are those of links.
+        base: stance ankle, pinned to its step, with five contacts; or the hip on its planned curve, with the paper's six.
+        zmp: within the supporting polygon (Algorithm 3), with the least margin maximised; or a penalty outside it.
+        tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
         duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
 
     Source:
@@ -103,7 +124,14 @@ def stairs_track(
         raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
     suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
     quanta = round(duration_s / QUANTUM)
-    loop = ClosedLoop(quanta=quanta, scheme=scheme, gains=len(suffixes), inverse_kinematics=inverse_kinematics)
+    loop = ClosedLoop(
+        quanta=quanta,
+        scheme=scheme,
+        gains=len(suffixes),
+        inverse_kinematics=inverse_kinematics,
+        coordinates=coordinates,
+        base=base,
+    )
     limits = {"lower": 0.0, "upper": 100.0, "minimum": 0.0, "maximum": 1e4}
     variables = (
         *(
@@ -124,14 +152,17 @@ def stairs_track(
 
     def motion(at: NumericPoint) -> Signals:
         desired, state, torque, zmp = (np.array(ca.evalf(part)).T for part in rollout(at, Exact()))
+        joints = loop.joints.full().T
         return Signals(
             joints=LINKS,
             arrays={
                 "t": np.linspace(QUANTUM, loop.quanta * QUANTUM, loop.quanta),
-                "q": state[:, :N],
-                "qd": state[:, N:],
-                "q_desired": desired[:, :N],
-                "qd_desired": desired[:, N:],
+                "q": state[:, :N] @ joints,
+                "qd": state[:, N:] @ joints,
+                "q_desired": desired[:, :N] @ joints,
+                "qd_desired": desired[:, N:] @ joints,
+                "link_q": state[:, :N],
+                "link_qd": state[:, N:],
                 "tau": torque,
                 "zmp": zmp[:, 0],
             },
@@ -139,13 +170,16 @@ def stairs_track(
                 "zmp": stair.COLUMNS["zmp"],
                 "q_desired": Columns(unit="rad", labels=LINKS),
                 "qd_desired": Columns(unit="rad/s", labels=LINKS),
+                "link_q": Columns(unit="rad", labels=LINKS),
+                "link_qd": Columns(unit="rad/s", labels=LINKS),
             },
         )
 
     def step_motion(at: NumericPoint) -> StepMotion:
         arrays = motion(at).arrays
-        state = np.hstack([arrays["q"], arrays["qd"]])
-        return make_driven_step(arrays["t"], state, arrays["tau"], arrays["zmp"], float(at["t2_s"]))
+        state = np.hstack([arrays["link_q"], arrays["link_qd"]])
+        on_links = arrays["tau"] @ loop.joints.full()
+        return make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
 
     return GaitProblem(
         name="stairs-track",
@@ -153,49 +187,60 @@ def stairs_track(
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
-        assemble=lambda point, ops: _assemble(point, rollout(point, ops), ops),
+        assemble=lambda point, ops: _assemble(point, rollout(point, ops), loop.joints, zmp, tracking_limit, ops),
         display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion)),
         hints=SolverHints(start=start, starts=1, amplifies_rounding=True),
     )
 
 
-def _assemble(point: Point, loop: Rollout, ops: Nonsmooth) -> Assembly:
-    """Return the mean of (53) over all quanta, with a penalty for the ZMP outside the support polygon."""
+def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_limit: bool, ops: Nonsmooth) -> Assembly:
+    """Return the mean of (53) over all quanta with the worth of the ZMP margin or its penalty, and the limits of both."""
     quanta = loop.state.shape[1]
-    errors = loop.state - loop.desired
-    power = loop.torque * loop.state[N:, :]
-    below, above = _zmp_violations(point, loop.zmp)
-    most, instants = point["tracking_tolerance_rad"], range(1, quanta + 1)
-    tracked = stair.rows("tracking", errors[:N, :], LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants)
+    errors = ca.diagcat(joints, joints) @ (loop.state - loop.desired)
+    power = loop.torque * (joints @ loop.state[N:, :])
+    rear, front = _support_polygon(point, quanta)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
-    outside = ca.sum1(_positive(below, ops) + _positive(above, ops)) / quanta
+    balance = _outside(loop.zmp.T, rear, front, ops) if rule == "penalty" else -_margin(loop.zmp.T, rear, front, ops)
+    instants, constraints = range(1, quanta + 1), []
+    if rule == "limits":  # (Algorithm 3)
+        constraints.append(stair.rows("zmp", loop.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
+    if tracking_limit:
+        most, limited = point["tracking_tolerance_rad"], errors[:N, :]
+        constraints.append(stair.rows("tracking", limited, LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants))
     finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
     return Assembly(
-        objective=tracking + effort + point["zmp_weight"] * outside,
-        constraints=(tracked,),
+        objective=tracking + effort + point["zmp_weight"] * balance,
+        constraints=tuple(constraints),
         indexes={
             "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
             "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
             "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
             "peak_torque_Nm": exact.largest(ca.vec(loop.torque)),
-            "zmp_margin_min_m": -ca.mmax(ca.fmax(below, above)),
+            "zmp_margin_min_m": _margin(loop.zmp.T, rear, front, exact),
             "quanta_before_divergence": ca.sum2(finite),
         },
     )
 
 
-def _zmp_violations(point: Point, zmp: MX) -> tuple[MX, MX]:
-    """Return distances of the ZMP behind and ahead of the support polygon, (m, 1) each [m]; negative inside.
+def _support_polygon(point: Point, quanta: int) -> tuple[MX, MX]:
+    """Return the rear and front end of the support polygon at the end of each quantum, (m, 1) ahead of the stance ankle [m].
 
     The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
     """
     foot = toe_foot_biped().foot_m
-    times = DM(np.arange(1, zmp.shape[1] + 1) * QUANTUM)
+    times = DM(np.arange(1, quanta + 1) * QUANTUM)
     rear = (times < point["t2_s"]) * (foot - point["stair_length_m"] / 2)
-    return rear - zmp.T, zmp.T - foot
+    return rear, MX(DM([foot] * quanta))
 
 
-def _positive(v: MX, ops: Nonsmooth) -> MX:
-    """Elementwise max(v, 0)."""
-    return (v + ops.abs(v)) / 2
+def _outside(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
+    """Return the mean distance of the ZMP (m, 1) from the support polygon [m]."""
+    distances = ca.vertcat(rear - zmp, zmp - front)
+    return ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
+
+
+def _margin(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
+    """Return the least distance of the ZMP (m, 1) from the ends of the support polygon [m]; negative outside."""
+    half, largest = (front - rear) / 2, (front - rear)[0] / 2  # the polygon never grows
+    return largest - ops.largest(ops.abs(zmp - (front + rear) / 2) + (largest - half))
