@@ -70,7 +70,7 @@ def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> 
         Contact(found[name][1], ca.jacobian(found[name][1], q).T, ca.jacobian(found[name][0], q).T) for name in names
     ]
     kp, kd = (SX([0.0, 0.0, *[gain] * 9]) for gain in HOLD)
-    control = Controller(kp, kd, SX(0), ca.DM.eye(len(LINKS)))
+    control = Controller(kp, kd, SX(0), ca.DM.eye(11))
     aim = QuantisedState(SX([0.0, 0.0, *HELD]), SX(11, 1))
     ground = Ground(SX(STIFFNESS), SX(DAMPING), SX(FRICTION))
     equations = implicit_quantum(motion, QuantisedState(q, v), control, aim, contacts, ground, SX(11, 1), QUANTUM)

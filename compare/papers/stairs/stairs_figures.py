@@ -196,6 +196,6 @@ def _draw_torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
             foot = link.startswith(("A'S", "S'"))
             axes.plot(arrays["t"], arrays["tau"][:, i], "--" if foot else "-", label=link, linewidth=1.0)
         axes.set(title=f"Fig. 29{'abc'[case - 1]}: case {case}", xlabel="time [s]")
-    figure.axes[0].set_ylabel("torque on the link [N m]")
+    figure.axes[0].set_ylabel("joint torque [N m]")
     add_legend_below(figure)
     return figure

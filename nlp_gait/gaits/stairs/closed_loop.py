@@ -41,7 +41,17 @@ N = len(LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
 # k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
 # slope and the share of the links' spin in the ZMP. Nothing is ever differentiated with respect to it.
-GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1, "base": 6, "slope": 1, "spin": 1}
+GIVEN = {
+    "aim": 2 * N,
+    "time": 1,
+    "size": 2,
+    "ground": 3,
+    "gravity_share": 1,
+    "disturbance": 1,
+    "base": 6,
+    "slope": 1,
+    "spin": 1,
+}
 TORSO = LINKS.index("UH")
 # Link from which the angle of another one is measured, the others' from the forward axis. Knees are as in (27), (28).
 _KNEES = {"KA": "HK", "K'A'": "HK'"}
@@ -209,7 +219,7 @@ class ClosedLoop:
 
 
 def _make_desired(ops: Nonsmooth) -> ca.Function:
-    """Return the function of (time, governing parameters with stair and reach margin) to the desired state and the hip's (22,)."""
+    """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)

@@ -58,10 +58,12 @@ PLAN = {
     "foot_pitch_rad": 0.3169,
 }
 TORSO_PITCH = "torso_pitch_rad"
-# Start points are normally distributed, in units of the ranges, around gains and a torso pitch with which the robot stays near
-# its plan: a rollout of a falling robot has no useful gradient.
+# Start points are normally distributed around gains and a torso pitch with which the robot stays near its plan: a rollout of a
+# falling robot has no useful gradient. The deviation is relative.
 PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
 SCATTER = 0.05
+# The cost falls with both gains, by less than a hundredth from here to a hundredth of this: the bound does not decide the cost.
+LARGEST_GAIN = 1e4
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PARAMETERS = (
@@ -132,7 +134,7 @@ def stairs_track(
         coordinates=coordinates,
         base=base,
     )
-    limits = {"lower": 0.0, "upper": 100.0, "minimum": 0.0, "maximum": 1e4}
+    limits = {"lower": 0.0, "upper": LARGEST_GAIN, "minimum": 0.0, "maximum": 1e6}
     variables = (
         *(
             Variable(name=name + suffix, unit=unit, description=f"{symbol} of {suffix[1:] or 'all links'}", **limits)
@@ -146,9 +148,8 @@ def stairs_track(
         return loop.rollout(point, ca.vertcat(*(stair.clip_to_range(point, variable) for variable in variables)), ops)
 
     def start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
-        gains_about = np.full(2 * len(suffixes), PLAUSIBLE_GAIN)
-        ranges = np.array([variable.upper - variable.lower for variable in variables])
-        return np.append(gains_about, PLAUSIBLE_TORSO) + SCATTER * ranges * rng.standard_normal(len(variables))
+        about = np.append(np.full(2 * len(suffixes), PLAUSIBLE_GAIN), PLAUSIBLE_TORSO)
+        return about * (1 + SCATTER * rng.standard_normal(len(variables)))
 
     def motion(at: NumericPoint) -> Signals:
         desired, state, torque, zmp = (np.array(ca.evalf(part)).T for part in rollout(at, Exact()))
@@ -207,7 +208,9 @@ def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_l
         constraints.append(stair.rows("zmp", loop.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
     if tracking_limit:
         most, limited = point["tracking_tolerance_rad"], errors[:N, :]
-        constraints.append(stair.rows("tracking", limited, LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants))
+        constraints.append(
+            stair.rows("tracking", limited, LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants)
+        )
     finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
     return Assembly(
         objective=tracking + effort + point["zmp_weight"] * balance,
@@ -242,5 +245,6 @@ def _outside(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
 
 def _margin(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
     """Return the least distance of the ZMP (m, 1) from the ends of the support polygon [m]; negative outside."""
-    half, largest = (front - rear) / 2, (front - rear)[0] / 2  # the polygon never grows
-    return largest - ops.largest(ops.abs(zmp - (front + rear) / 2) + (largest - half))
+    off, half = zmp - (front + rear) / 2, (front - rear) / 2
+    widest = half[0]  # the polygon never grows
+    return widest - ops.largest(ca.vertcat(widest - half + off, widest - half - off))
