@@ -30,7 +30,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import CERTIFICATES, read_certificate
+from nlp_gait.proofs.certificate import load_certificates
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "facts.json"
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
@@ -183,9 +183,8 @@ def best_baseline_points(id: str) -> list[tuple[float, Array]]:
 
 def find_proven_gap(id: str, best_known: float) -> float | None:
     """Return how much better than the best known any feasible point can be, by the shipped certificates; None without one."""
-    files = CERTIFICATES.glob(f"{id}-[0-9]*-percent.json")
-    bounds = [read_certificate(path).certificate.bound for path in files]
-    return (best_known - max(bounds)) / abs(best_known) if bounds else None
+    file = load_certificates().get(id)
+    return None if file is None else (best_known - file.certificate.bound) / abs(best_known)
 
 
 def prove_gap(instance: Instance, best: Array, limit_s: float) -> float | None:

@@ -23,7 +23,7 @@ from metaheuristics.registry import algorithm
 from nlp_gait.backends.identity import fingerprint, hash_json
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.bounds import has_power_form, make_bounds
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
@@ -33,6 +33,7 @@ from nlp_gait.proofs.checkpoint import hash_code
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4
 DRAWN, LISTED = 20, 10  # best distinct optima
+CHECK_EVALUATIONS = 20_000  # of a search that a certificate is compared with
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,6 +205,12 @@ class Certainty(Question[Evidence]):
             results=certificates,
             data=findings.to_json(),
         )
+
+
+def search_point(problem: GaitProblem, seed: int = 0) -> Array:
+    """Return the best point (n,) of a short search by PSO, which shares only the exact functions with IPOPT and proofs."""
+    found = minimize(compile_objective(problem), algorithm("pso"), evaluations=CHECK_EVALUATIONS, seed=seed)
+    return np.array(found.x)
 
 
 def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:

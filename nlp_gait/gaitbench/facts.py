@@ -10,6 +10,8 @@ from importlib.resources import files
 
 from nlp_gait.decoding import decode
 
+SIX_DIGITS = 1.001e-6  # a gap of 1e-6, rounded
+
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
@@ -27,7 +29,8 @@ class Evidence:
     def __str__(self) -> str:
         parts = [f"{self.agreeing} of {self.starts} starts of IPOPT"]
         if self.proven_gap is not None:
-            parts.insert(0, f"proven to {100 * self.proven_gap:.2g} %")
+            six = self.proven_gap <= SIX_DIGITS
+            parts.insert(0, "proven to six digits" if six else f"proven to {100 * self.proven_gap:.2g} %")
         elif self.agreeing <= 1:
             parts.insert(0, "best known")
         if self.cma_runs:
