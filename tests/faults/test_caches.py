@@ -12,7 +12,8 @@ import pytest
 from compare.study.record import read_record
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import find_compiler
-from tests.faults.processes import in_own_mounts, start
+from tests.compare.cli.calls import nlp_gait
+from tests.faults.processes import in_own_mounts, quick_compiler, start
 
 SEARCH = ("search", "walk12", "--runs", "3", "--evaluations", "500", "--jobs", "1")
 
@@ -31,10 +32,10 @@ def test_a_read_only_cache_costs_one_line(tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     cache.mkdir(mode=0o700)
     script = (
-        'mount --bind "$2" "$2"; mount -o remount,ro,bind "$2"; export NLP_GAIT_CACHE="$2"; shift 2; '
+        'mount --bind "$2" "$2"; mount -o remount,ro,bind "$2"; export NLP_GAIT_CACHE="$2" CXX="$3"; shift 3; '
         f'exec "$PYTHON" -m nlp_gait {" ".join(SEARCH)} --out "$1"'
     )
-    done = in_own_mounts('PYTHON="$1"; ' + script, str(cache), str(tmp_path / "out"))
+    done = in_own_mounts('PYTHON="$1"; ' + script, str(cache), quick_compiler(tmp_path), str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("\n") == 1 and "compiled code is stored for this process only" in done.stderr
     assert "Read-only file system" in done.stderr and not list(cache.iterdir())
@@ -43,9 +44,9 @@ def test_a_read_only_cache_costs_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_two_processes_share_a_cache_and_an_output_folder(tmp_path: Path) -> None:
-    alone = start(*SEARCH, "--out", str(tmp_path / "alone"))
-    both = [start(*SEARCH, "--out", str(tmp_path / "both"), NLP_GAIT_CACHE=str(tmp_path / "cache")) for _ in range(2)]
-    for process in (alone, *both):
+    assert nlp_gait(*SEARCH, "--out", tmp_path / "alone").stderr == ""
+    own = {"NLP_GAIT_CACHE": str(tmp_path / "cache"), "CXX": quick_compiler(tmp_path)}
+    for process in [start(*SEARCH, "--out", str(tmp_path / "both"), **own) for _ in range(2)]:
         _, messages = process.communicate(timeout=120)
         assert process.returncode == 0 and messages == ""
     assert runs(tmp_path / "both") == runs(tmp_path / "alone") and len(runs(tmp_path / "both")) == 3

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from compare.cli import app
 from metaheuristics import ParticleSwarm
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_folder, private_folder, warn_once
-from tests.faults.processes import ROOT
+from tests.faults.processes import ROOT, quick_compiler
 
 RUN = CliRunner()
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -105,21 +105,11 @@ def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
         "import pwd\ndef missing(*_):\n    raise KeyError('getpwuid(): uid not found')\npwd.getpwuid = missing\n"
     )
     kept = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME", FOLDER_VARIABLE)}
+    study = (*STUDY, "--runs", "1", "--algorithms", "pso", "--out", str(tmp_path / "study"))
     done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "nlp_gait",
-            *STUDY,
-            "--runs",
-            "1",
-            "--algorithms",
-            "pso",
-            "--out",
-            str(tmp_path / "study"),
-        ],
+        [sys.executable, "-m", "nlp_gait", *study],
         cwd=ROOT,
-        env={**kept, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
+        env={**kept, "PYTHONPATH": f"{tmp_path}:{ROOT}", "CXX": quick_compiler(tmp_path)},
         capture_output=True,
         text=True,
         timeout=120,
