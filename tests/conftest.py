@@ -66,9 +66,17 @@ def pytest_fixture_setup() -> Iterator[Any]:
         raise
 
 
+@pytest.fixture(scope="module")
+def coarse_pages() -> Iterator[None]:
+    """Draw each picture of a page once and small, for files whose tests do not measure the pictures of their pages."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("compare.report.writing.save", save_coarsely)
+        yield
+
+
 @pytest.fixture
 def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw each picture of a page once and small, for tests that write many pages and do not measure their pictures."""
+    """Do so for a test."""
     monkeypatch.setattr("compare.report.writing.save", save_coarsely)
 
 

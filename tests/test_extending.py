@@ -137,14 +137,14 @@ class MostHipSpeed(Limit):
 @pytest.mark.slow
 def test_a_limit_of_a_gait_is_one_class() -> None:
     """It is added to those of single support, limits the motion there, and has a parameter."""
-    body, grid = make_nao("nao-v5"), Grid(intervals=10)
+    body, grid = make_nao("nao-v5"), Grid(intervals=4)
     paper = make_single_support_phase(body, 0.06, body.make_splines("ssp", "cubic"), grid, Goal())
     phase = replace(paper, limits=(*paper.limits, MostHipSpeed()))
     problem = make_phase_problem("ssp", "single support with a limit on a hip's speed", phase)
-    solution = nlp_gait.solve(problem, starts=2)
+    solution = nlp_gait.solve(problem)
     fastest = np.abs(problem.signals(solution.x).arrays["qd"]).max(axis=0)
     own = float(fastest[problem.signals(solution.x).joints.index("LHipPitch")])
-    slower = nlp_gait.solve(problem.with_values(hip_rate_limit_rad_s=0.9 * own), starts=2)
+    slower = nlp_gait.solve(problem.with_values(hip_rate_limit_rad_s=0.9 * own))
     assert slower.converged and slower.objective > solution.objective
     assert any(bound.name.startswith("hip_rate[") for bound in slower.active_constraints)
 
@@ -208,13 +208,13 @@ def test_a_question_is_one_folder_and_one_line() -> None:
 def test_mathematics_is_changed_by_derive() -> None:
     """The example of the guide: a price on time, as an added parameter."""
     price = Parameter(name="price_W_s", unit="W/s", default=1.0, description="of a second", minimum=0.0)
-    problem = nlp_gait.load("nao-ssp").derive(
+    problem = nlp_gait.load("nao-ssp", intervals=4).derive(
         name="in-a-hurry",
         parameters=(price,),
         change=lambda gait, at, ops: replace(
             gait, objective=gait.objective + at["price_W_s"] * at["single_support_time_s"]
         ),
     )
-    hurried = nlp_gait.solve(problem, starts=2)
+    hurried = nlp_gait.solve(problem)
     assert hurried.converged and hurried.x["single_support_time_s"] < 2.0
     assert problem.signals(hurried.x).arrays["t"][-1] == pytest.approx(hurried.x["single_support_time_s"])

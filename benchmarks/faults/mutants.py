@@ -211,8 +211,11 @@ def tried(
     if wanted is not None:
         found = [m for m in found if f"{m[0]}:{m[1]}: {m[2]}" in wanted]
     survivors = 0
-    for path, line, change, text in found:
+    for tried_before, (path, line, change, text) in enumerate(found):
         path.write_text(text, encoding="utf-8")
+        os.utime(
+            path, (tried_before, tried_before)
+        )  # else a compiled file of an earlier mutant may be taken for this one's
         if survives(tests, marks, limits):
             survivors += 1
             print(f"{path}:{line}: {change}", flush=True)

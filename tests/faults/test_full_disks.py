@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from compare.study.record import read_record
+from tests.compare.cli.calls import nlp_gait
 from tests.faults.processes import ROOT, in_own_mounts
 
 FULL = Path("/dev/full")
@@ -29,7 +30,9 @@ def limited(kilobytes: int, *arguments: str) -> subprocess.CompletedProcess[str]
 
 
 @pytest.mark.slow
-def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(tmp_path: Path) -> None:
+def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(
+    tmp_path: Path, coarse_pictures: None
+) -> None:
     study = "walk12 --algorithms pso --runs 30 --evaluations 500 --starts 0 --jobs 1"
     script = (
         'mkdir "$2/small"; mount -t tmpfs -o size=48k none "$2/small"; '
@@ -44,11 +47,8 @@ def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(tmp_p
     assert 3 < len(records) < 30 and all(read_record(path) for path in records)
     assert not list(tmp_path.rglob("*.tmp*"))
     before = {path: path.read_bytes() for path in records}
-    again = subprocess.run(
-        [sys.executable, "-m", "nlp_gait", "compare", "--resume", "--out", str(tmp_path / "kept"), "--jobs", "1"],
-        cwd=ROOT,
-    )
-    assert again.returncode == 0 and {path: path.read_bytes() for path in records} == before
+    nlp_gait("compare", "--resume", "--out", tmp_path / "kept", "--jobs", "1")
+    assert {path: path.read_bytes() for path in records} == before
     assert len(list(tmp_path.glob("kept/records/*/*.json"))) == 30
 
 

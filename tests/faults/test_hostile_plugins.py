@@ -78,8 +78,6 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     ),
     "leaves a child": ("start", "os.fork() or time.sleep(10**6)", None),
 }
-ROUNDS = 2
-ONCE = ("never returns", "never returns at import", "prints megabytes")  # waiting for them again shows nothing new
 ENDED = ("evaluation budget used", "time limit reached")
 
 
@@ -102,15 +100,9 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
 ) -> None:
     alone = run_study(Study(tasks=(Task(problem=WALK, solver="pso", stop=STOP),)))
     solvers, ways = [SolverSpec(name="pso")], {}
-    for i in range(ROUNDS):
-        for k, way in enumerate(WAYS):
-            if i and way in ONCE:
-                continue
-            name = f"h{i}-{k}"
-            ways[name] = way
-            reference = f"{written(tmp_path, name, way)}:Algorithm"
-            solvers.append(SolverSpec(name=reference, label=name))
-    assert len(ways) >= 40
+    for k, way in enumerate(WAYS):
+        ways[f"h{k}"] = way
+        solvers.append(SolverSpec(name=f"{written(tmp_path, f'h{k}', way)}:Algorithm", label=f"h{k}"))
     study = StudySettings(problems=(WALK,), solvers=tuple(solvers), runs=1, stop=STOP)
     records = run_study(Study(tasks=study.tasks(), folder=tmp_path / "out"))
     assert capfd.readouterr().out == ""

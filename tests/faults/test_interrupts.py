@@ -35,6 +35,7 @@ from nlp_gait.interrupts import (
     remember_interrupts,
 )
 from tests.backends.toys import corner, toy
+from tests.compare.records import DSP_X
 from tests.faults.processes import ROOT, start
 
 RUN = CliRunner()
@@ -192,20 +193,15 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
     assert [path.name for path in (tmp_path / "store").iterdir()] == ["one.json"]
 
 
-@pytest.fixture(scope="module")
-def gait(tmp_path_factory: pytest.TempPathFactory) -> str:
-    path = tmp_path_factory.mktemp("gait") / "best.json"
-    assert RUN.invoke(app, ["solve", "nao-ssp", "--starts", "1", "--out", str(path)]).exit_code == 0
-    return str(path)
-
-
 @pytest.mark.slow
-def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gait: str) -> None:
+def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
     from nlp_gait.simulation import robustness
 
+    gait = tmp_path / "gait.json"
+    gait.write_text(json.dumps({"problem": "nao-dsp", "x": DSP_X}))
     monkeypatch.setattr(robustness, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
-    done = run("simulate", gait, "--robustness", "--out", str(tmp_path))
+    done = run("simulate", str(gait), "--robustness", "--out", str(tmp_path))
     assert f"interrupted in the tests of robustness; the simulation is stored in {tmp_path}" in done.stderr
     assert {"report.json", "model.xml", "simulation.npz"} <= {path.name for path in tmp_path.iterdir()}
     assert "robustness" not in json.loads((tmp_path / "report.json").read_text())

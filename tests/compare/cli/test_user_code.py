@@ -41,7 +41,8 @@ def edited(file: Path, old: str, new: str) -> None:
 
 def test_an_edit_of_their_file_recomputes_their_runs(mine: Path) -> None:
     names = "pso,my.py:Shrinking,my.py:annealing"
-    call = ["compare", "my.py:two_link", "--algorithms", names, "--runs", "1", "--starts", "1", "--evaluations", "300"]
+    call = ["compare", "my.py:two_link", "--option", "intervals=10", "--algorithms", names]
+    call += ["--runs", "1", "--starts", "1", "--evaluations", "300"]
 
     def again() -> list[str]:
         done = nlp_gait(*call, "--jobs", "1", "--out", "study")

@@ -200,7 +200,7 @@ def test_page_loads_nothing(page: str, tables: Tables) -> None:
 
 
 @pytest.mark.slow
-def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
+def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
     for r in study():
         path = tmp_path / RECORDS / r.problem / f"{r.solver}-{r.run:04d}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -213,14 +213,14 @@ def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_two_problems_have_a_performance_profile(tmp_path: Path) -> None:
+def test_two_problems_have_a_performance_profile(tmp_path: Path, coarse_pictures: None) -> None:
     other = [replace(r, problem="run") for r in study()]
     files = write_report(tmp_path, [*study(), *other], Manifest(settings=None, sessions=()))
     assert tmp_path / "performance-profile.svg" in files and all(path.stat().st_size for path in files)
 
 
 @pytest.mark.slow
-def test_nothing_feasible_is_reported_plainly(tmp_path: Path) -> None:
+def test_nothing_feasible_is_reported_plainly(tmp_path: Path, coarse_pictures: None) -> None:
     failed = [record("pso", run, [(10, None)], feasible=False, claimed=False) for run in range(2)]
     write_report(tmp_path, failed, Manifest(settings=None, sessions=()))
     assert "No solver found a feasible point of walk." in (tmp_path / "report.md").read_text(encoding="utf-8")

@@ -23,7 +23,7 @@ from nlp_gait.formulation import Display
 from nlp_gait.simulation.drive import DRIVES, Drive
 from tests.compare.records import DSP_X, record
 
-pytestmark = pytest.mark.slow  # gaits are played
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_pages")]  # gaits are played
 
 
 def dsp(algorithm: str, power_W: float, time_s: float = 0.4) -> RunRecord:
