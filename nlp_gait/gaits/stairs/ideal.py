@@ -1,4 +1,4 @@
-"""Climbing one step at least effort: full trajectory optimisation, a lower bound for every planner and controller."""
+"""Climbing one step at least effort: full trajectory optimisation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from nlp_gait.formulation import (
 from nlp_gait.formulation.blocks import Block, Layout
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simulation_model, skeleton
-from nlp_gait.gaits.stairs.ideal_model import AXES, IdealModel
+from nlp_gait.gaits.stairs.ideal_model import AXES, Ends, IdealModel
 from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -35,8 +35,7 @@ from nlp_gait.symbolic.nonsmooth import Exact
 
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
-# Shares of the step's time: the rear sole lifts at t1 = 0.5 s, the toe at t2 = 1.4 s of 3.5 s (Table III).
-SOLE_SHARE, TOE_SHARE = 0.5 / 3.5, 1.4 / 3.5
+STEP_TIME = 3.5  # t3, for which the times of the rear foot are given (Table III) [s]
 # A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
 NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
 # A plan whose legs reach on common stairs; neither optimal nor balanced.
@@ -72,13 +71,18 @@ PARAMETERS = (
 
 
 @maker
-def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
+def stairs_ideal(
+    *, ends: Ends = "rest", sole_off_s: float = 0.5, toe_off_s: float = 1.4, intervals: int = 70
+) -> GaitProblem:
     """Return the trajectory optimisation of one step.
 
     States are angles and rates of the seven links that move while the stance foot stands flat; controls are their
     accelerations and the ground's forces on sole and toe of the rear foot.
 
     Args:
+        ends: rest, both ends at rest on flat feet; moving, any rates at the ends and a landing on the toe, as in a planned step.
+        sole_off_s: time at which the rear sole lifts, in a step of 3.5 s; in others in proportion.
+        toe_off_s: time at which the rear toe lifts.
         intervals: equal parts of the step, at least 10.
 
     Source:
@@ -86,9 +90,11 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
     """
     if intervals < 10:
         raise InputError(f"intervals must be a whole number >= 10, got {intervals!r}")
-    sole_off, toe_off = round(SOLE_SHARE * intervals), round(TOE_SHARE * intervals)
+    if not 0 < sole_off_s < toe_off_s < STEP_TIME:
+        raise InputError(f"times must satisfy 0 < sole_off_s < toe_off_s < {STEP_TIME}, got {sole_off_s}, {toe_off_s}")
+    sole_off, toe_off = (max(1, round(time / STEP_TIME * intervals)) for time in (sole_off_s, toe_off_s))
     layout = _layout(intervals, sole_off, toe_off)
-    model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off)
+    model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off, ends=ends)
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         return _start(layout, intervals, parameters, rng)
@@ -147,7 +153,11 @@ def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
         objective=Objective(name="effort", unit="1"),
         assemble=model.assemble,
         grid=Grid(intervals=intervals),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion, repeats=True)),
+        display=Display(
+            motion=motion,
+            skeleton=skeleton,
+            simulation_model=simulation_model(step_motion, repeats=ends == "rest"),
+        ),
         hints=SolverHints(start=start, starts=3, searchable=False),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -20,6 +21,7 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that replaces an edge of the stair [m]
 AXES = ("x", "z")
+Ends = Literal["rest", "moving"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,6 +32,7 @@ class IdealModel:
     intervals: int  # N, equal parts of the step
     sole_off: int  # number of intervals with load on the rear sole
     toe_off: int  # number of intervals with load on the rear toe: the double support
+    ends: Ends
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
         """Return objective and constraints; everything is smooth."""
@@ -86,22 +89,24 @@ class IdealModel:
         return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
 
     def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
-        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends, and a still torso."""
+        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends if required, and a still torso."""
         n = self.intervals
         q, v, a = x["angle"], x["rate"], x["acceleration"]
         rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
         angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
         steps = range(1, n + 1)
         torso = v[MOVING.index("UH"), 1:n]
+        rest = _equal("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
+        still = _equal("torso_starts_still", v[MOVING.index("UH"), 0], ("UH",), (0,), "rad/s", 1.0)
         return (
             _equal("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
             _equal("angle_continuity", angles, MOVING, steps, "rad", 0.1),
-            _equal("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0),
+            rest if self.ends == "rest" else still,
             _equal("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
         )
 
     def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
-        """Return rows of the swing foot's positions and of its height above the stair."""
+        """Return rows of the swing foot's positions and of its height above the stair; one that moves lands on its toe."""
         n, lift = self.intervals, self.toe_off
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
@@ -110,6 +115,10 @@ class IdealModel:
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
         toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(toe_foot_biped().foot_m, 0) - size, 1, lift)
         ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
+        flat_at = [0, n]
+        if self.ends == "moving":
+            ends[:, 1] = swing_toe[:, n] - ca.vertcat(toe_foot_biped().foot_m, 0) - size
+            flat_at = [0]
         advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
@@ -119,7 +128,7 @@ class IdealModel:
         return (
             _equal("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
             _equal("toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1),
-            _equal("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
+            _equal("foot_flat", flat[:, flat_at], ("AS", "ST"), tuple(flat_at), "rad", 0.1),
             _equal("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
             _equal("hip_advance", advance, AXES, (n,), "m", 0.01),
             above("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), in_support),

@@ -37,9 +37,16 @@ from nlp_gait.gaits.stairs.display import (
     simulation_model,
     skeleton,
 )
-from nlp_gait.gaits.stairs.plan_samples import GROUND_SHARE, PlannedStep, PlanSamples, grid_at, reach_function
+from nlp_gait.gaits.stairs.plan_samples import (
+    GROUND_SHARE,
+    BalanceRule,
+    PlannedStep,
+    PlanSamples,
+    grid_at,
+    reach_function,
+)
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
-from nlp_gait.gaits.stairs.planned_motion import PHASES
+from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -55,6 +62,7 @@ VARIABLES = (
 # half of all runs of IPOPT end at unreachable poses. Of two optima, the better one catches the cycloid early (t_bc at 1.0 to
 # 1.4 s on the stairs of Table IV, instead of 2.7 to 2.8 s), as the starts do.
 PLAUSIBLE = (0.67, 0.09, 0.25, 0.08, 1.0, 1.4, 0.5, 1.0, 1.4, 0.35, 0.2)
+ZMP_OF_STANDING = 0.08  # of the first step's start points, ahead of the ankles, where the hip stands still [m]
 SCATTER = 0.1
 DRAWS = 100
 PARTS_AT_START = 10  # of each phase, at which the legs of a start point reach
@@ -83,29 +91,41 @@ PARAMETERS = (
 
 
 @maker
-def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitProblem:
+def stairs_plan(
+    *, minimise: Minimise = "energy", step: StepKind = "next", balance: BalanceRule = "feet", intervals: int = 40
+) -> GaitProblem:
     """Return the planner of one step.
 
     Args:
         minimise: energy, the integral of sum |torque x rate| over all joints, or the peak of the joints' jerk (the paper's
             knot shifting).
+        step: next, over a flat stance foot; landing, the same with the stance foot's reverse double support until t2; first,
+            one step up from standing at rest, with the hip from above the planned ZMP to where the next step starts.
+        balance: feet, the centre of pressure below the stance foot; polygon, as printed, the ZMP of (49) in the convex hull of
+            the contact points.
         intervals: of the step, a quarter in each phase.
 
     Source:
         Bhardwaj et al., section V and Table III.
     """
+    if step == "landing" and balance == "feet":
+        raise InputError(
+            "step 'landing' needs balance 'polygon': while it lands, the stance foot touches with its toe only"
+        )
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
-    step = PlannedStep(per_phase=intervals // len(PHASES))
+    planned = PlannedStep(per_phase=intervals // len(PHASES), kind=step, balance=balance)
+    variables = VARIABLES if balance == "feet" else stair.GOVERNING_VARIABLES
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return _assemble(point, step, minimise, ops)
+        return _assemble(point, planned, minimise, ops)
 
     def motion(at: NumericPoint) -> Signals:
-        samples = step.samples(at, Exact())
+        samples = planned.samples(at, Exact())
         arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
         moving = stair.joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
+        renamed["power"] = arrays.pop("power")[:, : len(JOINTS)]
         return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
 
     def step_motion(at: NumericPoint) -> StepMotion:
@@ -121,16 +141,20 @@ def stairs_plan(*, minimise: Minimise = "energy", intervals: int = 40) -> GaitPr
     return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
-        variables=VARIABLES,
+        variables=variables,
         own_parameters=PARAMETERS,
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion)),
-        hints=SolverHints(start=_start),
+        display=Display(
+            motion=motion,
+            skeleton=skeleton,
+            simulation_model=simulation_model(step_motion) if step == "next" and balance == "feet" else None,
+        ),
+        hints=SolverHints(start=partial(_start, step, variables)),
         rows_over_time=tuple(
             RowsOverTime(
-                name=name, assemble=partial(_at_phases, step, i), times=partial(_phase_times, i), means=("energy_J",)
+                name=name, assemble=partial(_at_phases, planned, i), times=partial(_phase_times, i), means=("energy_J",)
             )
             for i, name in enumerate(PHASES)
         ),
@@ -157,14 +181,16 @@ def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: 
         heights = step.clearances(point, ops, grid_at(phase, share(fractions)))
         clear = (_clearance(heights, point["clearance_m"]),)
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
-    return Assembly(objective=energy, constraints=(*_rows_at(point, samples), *clear), indexes={"energy_J": energy})
+    return Assembly(
+        objective=energy, constraints=(*_rows_at(point, samples, step.balance), *clear), indexes={"energy_J": energy}
+    )
 
 
 def _clearance(heights: MX, least: MX) -> Constraint:
     return stair.rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
 
 
-def _rows_at(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
+def _rows_at(point: Point, samples: PlanSamples, balance: BalanceRule) -> tuple[Constraint, ...]:
     """Return rows of reach, link angles, knees, accelerations and ground at every sample."""
     m = samples.q.shape[1]
     lower, upper = (MX(DM([stair.ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
@@ -176,49 +202,66 @@ def _rows_at(point: Point, samples: PlanSamples) -> tuple[Constraint, ...]:
         stair.rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
         stair.stance_load(point, samples.stance_force),
         stair.grip("friction", samples.stance_force, point["friction"]),
-        stair.stance_zmp(point, samples.stance_pressure),
+        stair.stance_zmp(point, samples.stance_pressure) if balance == "feet" else _polygon_zmp(point, samples),
     )
+
+
+def _polygon_zmp(point: Point, samples: PlanSamples) -> Constraint:
+    """Return rows for the ZMP of (49) between the outer contact points, with the margin parameter."""
+    rear, front = ca.vertsplit(samples.support)
+    ahead = ca.vertcat(samples.zmp - rear, front - samples.zmp)
+    return stair.rows("zmp", ahead, ("rear", "front"), "m", 0.01, lower=point["zmp_margin_m"])
 
 
 def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmooth) -> Assembly:
     samples = step.samples(point, ops)
     jerk = step.jerk(samples, point["quantum_s"])
     exact = Exact()
-    pressure = samples.stance_pressure.T
+    pressure, rear, front = samples.stance_pressure.T, MX(0), MX(toe_foot_biped().foot_m)
+    if step.balance == "polygon":
+        pressure, rear, front = samples.zmp.T, samples.support[0, :].T, samples.support[1, :].T
     least_clearance = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
     ends = ca.vertcat(*(point[name] if name else 0 for name in PHASE_ENDS))
     durations, least = ends[1:] - ends[:-1], point["least_phase_s"]
+    leaning = samples.qd[MOVING.index("K'A'"), 0]
+    rest = (stair.rows("rest", leaning, ("K'A'",), "rad/s", 0.1, lower=0.0, upper=0.0),) if step.kind == "first" else ()
     return Assembly(
         objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
-            *_rows_at(point, samples),
+            *_rows_at(point, samples, step.balance),
             _clearance(step.clearances(point, ops), least_clearance),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
+            *rest,
         ),
         indexes={
             "energy_J": step.energy(samples, exact),
             "peak_jerk_rad_s3": exact.largest(jerk),
             "peak_acceleration_rad_s2": exact.largest(ca.vec(DM(JOINT_RATES) @ samples.qdd)),
             "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
-            "zmp_margin_min_m": ca.mmin(exact.min(pressure, toe_foot_biped().foot_m - pressure)),
+            "zmp_margin_min_m": ca.mmin(exact.min(pressure - rear, front - pressure)),
         },
     )
 
 
-def _start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+def _start(
+    kind: StepKind, variables: tuple[Variable, ...], parameters: Mapping[str, float], rng: np.random.Generator
+) -> Array:
     """Draw a point around the plausible plan, again until every phase has a duration and the legs reach."""
-    ranges = np.array([variable.upper - variable.lower for variable in VARIABLES])
+    ranges = np.array([variable.upper - variable.lower for variable in variables])
     tread = parameters["stair_length_m"] / 2
     size, margin = [tread, parameters["rise_run_ratio"] * tread], parameters[stair.REACH_MARGIN[0]]
     given = [parameters[parameter.name] for parameter in stair.GIVEN_PARAMETERS]
-    lower, upper = (np.array([parameters[f"{v.name}.{end}"] for v in VARIABLES]) for end in ("lower", "upper"))
+    lower, upper = (np.array([parameters[f"{v.name}.{end}"] for v in variables]) for end in ("lower", "upper"))
+    about = np.array(PLAUSIBLE[: len(variables)])
+    if kind == "first":
+        about[[v.name for v in variables].index("zmp_start_m")] = ZMP_OF_STANDING
     best, least = np.empty(0), inf
     for _ in range(DRAWS):
-        x = np.clip(np.array(PLAUSIBLE) + SCATTER * ranges * rng.standard_normal(len(VARIABLES)), lower, upper)
+        x = np.clip(about + SCATTER * ranges * rng.standard_normal(len(variables)), lower, upper)
         plan = np.concatenate([x[: len(stair.GOVERNING_VARIABLES)], given])
         named = dict(zip(stair.GOVERNING, plan, strict=True))
         durations = np.diff([0.0, *(named[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))])
-        out_of_reach = np.array(reach_function(PARTS_AT_START)(plan, size, margin)) - (1 - margin)
+        out_of_reach = np.array(reach_function(PARTS_AT_START, kind)(plan, size, margin)) - (1 - margin)
         too_short = parameters["least_phase_s"] - durations
         violation = float(np.maximum(too_short, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum())
         if not best.size or violation < least:

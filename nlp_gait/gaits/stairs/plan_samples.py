@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Point
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, link_angles, loads, points
-from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, posture, stair_height
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, link_angles, loads, points
+from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind, posture, stair_height
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.support import compute_balance
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 # Checks of the swing foot against the stair per interval; none while the toe leaves or meets the ground.
 CLEARANCE_DENSITY = 4
 GROUND_SHARE = 0.1
+BalanceRule = Literal["feet", "polygon"]
+"""What keeps a planned step upright: ``feet``, the centre of pressure below the stance foot, with a variable share of the load
+on the rear toe; ``polygon``, as printed, the ZMP of (49) in the convex hull of all contact points."""
 
 
 class PlanSamples(NamedTuple):
@@ -32,12 +36,15 @@ class PlanSamples(NamedTuple):
     qdd: MX  # (7, m) [rad/s^2]
     reach: MX  # (2, m) cosines of swing and stance knee
     torque: MX  # (7, m) of the joints [Nm], in the order of JOINTS
-    power: MX  # (7, m) of the joints [W], signed
+    power: MX  # (7, m) of the joints [W], signed; with ``polygon`` an eighth row for the standing toe
     stance_force: MX  # (2, m) of the ground on the stance foot [N]
     stance_pressure: MX  # (1, m) its centre ahead of the stance ankle [m]
     zmp: MX  # (1, m) of the whole robot on the virtual slope, ahead of the stance ankle [m]
     hip: MX  # (2, m) [m]
     ankle: MX  # (2, m) of the swing leg [m]
+    stance_foot: MX  # (2, m) angles of the stance foot's sole and toe [rad]
+    stance_ankle: MX  # (2, m) [m]
+    support: MX  # (2, m) rear and front end of the contact points; with ``feet`` both are zero [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,6 +52,8 @@ class PlannedStep:
     """Per-sample functions of a planned step and their grid."""
 
     per_phase: int  # equal parts of each phase
+    kind: StepKind = "next"
+    balance: BalanceRule = "feet"
 
     @cached_property
     def grid(self) -> tuple[DM, Array]:
@@ -60,11 +69,14 @@ class PlannedStep:
     def samples(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> PlanSamples:
         """Return the step at all samples, or at those of another grid."""
         s, passing = grid or self.grid
-        return PlanSamples(*self._map_samples(sample_function(ops), point, s, passing, point["rear_share"]))
+        if self.balance == "polygon":
+            return PlanSamples(*self._map_samples(balanced_function(ops, self.kind), point, s, passing))
+        function = sample_function(ops, self.kind)
+        return PlanSamples(*self._map_samples(function, point, s, passing, point["rear_share"]))
 
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._map_samples(clearance_function(ops), point, *(grid or self.clearance_grid))
+        return self._map_samples(clearance_function(ops, self.kind), point, *(grid or self.clearance_grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -122,14 +134,14 @@ def _dynamics() -> ca.Function:
     return ca.Function("loads", [q, qd, qdd, toe], list(found))
 
 
-def sample_function(ops: Nonsmooth) -> ca.Function:
+def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample to the fields of ``PlanSamples``.
 
     Its inputs are s, the current phase, governing parameters, size, reach margin and rear share.
 
     The rear toe carries a share of the whole ground force, which falls from ``rear share`` to zero over the double support.
     """
-    inputs, plan, stair, step = _make_symbols(ops)
+    inputs, plan, stair, step = _make_symbols(ops, kind)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
     dynamics = _dynamics()
@@ -137,36 +149,47 @@ def sample_function(ops: Nonsmooth) -> ca.Function:
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))
     torque, stance_force, pressure = dynamics(*step.q, share * force)
-    slope = stair.rise / stair.tread
+    slope = _slope(stair, kind)
     # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
     zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
-    outputs = [
-        ca.dot(plan.durations, s),
-        *step.q,
-        step.reach,
-        torque,
-        torque * (DM(JOINT_RATES) @ step.q.velocity),
-        stance_force,
-        pressure,
-        zmp,
-        step.hip.position,
-        step.ankle.position,
-    ]
+    power = torque * (DM(JOINT_RATES) @ step.q.velocity)
+    outputs = _list_outputs(inputs, plan, step, torque, power, stance_force, pressure, zmp, SX(2, 1))
     return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
 
 
-def clearance_function(ops: Nonsmooth) -> ca.Function:
-    """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``sample_function`` but the last."""
-    inputs, _, stair, step = _make_symbols(ops)
-    found = points(toe_foot_biped().rods, link_angles(step.q.position), SX(2, 1))
-    heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH) for name in "TSA"]
+def balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+    """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
+    inputs, plan, stair, step = _make_symbols(ops, kind)
+    s, passing, *_ = inputs
+    found = compute_balance(toe_foot_biped().rods, GRAVITY, step, plan, s, passing, _slope(stair, kind), kind)
+    torque, power, *ground = found
+    outputs = _list_outputs(inputs, plan, step, torque[: len(JOINTS)], power, *ground)
+    return ca.Function("sample", inputs, ca.cse(outputs))
+
+
+def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) -> list[SX]:
+    *loads, support = loads
+    places = [step.hip.position, step.ankle.position, step.foot.position, step.stance_ankle.position]
+    return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads, *places, support]
+
+
+def _slope(stair: Stair[SX], kind: StepKind) -> SX:
+    """Slope k of (49); the hip does not rise in the first step."""
+    return SX(0) if kind == "first" else stair.rise / stair.tread
+
+
+def clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+    """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``balanced_function``."""
+    inputs, _, stair, step = _make_symbols(ops, kind)
+    found = points(toe_foot_biped().rods, link_angles(step.q.position), step.stance_ankle.position)
+    heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
 @cache
-def reach_function(per_phase: int) -> ca.Function:
+def reach_function(per_phase: int, kind: StepKind) -> ca.Function:
     """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
-    inputs, _, _, step = _make_symbols(Exact())
+    inputs, _, _, step = _make_symbols(Exact(), kind)
     s, passing = PlannedStep(per_phase=per_phase).grid
     one = ca.Function("reach", inputs, [ca.cse(step.reach)])
     given = [SX.sym("given", size.shape) for size in inputs[2:]]
@@ -176,10 +199,10 @@ def reach_function(per_phase: int) -> ca.Function:
     )
 
 
-def _make_symbols(ops: Nonsmooth) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+def _make_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = make_stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops)
+    step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops, kind)
     return [s, passing, values, size, margin], plan, stair, step

@@ -59,10 +59,10 @@ def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, place: SX, base: str =
 
     The base is the stance ankle A' or the hip H.
     """
-    return _sum_along_links(base, place, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
+    return sum_along_links(base, place, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
 
 
-def _sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str, V]:
+def sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str, V]:
     """Return sums along the links from the base to every point, by the point's name."""
     found = {base: place}
     for link, sense in _PATHS[base]:
@@ -73,7 +73,7 @@ def _sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str
 
 def _couplings(rods: Mapping[str, Rod], base: str) -> np.ndarray:
     """(9, 9) W [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, where u_i are the directions."""
-    arms = _sum_along_links(
+    arms = sum_along_links(
         base, np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)]
     )
     middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])

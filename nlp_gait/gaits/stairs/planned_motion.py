@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, Literal, NamedTuple, TypeVar
 
 import casadi as ca
 from casadi import SX
@@ -25,6 +25,9 @@ _LEAST_ROOT_SQUARED = 1e-6
 _LATEST = 1.0
 
 E = TypeVar("E")
+StepKind = Literal["next", "landing", "first"]
+"""Which step is planned: ``next`` over a stance foot that stands flat all the time; ``landing``, the same with the reverse double
+support: the stance foot, which landed on its toe, turns down until t2; ``first``, one step up from standing on both feet."""
 
 
 class Stair(NamedTuple, Generic[E]):
@@ -66,15 +69,18 @@ class ToeFoot(NamedTuple):
     toe: float
 
 
-def stair_height(x: SX, stair: Stair[SX], setback: float, width: float) -> SX:
+def stair_height(x: SX, stair: Stair[SX], setback: float, width: float, step: StepKind = "next") -> SX:
     """Return the height of the ground under a point at x, relative to the stance ankle [m].
 
     The edge of each step is ``setback`` behind the ankle that stands on it; half of its rise happens within 2.2 widths [m].
+    Below the first step there is only floor.
     """
 
     def edge(at: SX | float) -> SX:
         return 0.5 * (1 + ca.tanh((x - at + setback) / (2 * width)))
 
+    if step == "first":
+        return stair.rise * edge(stair.tread)
     return stair.rise * (edge(0.0) + edge(stair.tread) - 1)
 
 
@@ -108,9 +114,15 @@ def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     The motion of the rear foot backwards in time: about the tip of the toe, then about the sole; see ``ankle_on_toe``.
     """
     first, second = ca.vertsplit(plan.durations[:2])
-    remaining = first * (1 - s[0]) + second * (1 - s[1])
+    remaining = landing_share(plan, s) * first
     back = ca.vertcat(ca.fmin(remaining / first, 1), ca.fmax((remaining - first) / second, 0), 0, 0)
     return foot_angles(plan, back)
+
+
+def landing_share(plan: StairPlan, s: SX) -> SX:
+    """Return the time until the landed foot is flat as a share of t1: above 1 it stands on its toe, then on its sole."""
+    first, second = ca.vertsplit(plan.durations[:2])
+    return (first * (1 - s[0]) + second * (1 - s[1])) / first
 
 
 def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
@@ -150,8 +162,11 @@ def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
     return rising + (bridge - p1) + (cycloid(angle) - p4)
 
 
-def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX) -> SX:
+def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX, step: StepKind = "next") -> SX:
     """(2,) position of the hip [m], from the fractions s (4,) of the phases.
+
+    In the first step it stays level ("no change in hip altitude"), starts above the planned ZMP, where it can stand still,
+    and ends where the next step starts.
 
     Source:
         Bhardwaj et al., eqs. (21)-(26), with the arc of (25) as z_Ci + R - sqrt(R^2 - (x - x_start)^2): as printed it does
@@ -159,19 +174,24 @@ def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX) -> SX:
     """
     t = ca.dot(plan.durations, s)
     rate = ca.sqrt(gravity / plan.hip_height)  # (eq. 24)
-    planned_rise = stair.tread + plan.zmp_end - plan.zmp_start
+    first, last, zmp_last = plan.hip_start, plan.hip_start + stair.tread, stair.tread + plan.zmp_end
+    if step == "first":
+        first, last, zmp_last = plan.zmp_start, plan.hip_start, plan.zmp_end
+    planned_rise = zmp_last - plan.zmp_start
     a2, a3 = 3 * planned_rise / plan.t3**2, -2 * planned_rise / plan.t3**3  # (eq. 26)
 
     def particular(time: SX) -> SX:
         return plan.zmp_start + a2 * time**2 + a3 * time**3 + (6 * a3 * time + 2 * a2) / rate**2  # (eq. 23)
 
-    start = plan.hip_start - particular(SX(0))
-    end = plan.hip_start + stair.tread - particular(plan.t3)
+    start = first - particular(SX(0))
+    end = last - particular(plan.t3)
     # C1 exp(w t) + C2 exp(-w t), written so that neither exponential is large.
     fading = ca.exp(-rate * plan.t3)
     ahead = (end - start * fading) / (1 - fading**2)
     behind = (start - end * fading) / (1 - fading**2)
     x = particular(t) + ahead * ca.exp(rate * ca.fmin(t - plan.t3, _LATEST)) + behind * ca.exp(-rate * t)
+    if step == "first":
+        return ca.vertcat(x, plan.hip_height)
 
     arc = 2 * ca.atan2(stair.rise, stair.tread)
     radius = stair.tread / ca.sin(arc)
@@ -200,12 +220,14 @@ def _first_cycloid_angle(m: SX) -> SX:
 
 
 class Posture(NamedTuple):
-    """Planned motion of the whole robot at one instant, origin at the stance ankle."""
+    """Planned motion of the whole robot at one instant, origin at the ankle of the stance foot when it is flat."""
 
     q: Motion  # (7,) absolute link angles in the order of ``loads.MOVING`` [rad], with rates and accelerations
     reach: SX  # (2,) cosines of the swing and the stance knee: above 1 the ankle is out of reach
     hip: Motion  # (2,) [m]
     ankle: Motion  # (2,) of the swing leg [m]
+    foot: Motion  # (2,) angles of the stance foot's sole and toe [rad]
+    stance_ankle: Motion  # (2,) [m]
 
 
 def posture(
@@ -217,20 +239,29 @@ def posture(
     rates: SX,
     margin: SX,
     ops: Nonsmooth,
+    step: StepKind = "next",
 ) -> Posture:
     """Return the posture at fractions s (4,) of the phases, symbols; their rates (4,) are 1 / duration now, else 0 [1/s].
 
     The margin is on the cosine of a knee.
     """
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
-    swing_foot = ToeFoot(rods["AS"].length, rods["ST"].length)
-    at_hip = in_time(hip(plan, stair, gravity, s) - stance, s, rates)
-    at_ankle = in_time(ankle(plan, stair, swing_foot, s) - stance, s, rates)
+    climbed = stair  # half of the swing foot's way
+    if step == "first":
+        stance, climbed = SX(2, 1), Stair(stair.tread / 2, stair.rise / 2)
+    foot = ToeFoot(rods["AS"].length, rods["ST"].length)
+    at_hip = in_time(hip(plan, stair, gravity, s, step) - stance, s, rates)
+    at_ankle = in_time(ankle(plan, climbed, foot, s) - stance, s, rates)
+    stance_foot = stance_ankle = Motion(SX(2, 1), SX(2, 1), SX(2, 1))
+    if step == "landing":
+        stance_foot = in_time(ca.vertcat(*landed_angles(plan, s)), s, rates)
+        stance_ankle = in_time(ankle_on_toe(foot, *landed_angles(plan, s)), s, rates)
     swing, swing_reach = _leg(rods, at_hip, at_ankle, margin, ops)
-    support, support_reach = _leg(rods, at_hip, Motion(SX(2, 1), SX(2, 1), SX(2, 1)), margin, ops)
+    support, support_reach = _leg(rods, at_hip, stance_ankle, margin, ops)
     feet = in_time(ca.vertcat(*foot_angles(plan, s)), s, rates)
     torso = constant_motion(0.0)._replace(position=plan.torso_pitch)
-    return Posture(stack(swing, support, torso, feet), ca.vertcat(swing_reach, support_reach), at_hip, at_ankle)
+    reach = ca.vertcat(swing_reach, support_reach)
+    return Posture(stack(swing, support, torso, feet), reach, at_hip, at_ankle, stance_foot, stance_ankle)
 
 
 def _leg(rods: Mapping[str, Rod], at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:

@@ -1,0 +1,125 @@
+"""Balance as the paper checks it: the ZMP of (49) in the convex hull of the contact points, and the torques that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, Rod, centres, direction, sum_along_links
+from nlp_gait.gaits.stairs.planned_motion import Posture, StairPlan, StepKind, landing_share
+from nlp_gait.symbolic.trajectories import Motion
+
+_FOOT, _SWING = ("A'S'", "S'T'"), ("HK", "KA", "AS", "ST")
+# Of each joint: its point, the links on the side away from the stance toe, and whether its torque turns these clockwise.
+JOINT_SIDES = {
+    "ankle'": ("A'", ("K'A'", "HK'", "UH", *_SWING), 1),
+    "knee'": ("K'", ("HK'", "UH", *_SWING), 1),
+    "hip'": ("H", ("UH", *_SWING), -1),
+    "hip": ("H", _SWING, 1),
+    "knee": ("K", ("KA", "AS", "ST"), 1),
+    "ankle": ("A", ("AS", "ST"), 1),
+    "toe": ("S", ("ST",), 1),
+    "toe'": ("S'", ("A'S'", "K'A'", "HK'", "UH", *_SWING), 1),
+}
+LEAST_ARM = 1.0  # of the force on the rear foot about the centre of pressure of the other one [N m]
+
+
+class Balance(NamedTuple):
+    """Ground reaction and torques of the whole robot at one instant."""
+
+    torque: SX  # (8,) in the order of JOINT_SIDES [Nm]
+    power: SX  # (8,) [W]
+    stance_force: SX  # (2,) of the ground on the stance foot [N]
+    stance_pressure: SX  # its centre, ahead of the ankle of the flat stance foot [m]
+    zmp: SX  # (eq. 49) as printed: point masses, on the virtual slope in all phases; from the same point [m]
+    support: SX  # (2,) rear and front end of the contact points [m]
+
+
+def compute_balance(
+    rods: Mapping[str, Rod],
+    gravity: float,
+    step: Posture,
+    plan: StairPlan,
+    s: SX,
+    passing: SX,
+    slope: SX,
+    kind: StepKind,
+) -> Balance:
+    """Return ZMP, contact points and torques at fractions s (4,) of the phases, of which one is ``passing`` (4,).
+
+    Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
+    the forces on them are parallel. In the first step the swing foot carries nothing.
+    """
+    q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
+    at = _move_points(rods, Motion(q, v, a), step.stance_ankle)
+    middles = {
+        link: Motion(*parts)
+        for link, parts in zip(LINKS, zip(*(centres(part).values() for part in at), strict=True), strict=True)
+    }
+    push = {link: rods[link].mass * (middles[link].acceleration + ca.vertcat(0, gravity)) for link in LINKS}
+    turn = {link: rods[link].inertia * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(LINKS)}
+    force = sum(push.values(), SX(2, 1))
+    load = ca.fmax(force[1], LEAST_LOAD * gravity * sum(rod.mass for rod in rods.values()))
+    points = sum((_moment(middles[link].position, push[link]) for link in LINKS), SX(0))
+    moment = points + sum(turn.values(), SX(0))
+
+    place = at.position
+    sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
+    double = passing[0] + passing[1]
+    rear = rear_toe[0] + passing[0] * (rear_sole[0] - rear_toe[0])
+    heel = SX(0)
+    if kind == "landing":
+        on = landing_share(plan, s)
+        heel = double * ((on > 1) * toe[0] + (on > 0) * (on <= 1) * sole[0])
+    front = ca.fmin(ca.fmax(moment / load, heel), toe[0])
+    back = ca.vertcat(ca.fmin(ca.fmax(moment / load, rear), rear_toe[0]), rear_toe[1])
+    arm = ca.fmin(_moment(back, force) - front * load, -LEAST_ARM)
+    share = SX(0) if kind == "first" else double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
+
+    torque, rate = [], []
+    for name, (joint, links, sense) in JOINT_SIDES.items():
+        total = sum((_moment(middles[link].position - place[joint], push[link]) + turn[link] for link in links), SX(0))
+        torque.append(-sense * (total - share * _moment(back - place[joint], force)))
+        rate.append(_joint_rate(name, v))
+    pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, LEAST_LOAD * load)
+    behind = heel if kind == "first" else double * rear
+    return Balance(
+        ca.vertcat(*torque),
+        ca.vertcat(*torque) * ca.vertcat(*rate),
+        (1 - share) * force,
+        pressure,
+        points / ca.fmax(force[1] - slope * force[0], LEAST_LOAD * load),  # (eq. 49)
+        ca.vertcat(behind, toe[0]),
+    )
+
+
+def _move_points(rods: Mapping[str, Rod], q: Motion, ankle: Motion) -> Motion:
+    """Return points by name, their velocities and accelerations, from nine angles and the stance ankle."""
+
+    def along(link: str) -> Motion:
+        angle, rate, acceleration = (part[LINKS.index(link)] for part in q)
+        unit = direction(link, angle)
+        normal = direction(link, angle + ca.pi / 2)
+        return Motion(unit, rate * normal, acceleration * normal - rate**2 * unit)
+
+    found = (
+        sum_along_links("A'", base, lambda link, i=i: rods[link].length * along(link)[i])
+        for i, base in enumerate(ankle)
+    )
+    return Motion(*found)
+
+
+def _joint_rate(name: str, v: SX) -> SX:
+    """Return the rate of a joint from nine link rates: of the links on both its sides, torso counter-clockwise."""
+    pairs = {"ankle'": ("K'A'", "A'S'"), "knee'": ("HK'", "K'A'"), "hip'": ("HK'", "UH"), "hip": ("HK", "UH")}
+    pairs |= {"knee": ("KA", "HK"), "ankle": ("AS", "KA"), "toe": ("ST", "AS"), "toe'": ("A'S'", "S'T'")}
+    first, second = (v[LINKS.index(link)] for link in pairs[name])
+    return first + second if "UH" in pairs[name] else first - second
+
+
+def _moment(at: SX, force: SX) -> SX:
+    """Moment of a force about the origin, counter-clockwise [N m]."""
+    return at[0] * force[1] - at[1] * force[0]
