@@ -24,11 +24,14 @@ LINES = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), 
 def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     """Return the skeleton of the robot on its stair."""
     history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
-    q = SX.sym("q", history.shape[1])
-    found = points(toe_foot_biped().rods, q if q.numel() == len(LINKS) else link_angles(q), SX(2, 1))
-    function = ca.Function("points", [q], list(found.values()))
     samples = len(signals.arrays["t"])
-    values = dict(zip(found, function.map(samples)(history.T), strict=True))
+    if history.shape[1] == len(MOVING):
+        history = np.hstack([history, signals.arrays.get("stance_foot", np.zeros((samples, 2)))])
+    q, ankle = SX.sym("q", len(LINKS)), SX.sym("ankle", 2)
+    found = points(toe_foot_biped().rods, q, ankle)
+    function = ca.Function("points", [q, ankle], list(found.values()))
+    base = signals.arrays.get("stance_ankle", np.zeros((samples, 2)))
+    values = dict(zip(found, function.map(samples)(history.T, base.T), strict=True))
     at = {name: np.array(value.full().T) for name, value in values.items()}
     tread = parameters["stair_length_m"] / 2
     rise = tread * parameters["rise_run_ratio"]

@@ -168,9 +168,8 @@ def balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
 
 
 def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) -> list[SX]:
-    *loads, support = loads
     places = [step.hip.position, step.ankle.position, step.foot.position, step.stance_ankle.position]
-    return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads, *places, support]
+    return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
 
 
 def _slope(stair: Stair[SX], kind: StepKind) -> SX:

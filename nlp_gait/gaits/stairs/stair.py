@@ -47,6 +47,9 @@ COLUMNS = {
     "zmp": vector_columns("m", "x"),
     "hip": vector_columns("m", "xz"),
     "ankle": vector_columns("m", "xz"),
+    "stance_foot": Columns(unit="rad", labels=("A'S'", "S'T'")),
+    "stance_ankle": vector_columns("m", "xz"),
+    "support": Columns(unit="m", labels=("rear", "front")),
 }
 
 

@@ -54,19 +54,14 @@ def compute_balance(
     the forces on them are parallel. In the first step the swing foot carries nothing.
     """
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
-    at = _move_points(rods, Motion(q, v, a), step.stance_ankle)
-    middles = {
-        link: Motion(*parts)
-        for link, parts in zip(LINKS, zip(*(centres(part).values() for part in at), strict=True), strict=True)
-    }
-    push = {link: rods[link].mass * (middles[link].acceleration + ca.vertcat(0, gravity)) for link in LINKS}
+    place, middles = _move_points(rods, Motion(q, v, a), step.stance_ankle)
+    push = {link: rods[link].mass * (middles[link][1] + ca.vertcat(0, gravity)) for link in LINKS}
     turn = {link: rods[link].inertia * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(LINKS)}
     force = sum(push.values(), SX(2, 1))
     load = ca.fmax(force[1], LEAST_LOAD * gravity * sum(rod.mass for rod in rods.values()))
-    points = sum((_moment(middles[link].position, push[link]) for link in LINKS), SX(0))
+    points = sum((_moment(middles[link][0], push[link]) for link in LINKS), SX(0))
     moment = points + sum(turn.values(), SX(0))
 
-    place = at.position
     sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
     double = passing[0] + passing[1]
     rear = rear_toe[0] + passing[0] * (rear_sole[0] - rear_toe[0])
@@ -81,7 +76,7 @@ def compute_balance(
 
     torque, rate = [], []
     for name, (joint, links, sense) in JOINT_SIDES.items():
-        total = sum((_moment(middles[link].position - place[joint], push[link]) + turn[link] for link in links), SX(0))
+        total = sum((_moment(middles[link][0] - place[joint], push[link]) + turn[link] for link in links), SX(0))
         torque.append(-sense * (total - share * _moment(back - place[joint], force)))
         rate.append(_joint_rate(name, v))
     pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, LEAST_LOAD * load)
@@ -96,20 +91,20 @@ def compute_balance(
     )
 
 
-def _move_points(rods: Mapping[str, Rod], q: Motion, ankle: Motion) -> Motion:
-    """Return points by name, their velocities and accelerations, from nine angles and the stance ankle."""
+def _move_points(rods: Mapping[str, Rod], q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tuple[SX, SX]]]:
+    """Return positions of all points and positions and accelerations of the links' centres, from nine angles and the stance ankle."""
 
-    def along(link: str) -> Motion:
-        angle, rate, acceleration = (part[LINKS.index(link)] for part in q)
-        unit = direction(link, angle)
+    def position(link: str) -> SX:
+        return rods[link].length * direction(link, q.position[LINKS.index(link)])
+
+    def acceleration(link: str) -> SX:
+        angle, rate, change = (part[LINKS.index(link)] for part in q)
         normal = direction(link, angle + ca.pi / 2)
-        return Motion(unit, rate * normal, acceleration * normal - rate**2 * unit)
+        return rods[link].length * (change * normal - rate**2 * direction(link, angle))
 
-    found = (
-        sum_along_links("A'", base, lambda link, i=i: rods[link].length * along(link)[i])
-        for i, base in enumerate(ankle)
-    )
-    return Motion(*found)
+    place = sum_along_links("A'", ankle.position, position)
+    pushed = centres(sum_along_links("A'", ankle.acceleration, acceleration))
+    return place, {link: (at, pushed[link]) for link, at in centres(place).items()}
 
 
 def _joint_rate(name: str, v: SX) -> SX:
