@@ -92,7 +92,7 @@ def compute_balance(
 
 
 def _move_points(rods: Mapping[str, Rod], q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tuple[SX, SX]]]:
-    """Return positions of all points and positions and accelerations of the links' centres, from nine angles and the stance ankle."""
+    """Return places of all points, and places and accelerations of the links' centres."""
 
     def position(link: str) -> SX:
         return rods[link].length * direction(link, q.position[LINKS.index(link)])
