@@ -11,8 +11,9 @@ import numpy as np
 
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.stairs import stairs_motion
+from compare.papers.stairs import stairs_instants, stairs_motion
 from compare.papers.stairs import stairs_runs as runs
+from compare.papers.stairs import stairs_tracking as tracking
 from compare.papers.stairs.stairs_figures import draw_figures
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
@@ -28,8 +29,9 @@ NEAR_BOUND = 0.01  # of a gain's range
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     """Run plans and ideals, then track the best plans, then compute what follows from them."""
     findings = StairsFindings(effort=effort, runs=runner.run_tasks(runs.make_first_tasks(effort)))
-    findings.runs.update(runner.run_tasks(runs.make_track_tasks(findings)))
-    return replace(findings, others=runner.compute([*runs.make_computations(findings)], (runs, stairs_motion)))
+    findings.runs.update(runner.run_tasks([*runs.make_track_tasks(findings), *tracking.make_tracking_tasks(findings)]))
+    computations = [*runs.make_computations(findings), *tracking.make_tracking_computations(findings)]
+    return replace(findings, others=runner.compute(computations, (runs, stairs_motion, stairs_instants)))
 
 
 def compute_values(findings: StairsFindings) -> dict[str, Any]:
@@ -53,6 +55,7 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "end_rate": end_rate,
         **_count_gains_at_bounds(findings),
         **_compute_growth(findings),
+        **tracking.compute_tracking_values(findings),
     }
 
 
@@ -110,6 +113,7 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
         "printed-scheme": _list_results(findings, "printed"),
         "replay": _list_results(findings, "replay"),
         "learned": _list_results(findings, "learned"),
+        **tracking.make_tracking_tables(findings),
     }
 
 
@@ -233,4 +237,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
+    checks=tracking.TRACKING_CHECKS,
 )

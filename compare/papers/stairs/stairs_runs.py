@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from compare.papers.paper_runs import (
     make_search_tasks,
     make_start_tasks,
 )
+from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS
 from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay, swing_leg
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
@@ -27,7 +28,6 @@ from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.closed_loop import InverseKinematics
 from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, network_angles
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -64,6 +64,7 @@ class StairsEffort(Effort):
     runs: int = 3  # of each search
     plan_evaluations: int = 10_000
     track_evaluations: int = ANTS * ITERATIONS  # as in the paper
+    instant_evaluations: int = ANTS * ITERATIONS  # of each search of Algorithm 4
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
     track_settings: Mapping[str, Any] = field(default_factory=lambda: {"time_limit_s": 1200.0})
     # Tread and rise of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
@@ -87,7 +88,7 @@ class StairsEffort(Effort):
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
         gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + 1
-        case = gradient + 2 * len(ALGORITHMS) * self.runs + PER_CASE
+        case = gradient + (2 * len(ALGORITHMS) + len(CHOICES)) * self.runs + PER_CASE + len(INSTANTS)
         others = sum(1 + self.count_other_starts(rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2
 
@@ -243,7 +244,7 @@ def track_with_network(case: int, plan: Mapping[str, float], x: list[float]) -> 
     """Compare a tracked step whose desired leg angles come from the network with the closed form: cost and angles."""
     found: dict[str, float] = {}
     angles = []
-    for kind in get_args(InverseKinematics):
+    for kind in ("closed-form", "network"):
         problem = make_track_spec(case, plan, inverse_kinematics=kind).load()
         found[f"{kind} cost"] = evaluate(problem, x).objective["value"]
         angles.append(problem.signals(np.array(x)).arrays["q_desired"])

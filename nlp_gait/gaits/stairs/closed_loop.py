@@ -12,7 +12,7 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Point
-from nlp_gait.gaits.stairs.leg_network import solve_legs_by_network
+from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED, solve_legs_by_network
 from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, biped_dynamics, centres, link_angles, points
 from nlp_gait.gaits.stairs.planned_motion import Stair, posture, stair_height
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -29,7 +29,8 @@ from nlp_gait.symbolic.quantised import (
 )
 
 Scheme = Literal["implicit", "explicit"]
-InverseKinematics = Literal["closed-form", "network"]
+InverseKinematics = Literal["closed-form", "network", "printed-network"]
+Rates = Literal["exact", "differences"]
 Coordinates = Literal["joint", "printed", "link"]
 Base = Literal["stance-ankle", "hip"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
@@ -40,7 +41,8 @@ BASES: Mapping[Base, str] = {"stance-ankle": "A'", "hip": "H"}
 N = len(LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
 # k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
-# slope and the share of the links' spin in the ZMP. Nothing is ever differentiated with respect to it.
+# slope and the share of the links' spin in the ZMP, torques besides the controller's. Nothing is ever differentiated with
+# respect to it.
 GIVEN = {
     "aim": 2 * N,
     "time": 1,
@@ -51,6 +53,7 @@ GIVEN = {
     "base": 6,
     "slope": 1,
     "spin": 1,
+    "torque": N,
 }
 TORSO = LINKS.index("UH")
 # Link from which the angle of another one is measured, the others' from the forward axis. Knees are as in (27), (28).
@@ -96,6 +99,7 @@ class ClosedLoop:
     inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
     coordinates: Coordinates = "joint"  # what the controller measures and drives
     base: Base = "stance-ankle"  # pinned to its step; or the hip, on its planned curve
+    rates: Rates = "exact"  # desired ones: derivatives of the plan, or differences of its angles over a quantum
 
     @cached_property
     def joints(self) -> DM:
@@ -110,8 +114,12 @@ class ClosedLoop:
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
         planned = _make_desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
         desired, place, speed = ca.vertsplit(planned, [0, 2 * N, 2 * N + 2, 2 * N + 4])
-        if self.inverse_kinematics == "network":
-            desired = solve_legs_by_network(desired)
+        if self.inverse_kinematics != "closed-form":
+            settings = ONLINE if self.inverse_kinematics == "network" else PRINTED
+            desired = solve_legs_by_network(desired, settings)
+        if self.rates == "differences":
+            differences = (desired[:N, 1:] - desired[:N, :-1]) / QUANTUM
+            desired = ca.vertcat(desired[:N, :], ca.horzcat(desired[N:, 0], differences))
         constants = ca.vertcat(
             size,
             *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
@@ -128,6 +136,7 @@ class ClosedLoop:
             base if self.base == "hip" else DM(6, self.quanta),
             stair.rise / stair.tread * on_slope,
             ca.repmat(point["spin_in_zmp"], 1, self.quanta),
+            DM(N, self.quanta),
         )
         return QuantumInputs(desired, given)
 
@@ -169,7 +178,7 @@ class ClosedLoop:
         ]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
         inertia = ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push  # of links that the base accelerates
-        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) - inertia
+        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) - inertia + parts["torque"]
         if self.scheme == "implicit":
             return implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
         return explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
@@ -182,7 +191,7 @@ class ClosedLoop:
         rods, base = toe_foot_biped().rods, BASES[self.base]
         G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q, base).G
         acted = following if self.scheme == "implicit" else state
-        torque = controller_torque(parts["control"], parts["desired"], acted, G)
+        torque = controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)

@@ -112,9 +112,10 @@ class NetworkSettings:
         return np.concatenate([inner.ravel(order="F"), outer.ravel(order="F")])
 
 
-# Gradient steps, as printed, at a rate with which every pose of the three planned steps converges within 40 of them; the
-# printed 5,000 would take a minute for each rollout, as all of them are evaluated.
+# Gradient steps at a rate with which every pose of the three planned steps converges within 40 of them; the printed 5,000 at
+# the printed rate (Table II) take a minute for each rollout, as all of them are evaluated.
 ONLINE = NetworkSettings(rule="gradient", rate=0.3, iterations=100)
+PRINTED = NetworkSettings(rule="gradient", rate=1e-4)
 LEGS = (("HK", "KA"), ("HK'", "K'A'"))
 
 
@@ -147,7 +148,7 @@ def network_angles(
     return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def solve_legs_by_network(desired: MX) -> MX:
+def solve_legs_by_network(desired: MX, settings: NetworkSettings = ONLINE) -> MX:
     """Replace desired angles and rates (18, m) of thighs and shanks along a path by those of the network.
 
     The network learns the ankle's position relative to the hip; rates follow by differentiating its forward kinematics. It
@@ -164,10 +165,10 @@ def solve_legs_by_network(desired: MX) -> MX:
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
         rates = ca.Function("rates", [q, velocity], [leg_rates(q, velocity, *lengths)]).map(columns)
         train = make_training_path(
-            ONLINE.hidden, *lengths, columns, ONLINE.rate, ONLINE.iterations, ONLINE.tolerance_m2
+            settings.hidden, *lengths, columns, settings.rate, settings.iterations, settings.tolerance_m2
         )
         targets, velocities = follow(ca.vertcat(*(rows[i] for i in at[:2])), ca.vertcat(*(rows[i] for i in at[2:])))
-        angles = train(DM(ONLINE.first_weights), targets)
+        angles = train(DM(settings.first_weights), targets)
         for i, row in zip(at, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):
             rows[i] = row
     return ca.vertcat(*rows)

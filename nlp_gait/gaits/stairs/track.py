@@ -34,6 +34,7 @@ from nlp_gait.gaits.stairs.closed_loop import (
     Coordinates,
     InverseKinematics,
     N,
+    Rates,
     Rollout,
     Scheme,
 )
@@ -99,6 +100,7 @@ def stairs_track(
     inverse_kinematics: InverseKinematics = "closed-form",
     coordinates: Coordinates = "joint",
     base: Base = "stance-ankle",
+    rates: Rates = "exact",
     zmp: ZmpRule = "limits",
     tracking_limit: bool = True,
     duration_s: float = 3.5,
@@ -111,10 +113,12 @@ def stairs_track(
         gains: one K_p and K_d for all links as in the paper, or one for each link.
         scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
-            quantum's pose within each evaluation (which makes one many times slower).
-        coordinates: what the controller measures and drives: joint angles and torques; as printed only the knees are joints
-            (27), (28), and other angles are those of links; or all angles are those of links.
+            quantum's pose within each evaluation (which makes one many times slower); or that at the printed rate and number
+            of iterations, with which few poses converge.
+        coordinates: what the controller measures and drives, and the disturbance acts on: joint angles and torques; as printed
+            only the knees are joints (27), (28), and other angles are those of links; or all angles are those of links.
         base: stance ankle, pinned to its step, with five contacts; or the hip on its planned curve, with the paper's six.
+        rates: desired rates of the angles: exact, or as printed by differences over a quantum.
         zmp: within the supporting polygon (Algorithm 3), with the least margin maximised; or a penalty outside it.
         tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
         duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
@@ -133,6 +137,7 @@ def stairs_track(
         inverse_kinematics=inverse_kinematics,
         coordinates=coordinates,
         base=base,
+        rates=rates,
     )
     limits = {"lower": 0.0, "upper": LARGEST_GAIN, "minimum": 0.0, "maximum": 1e6}
     variables = (
@@ -199,7 +204,7 @@ def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_l
     quanta = loop.state.shape[1]
     errors = ca.diagcat(joints, joints) @ (loop.state - loop.desired)
     power = loop.torque * (joints @ loop.state[N:, :])
-    rear, front = _support_polygon(point, quanta)
+    rear, front = support_polygon(point, quanta)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
     balance = _outside(loop.zmp.T, rear, front, ops) if rule == "penalty" else -_margin(loop.zmp.T, rear, front, ops)
@@ -216,6 +221,7 @@ def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_l
         objective=tracking + effort + point["zmp_weight"] * balance,
         constraints=tuple(constraints),
         indexes={
+            "controller_cost": ca.sum1(exact.abs(ca.vertcat(ca.vec(errors), ca.vec(power)))) / quanta,
             "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
             "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
             "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
@@ -226,7 +232,7 @@ def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_l
     )
 
 
-def _support_polygon(point: Point, quanta: int) -> tuple[MX, MX]:
+def support_polygon(point: Point, quanta: int) -> tuple[MX, MX]:
     """Return the rear and front end of the support polygon at the end of each quantum, (m, 1) ahead of the stance ankle [m].
 
     The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.

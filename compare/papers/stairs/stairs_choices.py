@@ -1,0 +1,27 @@
+"""How the tracked step of the stairs paper may be read (``stairs_choices.toml``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import get_args
+
+from compare.papers.claims import read_tables
+from compare.papers.stairs.stairs_instants import Decides
+from nlp_gait.decoding import decode
+
+OURS, FREE, PRINTED = "ours", "free", "printed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """A reading of the tracked step: the plan that is followed, ``plan`` or ``jerk``, and options and values of the problem."""
+
+    text: str
+    plan: str = "plan"
+    options: Mapping[str, str | bool] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_choices.toml").items()}
+INSTANTS = tuple((name, decides) for name in (OURS, FREE, PRINTED) for decides in get_args(Decides))  # of Algorithm 4
