@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from tests.referee.series import Array, Series, atan2, sincos, sqrt, stack, time
 
@@ -14,7 +15,8 @@ THIGH, SHANK, WIDTH, SOLE = 0.19, 0.15, 0.12, 0.02
 BACK, FRONT, BREADTH = 0.03, 0.07, 0.055
 GRAVITY = 9.81
 F1_MAX, F2_MAX = 442.522, 0.13  # section 7
-INTERVALS = 20  # of Simpson's rule for (9)
+INTERVALS = 20  # of the indexes; every second one is an instant of the reach
+PANELS, NODES = 10, 16  # of Gauss's rule for (9)
 
 
 class Leg(NamedTuple):
@@ -36,7 +38,10 @@ def walk(X: Array, weight: float = 0.15, T: float = 1.0, static_load: bool = Fal
         static_load: the weight alone is the ground's load, as eq. (14) has it, without the masses' vertical acceleration.
     """
     s, n, H, h = X.T[:, None, :]
-    t = time(T * np.broadcast_to(np.linspace(0.0, 1.0, INTERVALS + 1)[:, None], (INTERVALS + 1, len(X))), 2)
+    nodes, weights = roots_legendre(NODES)
+    instants = [np.linspace(0.0, 1.0, INTERVALS + 1), *((k + (nodes + 1) / 2) / PANELS for k in range(PANELS))]
+    phases = np.concatenate(instants)[:, None]
+    t = time(T * np.broadcast_to(phases, (len(phases), len(X))), 2)
     # (4), (6) over the first step; P0 stands at the origin.
     swing_x = sincos((t - T / 2) * (np.pi / T))[0] * (s / 2)
     swing = stack([swing_x, -WIDTH, sincos((swing_x / s + 0.5) * np.pi)[0] * H])
@@ -53,9 +58,9 @@ def walk(X: Array, weight: float = 0.15, T: float = 1.0, static_load: bool = Fal
     vertical = masses * (GRAVITY + a[:, 2])
     load = GRAVITY * masses.sum() if static_load else vertical.sum(axis=0)
     zmp = [(p[:, k] * vertical - masses * a[:, k] * p[:, 2]).sum(axis=0) / load for k in (0, 1)]  # (14)
-    weights = np.where(np.arange(INTERVALS + 1) % 2, 4.0, 2.0)
-    weights[[0, -1]] = 1.0
-    Q = T * weights @ (zmp[0] ** 2 + zmp[1] ** 2) / (3 * INTERVALS)  # (9)
+    squares = (zmp[0] ** 2 + zmp[1] ** 2)[INTERVALS + 1 :]
+    Q = T * np.tile(weights, PANELS) @ squares / (2 * PANELS)  # (9)
+    zmp = [part[: INTERVALS + 1] for part in zmp]
     margin = np.min([zmp[0] + BACK, FRONT - zmp[0], zmp[1] + BREADTH / 2, BREADTH / 2 - zmp[1]], axis=0)  # (8)
     found = {"f": weight / Q / F1_MAX + (1 - weight) * X[:, 0] / F2_MAX, "f1_per_m2s": 1 / Q, "Q_m2s": Q}  # (10), (11)
     found |= {"hip_speed_m_s": X[:, 0] / (2 * T), "zmp_margin_min_m": margin.min(axis=0)}
@@ -64,7 +69,9 @@ def walk(X: Array, weight: float = 0.15, T: float = 1.0, static_load: bool = Fal
     for letter, value in zip("xy", zmp, strict=True):
         found |= {f"zmp_{letter}_min_m": value.min(axis=0), f"zmp_{letter}_max_m": value.max(axis=0)}
     for name, leg in (("stance", stance), ("swing", moved)):
-        found |= {f"reach[{name} leg, {k / INTERVALS:g} T]": cosine for k, cosine in enumerate(leg.cosine)}
+        found |= {
+            f"reach[{name} leg, {k / INTERVALS:g} T]": cosine for k, cosine in enumerate(leg.cosine[: INTERVALS + 1])
+        }
     return found
 
 

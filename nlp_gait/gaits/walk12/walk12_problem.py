@@ -32,9 +32,16 @@ from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Horizon = Literal["step", "1s"]
+# Rule for the integral (9): Gauss-Legendre on each panel of two intervals, Simpson's on the intervals, or the paper's Runge-Kutta
+# method of fourth order with 10,000 steps, 0.0001 s each if T = 1 s. For an integral over time that is Simpson's rule.
+Quadrature = Literal["gauss", "simpson", "runge-kutta"]
 
 F1MAX = 442.522  # the paper's largest f1, section 7 [1/(m^2 s)]
 F2MAX = 0.13  # [m]
+PRINTED_STEPS = 10_000
+# Nodes of Gauss's rule over a step, and the fewest on a panel. A nearly straight leg makes the integrand spike: over all gaits
+# that reach, f is within 2e-7, by Simpson's rule on 20 intervals within 8e-3 (``python -m benchmarks.guarantees.quadrature``).
+GAUSS_NODES, FEWEST_NODES = 160, 3
 LARGEST_TURN = math.radians(8.0)  # section 5.4
 
 VARIABLES = (  # (eq. 7)
@@ -62,23 +69,26 @@ PARAMETERS = parameters(
 
 
 @maker
-def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact") -> GaitProblem:
+def walk12(
+    *, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact", quadrature: Quadrature = "gauss"
+) -> GaitProblem:
     """Return the gait problem of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
     Args:
-        intervals: of Simpson's rule over a step; even.
+        intervals: of a step, whose ends are the instants of the indexes and, every second one, of the reach; even.
         horizon: Q over one step, as printed in (9), or over one second of walking, as Table IV implies.
         zmp: reading of the zero-moment point, see ``walk12_model.Zmp``.
+        quadrature: of Q: Gauss's rule on 160 nodes, Simpson's on the intervals, or the paper's 10,000 Runge-Kutta steps.
 
     Source:
         Goswami, Vadakkepat, Phung (2008), section 5.
     """
     if intervals < 2 or intervals % 2:
-        raise InputError(f"intervals must be an even whole number >= 2 (Simpson's rule), got {intervals!r}")
+        raise InputError(f"intervals must be an even whole number >= 2 (panels of two), got {intervals!r}")
     robot = load_point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return _assemble(point, _make_zmp_function(robot, ops, zmp), robot, intervals, horizon)
+        return _assemble(point, _make_zmp_function(robot, ops, zmp), robot, intervals, horizon, quadrature)
 
     def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         zmp_at = _sample_zmp(_make_zmp_function(robot, ops, zmp), point, phases)
@@ -113,24 +123,40 @@ def walk12(*, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact"
     )
 
 
-def make_simpson_weights(intervals: int) -> DM:
-    """Return (N + 1, 1) weights of Simpson's rule on [0, 1] with N intervals, N even."""
-    weights = np.full(intervals + 1, 2.0)
+def make_rule(quadrature: Quadrature, intervals: int) -> tuple[DM, DM]:
+    """Return phases (1, n) and weights (n, 1) of a rule on [0, 1] for an even number of intervals."""
+    if quadrature == "gauss":
+        panels = intervals // 2
+        nodes, weights = np.polynomial.legendre.leggauss(max(FEWEST_NODES, -(-GAUSS_NODES // panels)))
+        # Last digits depend on the linear algebra library; the problem must be the same on every machine.
+        nodes, weights = np.round(nodes, 14), np.round(weights, 14)
+        phases = (np.arange(panels)[:, None] + (nodes + 1) / 2) / panels
+        return DM(phases.ravel()).T, DM(np.tile(weights / (2 * panels), panels))
+    count = 2 * PRINTED_STEPS if quadrature == "runge-kutta" else intervals
+    weights = np.full(count + 1, 2.0)
     weights[1::2] = 4.0
     weights[[0, -1]] = 1.0
-    return DM(weights / (3 * intervals))
+    return DM(np.linspace(0.0, 1.0, count + 1)).T, DM(weights / (3 * count))
 
 
-def _assemble(point: Point, zmp_at: ca.Function, robot: PointMassBiped, intervals: int, horizon: Horizon) -> Assembly:
+def _assemble(
+    point: Point,
+    zmp_at: ca.Function,
+    robot: PointMassBiped,
+    intervals: int,
+    horizon: Horizon,
+    quadrature: Quadrature,
+) -> Assembly:
     T, s = point["step_time_s"], point["step_length_m"]
-    phases = DM(np.linspace(0.0, 1.0, intervals + 1)).T
-    weights = make_simpson_weights(intervals)
+    phases, weights = make_rule(quadrature, intervals)
     zmp = _sample_zmp(zmp_at, point, phases)
     Q = T * ca.sum1(zmp**2) @ weights  # (eq. 9)
     if horizon == "1s":
         steps = ca.floor(1 / T)
         begun = 1 / T - steps  # share of the last step within the second
         Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
+    if quadrature != "simpson":
+        zmp = _sample_zmp(zmp_at, point, DM(np.linspace(0.0, 1.0, intervals + 1)).T)
     f1 = 1 / Q  # (eq. 10)
     f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
     indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_measure_stability(zmp, robot)}

@@ -24,7 +24,7 @@ from nlp_gait.formulation.result import load_result
 @pytest.fixture(scope="module")
 def runs() -> list[RunRecord]:
     """Two short runs of a search without IPOPT."""
-    spec = ProblemSpec(name="walk12", values={"lambda": 0.4})
+    spec = ProblemSpec(name="walk12", options={"quadrature": "simpson"}, values={"lambda": 0.4})
     tasks = [Task(problem=spec, solver="pso", stop=Stop(evaluations=300), run=run) for run in range(2)]
     return run_study(Study(tasks=tuple(tasks)))
 
