@@ -1,8 +1,8 @@
 """Largest error of f of the 12-joint walk by its quadrature: ``python -m benchmarks.guarantees.quadrature``.
 
-The integrand of Q is smooth over a step, but spikes where a leg is nearly straight. Differential evolution looks for the gait with
-the largest error in f at lambda = 1, over all gaits whose bending height is the least with which both legs reach. The reference
-is Gauss's rule on 440 nodes.
+The integrand of Q is smooth over a step, but spikes where a leg is nearly straight. Differential evolution looks for the gait
+with the largest error in f at lambda = 1, over all gaits whose bending height is the least with which both legs reach. The
+reference is Gauss's rule on 440 nodes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ def make_reach() -> ca.Function:
 
 def map_rows(function: ca.Function, X: Array) -> Array:
     """Evaluate a function of (4,) at points (P, 4)."""
-    return np.asarray(function.map(len(X))(X.T), dtype=float).ravel()
+    values: Array = np.array(function.map(len(X))(X.T)).ravel()
+    return values
 
 
 def straighten(S: Array, reach: ca.Function) -> Array:
@@ -72,7 +73,7 @@ def main() -> None:
 
         def cost(S: Array, rule: ca.Function = rule) -> Array:
             X = straighten(np.atleast_2d(S.T), reach)
-            return np.asarray(-np.log10(np.abs(map_rows(rule, X) - map_rows(reference, X)) / F1MAX + 1e-16))
+            return np.negative(np.log10(np.abs(map_rows(rule, X) - map_rows(reference, X)) / F1MAX + 1e-16))
 
         settings = {"vectorized": True, "updating": "deferred", "popsize": 12, "maxiter": GENERATIONS, "polish": False}
         ends = [differential_evolution(cost, bounds, seed=seed, **settings) for seed in range(SEEDS)]
