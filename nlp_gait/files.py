@@ -55,8 +55,8 @@ def read_bytes(
             status = os.fstat(descriptor)
             if not stat.S_ISREG(status.st_mode):
                 raise ValueError("it is a folder" if stat.S_ISDIR(status.st_mode) else "it is not a regular file")
-            content = file.read(at_most + 1)
-        if len(content) > at_most:
+            content = file.read(at_most + 1) if status.st_size <= at_most else b""
+        if max(status.st_size, len(content)) > at_most:
             raise ValueError(f"it has more than {at_most} bytes")
     return content
 

@@ -15,7 +15,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import redirect_stdout
-from functools import cache
+from functools import cache, lru_cache
 from importlib.abc import SourceLoader
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -123,20 +123,25 @@ def hash_file(path: Path) -> str:
 
 
 def _find_imports(content: bytes, folder: Path) -> Iterator[Path]:
+    for name in filter(None, _parse_imports(content)):
+        stem = folder.joinpath(*name.split("."))
+        yield from (file for file in (stem.with_suffix(ENDING), stem / "__init__.py") if file.is_file())
+
+
+@lru_cache(maxsize=32)  # a study hashes its files for every record
+def _parse_imports(content: bytes) -> tuple[str, ...]:
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError):
-        return  # running it reports the error
+        return ()  # running it reports the error
+    names: list[str] = []
     for node in ast.walk(tree):
-        names: list[str] = []
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             module = [node.module] if node.module else []
-            names = [".".join([*module, *more]) for more in ([], *([alias.name] for alias in node.names))]
-        for name in names:
-            stem = folder.joinpath(*name.split("."))
-            yield from (file for file in (stem.with_suffix(ENDING), stem / "__init__.py") if name and file.is_file())
+            names += [".".join([*module, *more]) for more in ([], *([alias.name] for alias in node.names))]
+    return tuple(names)
 
 
 def check_reference(text: str, kind: Kind) -> None:

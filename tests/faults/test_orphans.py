@@ -65,7 +65,7 @@ def test_workers_end_with_the_study(name: str, tmp_path: Path) -> None:
     study = start("compare", "walk12", "--algorithms", "pso", "--runs", "4", "--evaluations", "90000000", "--jobs", "2")
     try:
         wait_for(lambda: sum("loky" in command_line(child) for child in offspring(study.pid)) >= 2)
-        time.sleep(2.0)  # the runs are in progress
+        time.sleep(1.0)  # the runs are in progress
         started = offspring(study.pid)
         assert running(started)
     finally:

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.errors import InputError
 from tests.compare.study.test_study import contents
 
-pytest.importorskip("distributed")
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="distributed not installed")  # slow to import
 
 STUDY = StudySettings(
     problems=(ProblemSpec(name="walk12"),),
