@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeVar, cast
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -22,12 +22,16 @@ from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import check_name, make_writable_folder, replace_nan
 from nlp_gait.interrupts import Interrupted
 
+if TYPE_CHECKING:
+    from compare.study.evidence import Exclusion
+
 T = TypeVar("T")
 
 # Characters of an error message, in which a value can be a whole file.
 LONGEST_SENTENCE = 2000
 STACKED_WIDTH = 60  # of terminals on which tables are stacked: a block of lines per row
 LONGEST_CELL = 24  # characters of a cell on one line
+MOST_EXCLUDED = 20  # records named on a terminal
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
 GAP = 3  # characters between two columns of a table
 
@@ -65,6 +69,15 @@ def fail(message: str, status: int = 1) -> NoReturn:
     """End with a status and one sentence."""
     say_error(message)
     raise typer.Exit(status)
+
+
+def end_if_excluded(excluded: Sequence[Exclusion]) -> None:
+    """Report records that are no evidence on stderr, and end with status 1 if there are any."""
+    for exclusion in excluded[:MOST_EXCLUDED]:
+        say_error(f"excluded {exclusion.sentence}")
+    if excluded:
+        more = f" ({len(excluded) - MOST_EXCLUDED} more are in the report)" if len(excluded) > MOST_EXCLUDED else ""
+        fail(f"{len(excluded)} records were excluded{more}; delete them, and rerun the study to compute them again")
 
 
 def say_error(message: str) -> None:

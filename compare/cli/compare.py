@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, print_result, print_table, progress_bar, say, say_error, stdout
+from compare.cli.common import (
+    end_if_excluded,
+    end_interrupted,
+    fail,
+    print_result,
+    print_table,
+    progress_bar,
+    say,
+    say_error,
+    stdout,
+)
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.report import plain_simulations, print_simulations, simulate_best
 from compare.study.settings import SolverSpec, read_settings, resolve_user_code
@@ -125,9 +135,10 @@ def compare(
             end_interrupted(
                 f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
             )
-    records += read_imported_records(out, records)
+    imported = read_imported_records(out, records)
+    records += imported.records
     gaits = simulate_best(out, records, Drive()) if engine else []
-    written = write_report(out, records, read_manifest(out), as_csv=as_csv)
+    written = write_report(out, records, read_manifest(out), excluded=imported.excluded, as_csv=as_csv)
     data = {"problems": summarise_problems(records), **plain_simulations(gaits)} if as_json else {}
 
     def tables() -> None:
@@ -135,6 +146,7 @@ def compare(
         print_simulations(gaits)
 
     print_result(as_json, data, written, tables)
+    end_if_excluded(imported.excluded)
     end_if_none_left(records)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import print_result, stdout
+from compare.cli.common import end_if_excluded, print_result, stdout
 from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.options import RESULTS, AsCsv, AsJson, NamedProblem
 
@@ -42,18 +42,22 @@ def import_results(
     """
     from compare.analysis.comparison import label_editions
     from compare.report import write_report
+    from compare.study.evidence import read_evidence
     from compare.study.import_runs import import_runs
     from compare.study.manifest import read_manifest
-    from compare.study.record_files import read_records, write_record
+    from compare.study.record_files import write_record
     from nlp_gait.files import make_writable_folder
 
     spec = problem.spec()
     records = import_runs(spec, finals, label, history, evaluations)
     kept = [write_record(record, make_writable_folder(out)) for record in records]
-    everything = label_editions(read_records(out))
-    written = [*kept, *write_report(out, everything, read_manifest(out), as_csv=as_csv)]
+    evidence = read_evidence(out)
+    everything = label_editions(evidence.records)
+    report = write_report(out, everything, read_manifest(out), excluded=evidence.excluded, as_csv=as_csv)
+    written = [*kept, *report]
     shown = [record for record in everything if record.problem == spec.title]
     print_result(as_json, {"problems": summarise_problems(shown)}, written, lambda: print_summaries(shown))
+    end_if_excluded(evidence.excluded)
 
 
 @command
@@ -75,9 +79,10 @@ def logs(
     """
     from compare.analysis.comparison import compare_problems
     from compare.logs import write_coco, write_ioh
-    from compare.study.record_files import read_records
+    from compare.study.evidence import read_evidence
 
-    records = read_records(folder)
+    evidence = read_evidence(folder)
+    records = evidence.records
     comparisons = compare_problems(records)
     written = (write_ioh if form == "ioh" else write_coco)(comparisons, to)
     data = {"problems": [comparison.problem for comparison in comparisons], "runs": len(records)}
@@ -87,3 +92,4 @@ def logs(
         () if not as_json else written,
         lambda: stdout.print(f"wrote {len(written)} files to {to}", soft_wrap=True),
     )
+    end_if_excluded(evidence.excluded)

@@ -14,6 +14,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import (
+    end_if_excluded,
     end_interrupted,
     interruptible,
     print_result,
@@ -60,7 +61,9 @@ def report(
 ) -> None:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
-    It includes solvers that a later call omitted; runs of earlier definitions have names that say how they differ.
+    It includes solvers that a later call omitted; runs of earlier definitions have names that say how they differ. Every point is
+    evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
+    is 1.
 
     With `--engine` the best gaits are simulated and stored, and the report says whether the engine confirms the model.
 
@@ -69,8 +72,9 @@ def report(
     """
     from compare.analysis.comparison import label_editions
     from compare.analysis.statistics.run_length import Weighting
-    from compare.report import rebuild_report
-    from compare.study.record_files import read_records
+    from compare.report import write_report
+    from compare.study.evidence import read_evidence
+    from compare.study.manifest import read_manifest
 
     if not engine and drive_options != DriveOptions():
         raise InputError("the drive applies to simulated gaits: add --engine")
@@ -79,9 +83,13 @@ def report(
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     name_all(code)
-    simulated = simulate_best(folder, label_editions(read_records(folder)), drive_options.make()) if engine else []
-    written = rebuild_report(folder, weighting, as_csv=as_csv)
-    print_result(as_json, plain_simulations(simulated), written, lambda: print_simulations(simulated))
+    evidence, manifest = read_evidence(folder), read_manifest(folder)
+    records = label_editions(evidence.records)
+    simulated = simulate_best(folder, records, drive_options.make()) if engine else []
+    written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, as_csv=as_csv)
+    data = {**plain_simulations(simulated), "excluded": [exclusion.sentence for exclusion in evidence.excluded]}
+    print_result(as_json, data, written, lambda: print_simulations(simulated))
+    end_if_excluded(evidence.excluded)
 
 
 @command

@@ -16,16 +16,18 @@ from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import format_settings, make_session_section
 from compare.report.writing import write_document
 from compare.study.description import describe_solver, list_described_names
+from compare.study.evidence import Exclusion, read_evidence
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
-from compare.study.record_files import read_records
 from compare.study.simulations import SimulatedGait, load_simulations
 from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 
 
 def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
-    """Rewrite the report of all records of a folder, earlier ones included; return its files. Raises as ``read_records``."""
-    return write_report(folder, label_editions(read_records(folder)), read_manifest(folder), weighting, as_csv=as_csv)
+    """Rewrite the report of all records of a folder, earlier ones included; return its files. Raises as ``read_evidence``."""
+    evidence = read_evidence(folder)
+    records, manifest = label_editions(evidence.records), read_manifest(folder)
+    return write_report(folder, records, manifest, weighting, excluded=evidence.excluded, as_csv=as_csv)
 
 
 def write_report(
@@ -34,11 +36,12 @@ def write_report(
     manifest: Manifest,
     weighting: Weighting = DEFAULT_WEIGHTING,
     *,
+    excluded: Sequence[Exclusion] = (),
     as_csv: bool = False,
 ) -> list[Path]:
     """Write the report with stored simulations, the figures as PNG and SVG, and optionally CSV files; return all paths."""
     simulated = load_simulations(folder, select_best_gaits(records))
-    written = write_document(folder, make_study_document(records, manifest, weighting, simulated))
+    written = write_document(folder, make_study_document(records, manifest, weighting, simulated, excluded))
     written += write_better_points(folder, compare_problems(records))
     if as_csv:
         written += _write_csv_files(folder, records)
@@ -50,8 +53,9 @@ def make_study_document(
     manifest: Manifest,
     weighting: Weighting = DEFAULT_WEIGHTING,
     simulated: Sequence[SimulatedGait] = (),
+    excluded: Sequence[Exclusion] = (),
 ) -> Document:
-    """Return the document of a study's records and of their best gaits simulated in the engine."""
+    """Return the document of a study's records, of their best gaits simulated in the engine, and of excluded records."""
     comparisons = compare_problems(records, weighting)
     sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
     if len(comparisons) > 1 and list_expected_costs(comparisons):
@@ -59,7 +63,27 @@ def make_study_document(
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
         verdict=write_verdict(comparisons),
-        parts=(*sections, *(() if simulated else (HOW,)), _make_method_section(comparisons, manifest, weighting)),
+        parts=(
+            *_list_excluded(excluded),
+            *sections,
+            *(() if simulated else (HOW,)),
+            _make_method_section(comparisons, manifest, weighting),
+        ),
+    )
+
+
+def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
+    if not excluded:
+        return ()
+    rows = [(exclusion.name, "; ".join(exclusion.reasons)) for exclusion in excluded]
+    return (
+        Section(
+            title="Excluded records",
+            parts=(
+                "All numbers of records are evaluated again. These records are no evidence, and nothing below contains them.",
+                text_table(("record", "reason"), rows, prose=True),
+            ),
+        ),
     )
 
 

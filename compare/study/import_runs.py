@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from compare.judge import evaluate
+from compare.study.evidence import Evidence, check_records
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.record_files import RECORDS, read_records
 from compare.study.store import as_json
@@ -148,15 +149,16 @@ def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tupl
     }
 
 
-def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> list[RunRecord]:
-    """Return the imported records in a folder whose problems are those of some records."""
+def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> Evidence:
+    """Return the checked imported records in a folder whose problems are those of some records."""
     if not (folder / RECORDS).is_dir():
-        return []
+        return Evidence([], [])
     known = {record.problem: record.definition["problem"].get("sha256") for record in records}
-    return [
+    imported = [
         record
         for record in read_records(folder)
         if "imported" in record.definition
         and record.problem in known
         and record.definition["problem"].get("sha256") == known[record.problem]
     ]
+    return check_records(imported)

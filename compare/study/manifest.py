@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import os
-import platform
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
+from compare.study.origin import describe_processor, describe_system, format_now, hash_installed_code
 from compare.study.settings import StudySettings, parse_settings
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes, read_cpu_info
+from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
 from nlp_gait.decoding import decode
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import convert_errors, read_json, write_json
@@ -33,7 +32,7 @@ class Session:
     command: str
     started: str  #: date and time, UTC
     machine: Mapping[str, str]  #: processor, system, number of usable processors
-    versions: Mapping[str, str]  #: of Python and the installed packages
+    versions: Mapping[str, str]  #: of Python and the installed packages, and the hash of the code that runs solvers
     kernel: str  #: compiler and flags of the objective, or why it is interpreted
     jobs: str  #: worker processes, or the address of the scheduler
 
@@ -42,13 +41,13 @@ class Session:
         """Return a session that begins now, in this process."""
         return cls(
             command=command,
-            started=datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
+            started=format_now(),
             machine={
-                "processor": read_cpu_info("model name") or platform.processor() or "unknown",
-                "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+                "processor": describe_processor(),
+                "system": describe_system(),
                 "processors": str(available_cores()),
             },
-            versions={"python": sys.version.split()[0], **_versions()},
+            versions={"python": sys.version.split()[0], **_versions(), "code": hash_installed_code()[:8]},
             kernel=_kernel(),
             jobs=jobs,
         )

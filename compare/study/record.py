@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from compare.judge import Evaluation
+from compare.study.origin import Origin, format_now
 from compare.study.task import LABEL, ProblemSpec, Task
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json, replace_nan
-from nlp_gait.formulation import Objective, Result
+from nlp_gait.formulation import GaitProblem, Objective, Result
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import format_html_table, import_pandas
@@ -50,6 +51,7 @@ class Times:
     solve: float
     objective: float  #: share of ``solve`` in the objective; NaN if unknown
     history: tuple[float, ...]  #: at each entry of the history, from the start of the solve
+    finished: str = ""  #: date and time of the end of the run, UTC; empty if unknown
 
     @classmethod
     def make_unknown(cls, solve: float, history: tuple[float, ...]) -> Times:
@@ -124,16 +126,19 @@ class RunRecord:
     active_constraints: tuple[ActiveConstraint, ...]
     history: History
     time_s: Times
+    origin: Origin | None = None  #: of this run; None for imported results
 
     @classmethod
-    def from_task(cls, task: Task, **results: Any) -> RunRecord:
-        """Return the record of a task with the results of its run: the fields from ``settings`` on."""
+    def from_task(cls, task: Task, *, time_s: Times, **results: Any) -> RunRecord:
+        """Return the record of a task with the results of its run, which ends now: the fields from ``settings`` on."""
         return cls(
             problem=task.problem.title,
             solver=task.title,
             run=task.run,
             seed=task.run_seed,
             definition=task.definition(),
+            time_s=replace(time_s, finished=format_now()),
+            origin=Origin.make(),
             **results,
         )
 
@@ -234,10 +239,15 @@ def parse_record(raw: Any) -> RunRecord:
 
 def load_gait(record: RunRecord) -> Result:
     """Return the problem and the point of a record; GaitError if it cannot be loaded or has other variables now."""
+    problem = load_problem(record)
+    return Result(problem=problem, x=problem.check_x(record.x))
+
+
+def load_problem(record: RunRecord) -> GaitProblem:
+    """Return the problem of a record; raises GaitError if it cannot be loaded."""
     stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
     name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
-    problem = ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
-    return Result(problem=problem, x=problem.check_x(record.x))
+    return ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
 
 
 def make_row(record: RunRecord) -> list[object]:

@@ -34,7 +34,7 @@ def locate_record(folder: Path, task: Task) -> Path:
 
 def write_record(record: RunRecord, folder: Path) -> Path:
     """Write a record to a study's folder and return its file; one of another definition is renamed. Raises OutputError."""
-    path = locate_run(folder / RECORDS, record.problem, record.solver, record.run)
+    path = _locate(folder / RECORDS, record)
     if not path.parent.is_dir():
         make_writable_folder(path.parent)
     if path.exists():
@@ -49,13 +49,34 @@ def write_record(record: RunRecord, folder: Path) -> Path:
 
 def read_records(folder: Path) -> list[RunRecord]:
     """Return all records in a folder by file name, those of other definitions last; InputError for none or a damaged one."""
+    records = []
+    for _, record in read_each(folder):
+        if isinstance(record, InputError):
+            raise record
+        records.append(record)
+    return records
+
+
+def read_each(folder: Path) -> list[tuple[Path, RunRecord | InputError]]:
+    """Return files and records in the order of ``read_records``, damaged ones as their error; InputError if there are none."""
     with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
         paths = sorted((folder / RECORDS).glob("*/*.json"))
     if not paths:
         raise InputError(f"{str(folder)!r} contains no records ({RECORDS}/<problem>/<solver>-<run>.json)")
-    records = [(path, _read_checked(path)) for path in paths]
-    records.sort(key=lambda item: item[0] != locate_run(folder / RECORDS, item[1].problem, item[1].solver, item[1].run))
-    return [record for _, record in records]
+    found = [(path, _read_or_error(path)) for path in paths]
+    found.sort(key=lambda item: isinstance(item[1], RunRecord) and item[0] != _locate(folder / RECORDS, item[1]))
+    return found
+
+
+def _read_or_error(path: Path) -> RunRecord | InputError:
+    try:
+        return _read_checked(path)
+    except InputError as error:
+        return error
+
+
+def _locate(folder: Path, record: RunRecord) -> Path:
+    return locate_run(folder, record.problem, record.solver, record.run)
 
 
 def find_record(folder: Path, task: Task) -> tuple[RunRecord | None, RunRecord | None]:
@@ -80,7 +101,7 @@ def _add_key(path: Path, definition: Mapping[str, Any]) -> Path:
 def _read_checked(path: Path) -> RunRecord:
     """Return the record; a copy under another name is refused, because it would count twice."""
     record = read_record(path)
-    own = locate_run(path.parents[1], record.problem, record.solver, record.run)
+    own = _locate(path.parents[1], record)
     if path not in (own, _add_key(own, record.definition)):
         raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
     if (

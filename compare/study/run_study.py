@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.study.definition import describe_differences
+from compare.study.evidence import check_records
 from compare.study.record import RunRecord, make_frame
 from compare.study.record_files import find_record, locate_record, write_record
 from compare.study.run_task import PLANNED_RUNS, Run, run_task
@@ -131,7 +132,18 @@ def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str
             records[index] = record
         elif other is not None:
             outdated[task.problem.title, task.title, describe_differences(other.definition, task.definition())] += 1
-    return records, outdated
+    problems = {id(record): study.tasks[index].problem for index, record in records.items()}
+    evidence = check_records(
+        list(records.values()),
+        find_problem=lambda record: problems[id(record)].load(),
+        needs_origin=False,
+        between_samples="none",
+    )
+    for exclusion in evidence.excluded:
+        assert exclusion.record is not None  # for the type checker
+        outdated[exclusion.record.problem, exclusion.record.solver, exclusion.reasons[0]] += 1
+    kept = {id(record) for record in evidence.records}
+    return {index: record for index, record in records.items() if id(record) in kept}, outdated
 
 
 def _run_missing(study: Study, records: dict[int, RunRecord]) -> Iterator[tuple[int, RunRecord]]:

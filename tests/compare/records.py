@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict
+from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.formulation.solution import ActiveConstraint
 
 # A point of nao-dsp that can be played.
@@ -82,6 +84,44 @@ def record(
         active_constraints=active,
         history=History(evaluations=tuple(c for c, _ in history), objective=tuple(v for _, v in history)),
         time_s=Times(build=0.5, compile=1.5, solve=seconds[-1], objective=seconds[-1] / 2, history=seconds),
+    )
+
+
+# A feasible point of nao-dsp, like those with up to 0.6 s.
+FAST_X = {
+    "hip_height_m": 0.31,
+    "hip_vz_start_m_s": 0.05,
+    "hip_vz_end_m_s": -0.042764743,
+    "hip_vx_start_m_s": 0.155932802,
+    "hip_vx_end_m_s": 0.088565687,
+    "hip_vy_start_m_s": -0.17373649,
+    "hip_vy_end_m_s": -0.177785607,
+    "double_support_time_s": 0.52,
+}
+
+
+def judged(
+    solver: str, x: Mapping[str, float], *, problem: str = "nao-dsp", run: int = 0, evaluations: int = 10
+) -> RunRecord:
+    """A run of a search that ends at a point, as the judge finds it."""
+    task = Task(problem=ProblemSpec(name=problem), solver=solver, run=run, stop=Stop(evaluations=evaluations))
+    verdict = Verdict.from_evaluation(evaluate(task.problem.load(), x))
+    best = verdict.objective if verdict.feasible else None
+    return RunRecord.from_task(
+        task,
+        settings={"kind": solver},
+        status="evaluation budget used",
+        claimed=verdict.feasible,
+        x=dict(x),
+        claimed_objective=best,
+        claimed_violation=verdict.violation,
+        verdict=verdict,
+        evaluations={"f": evaluations},
+        failed_evaluations=0,
+        iterations=1,
+        active_constraints=(),
+        history=History(evaluations=(evaluations,), objective=(best,)),
+        time_s=Times(build=0.1, compile=0.1, solve=0.5 + 0.1 * run, objective=0.3, history=(0.5 + 0.1 * run,)),
     )
 
 

@@ -14,10 +14,9 @@ from compare.analysis.solver_table import summarise
 from compare.analysis.statistics.run_length import Weighting
 from compare.report import rebuild_report, write_report
 from compare.study.manifest import Manifest, Session
-from compare.study.record_files import RECORDS
+from compare.study.record_files import write_record
 from nlp_gait.errors import InputError
-from nlp_gait.files import write_json
-from tests.compare.records import record, study
+from tests.compare.records import FAST_X, judged, record, study
 
 SESSION = Session(
     command="nlp-gait compare <b>walk</b>",
@@ -200,16 +199,17 @@ def test_page_loads_nothing(page: str, tables: Tables) -> None:
 
 
 @pytest.mark.slow
-def test_rebuilding_gives_the_same_report(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
-    for r in study():
-        path = tmp_path / RECORDS / r.problem / f"{r.solver}-{r.run:04d}.json"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_json(path, r.to_json())
-    rebuild_report(tmp_path)
-    first, again = (Tables((f / "report.html").read_text(encoding="utf-8")).rows for f in (folder, tmp_path))
-    assert again == first[: first.index(["what", "value"])]
-    rebuild_report(tmp_path, Weighting(gradient=0.0, jacobian=0.0, hessian=0.0))
-    assert Tables((tmp_path / "report.html").read_text(encoding="utf-8")).row("newton")[10] == "10"
+def test_rebuilding_gives_the_same_report_and_names_what_is_no_evidence(tmp_path: Path, coarse_pictures: None) -> None:
+    good = judged("pso", FAST_X)
+    bad = replace(judged("pso", FAST_X, run=1), verdict=replace(good.verdict, objective=1.0))
+    for r in (good, bad):
+        write_record(r, tmp_path)
+    rebuild_report(tmp_path, as_csv=True)
+    page = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "Excluded records" in page and "its objective is 1, but that of its x is 1.4" in page
+    assert (tmp_path / "runs.csv").read_text().count("pso") == 1
+    rebuild_report(tmp_path, Weighting(f=3.0))
+    assert "30" in Tables((tmp_path / "report.html").read_text(encoding="utf-8")).row("pso")
 
 
 @pytest.mark.slow

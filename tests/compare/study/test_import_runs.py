@@ -199,9 +199,9 @@ def test_values_missing_from_a_file_are_filled_in_and_others_stay(tmp_path: Path
 def test_records_from_elsewhere_belong_to_the_very_problem(tmp_path: Path) -> None:
     """Another value of a parameter is another problem; a folder without records has none."""
     own = import_runs(WALK, finals(tmp_path), "ga", evaluations=3)
-    assert read_imported_records(tmp_path / "absent", own) == []
+    assert read_imported_records(tmp_path / "absent", own) == ([], [])
     for record in own:
         write_record(record, tmp_path)
-    assert [record.run for record in read_imported_records(tmp_path, own)] == [0, 1, 2]
+    assert [record.run for record in read_imported_records(tmp_path, own).records] == [0, 1, 2]
     other = import_runs(ProblemSpec(name="walk12", values={"lambda": 0.5}), finals(tmp_path), "ga", evaluations=3)
-    assert read_imported_records(tmp_path, other) == []
+    assert read_imported_records(tmp_path, other) == ([], [])

@@ -21,14 +21,13 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Display
 from nlp_gait.simulation.drive import DRIVES, Drive
-from tests.compare.records import DSP_X, record
+from tests.compare.records import FAST_X, judged
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_pages")]  # gaits are played
 
 
-def dsp(algorithm: str, power_W: float, time_s: float = 0.4) -> RunRecord:
-    made = record(algorithm, 0, [(10, power_W)], problem="nao-dsp")
-    return replace(made, x=DSP_X | {"double_support_time_s": time_s})
+def dsp(algorithm: str, time_s: float = 0.5) -> RunRecord:
+    return judged(algorithm, FAST_X | {"double_support_time_s": time_s})
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("mujoco")
     path = tmp_path_factory.mktemp("study")
     (path / RECORDS / "nao-dsp").mkdir(parents=True)
-    for made in (dsp("pso", 3.0), dsp("ga", 4.0, 0.35)):
+    for made in (dsp("pso"), dsp("ga", 0.51)):
         write_json(path / RECORDS / "nao-dsp" / f"{made.solver}-0000.json", made.to_json())
     return path
 
@@ -56,7 +55,7 @@ def refuse(*_: object, **__: object) -> None:
 def test_the_command_simulates_each_solvers_best_gait(report: dict[str, object], folder: Path) -> None:
     gaits = report["gaits"]
     assert isinstance(gaits, list)
-    assert [gait["solver"] for gait in gaits] == ["pso", "ga"]
+    assert [gait["solver"] for gait in gaits] == ["ga", "pso"]
     for gait in gaits:
         assert gait["unit"] == "W" and gait["fell_at_s"] is None and gait["steps"] is None
         assert gait["engine"] == pytest.approx(gait["model"], rel=0.2)
@@ -84,16 +83,16 @@ def test_a_stored_simulation_is_not_repeated(
     monkeypatch.setattr(simulations, "simulate_plan", refuse)
     gaits = report["gaits"]
     assert isinstance(gaits, list)
-    assert [p.engine for p in simulate_records(folder, [dsp("pso", 3.0)], Drive())] == [gaits[0]["engine"]]
+    assert [p.engine for p in simulate_records(folder, [dsp("pso")], Drive())] == [gaits[1]["engine"]]
     with pytest.raises(AssertionError, match="played again"):
-        simulate_records(folder, [dsp("pso", 3.0)], DRIVES["held"])
+        simulate_records(folder, [dsp("pso")], DRIVES["held"])
     with pytest.raises(AssertionError, match="played again"):
-        simulate_records(folder, [dsp("pso", 3.0, 0.5)], Drive())
+        simulate_records(folder, [dsp("pso", 0.55)], Drive())
 
 
 def test_a_gait_that_has_changed_has_no_simulation_to_show(report: dict[str, object], folder: Path) -> None:
-    assert len(load_simulations(folder, [dsp("pso", 3.0), dsp("ga", 4.0, 0.35)])) == 2
-    assert load_simulations(folder, [dsp("pso", 3.0, 0.5), dsp("aco", 3.0)]) == []
+    assert len(load_simulations(folder, [dsp("pso"), dsp("ga", 0.51)])) == 2
+    assert load_simulations(folder, [dsp("pso", 0.55), dsp("aco")]) == []
 
 
 def test_problems_that_cannot_be_simulated_are_left_out_or_refused(
@@ -102,24 +101,24 @@ def test_problems_that_cannot_be_simulated_are_left_out_or_refused(
     pytest.importorskip("mujoco")
     still = SimpleNamespace(problem=SimpleNamespace(display=Display()))
     monkeypatch.setattr(simulations, "load_gait", lambda _: still)
-    assert simulate_records(tmp_path, [dsp("pso", 3.0)], Drive()) == []
+    assert simulate_records(tmp_path, [dsp("pso")], Drive()) == []
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
-    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
+    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso").to_json())
     refused = CliRunner().invoke(app, ["report", str(tmp_path), "--engine"])
     assert refused.exit_code == 1 and "no gait of nao-dsp can be simulated" in refused.stderr
 
 
 def test_a_damaged_simulation_is_refused_with_its_remedy(tmp_path: Path) -> None:
-    gait = dsp("pso", 3.0)
+    gait = dsp("pso")
     inputs = {"problem": gait.definition["problem"], "x": dict(gait.x)}
     Store(tmp_path).save("simulations/nao-dsp/pso-0000", inputs, {})
     with pytest.raises(InputError, match="delete it and rerun with --engine"):
-        load_simulations(tmp_path, [dsp("pso", 3.0)])
+        load_simulations(tmp_path, [dsp("pso")])
 
 
 def test_a_report_without_simulations_says_how_to_get_them(tmp_path: Path) -> None:
     (tmp_path / RECORDS / "nao-dsp").mkdir(parents=True)
-    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso", 3.0).to_json())
+    write_json(tmp_path / RECORDS / "nao-dsp" / "pso-0000.json", dsp("pso").to_json())
     done = CliRunner().invoke(app, ["report", str(tmp_path)])
     assert done.exit_code == 0
     assert "`nlp-gait report DIR --engine`" in (tmp_path / "report.md").read_text()
