@@ -290,10 +290,10 @@ def _check_history(record: RunRecord) -> Iterator[str]:
 def _check_repeats(records: Sequence[RunRecord], reasons: Reasons) -> None:
     """Find runs that count twice: with the seed of another run of the same solver, or with all its times."""
 
-    def shared(record: RunRecord) -> tuple[str, str, str]:
+    def make_key(record: RunRecord) -> tuple[str, str, str]:
         return record.problem, record.solver, hash_json(select_shared(record.definition))
 
-    for group in _group(records, shared):
+    for group in _group(records, make_key):
         group.sort(key=lambda k: records[k].run)
         seeds: dict[int, int] = {}
         times: dict[tuple[float, ...], int] = {}
