@@ -35,7 +35,7 @@ class Evaluation:
     #: Rows violated on the dense grid, worst first; times are samples of that grid
     dense_violations: tuple[ConstraintValue, ...]
     dense_intervals: int | None  #: number of intervals of the dense grid
-    guaranteed: Guarantee | None  #: what is proven between the samples; None for an infeasible point
+    guaranteed: Guarantee | None  #: what is proven between the samples; None for an infeasible point, or without ``prove``
 
     @property
     def violations(self) -> tuple[ConstraintValue, ...]:
@@ -48,8 +48,13 @@ class Evaluation:
         return {"schema": 1, "problem": self.problem, **robot, **asdict(self)}
 
 
-def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, float]) -> Evaluation:
-    """Return the exact values at x (n,), in the problem's order or by name; raises InputError for a wrong length or NaN."""
+def evaluate(
+    problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, float], *, prove: bool = True
+) -> Evaluation:
+    """Return the exact values at x (n,), in the problem's order or by name; raises InputError for a wrong length or NaN.
+
+    Without ``prove`` nothing is proven of a feasible point: ``guaranteed`` is None.
+    """
     point = problem.check_x(x)
     exact = build_exact_model(problem)
     values = exact.at(point, problem.p)
@@ -73,5 +78,5 @@ def evaluate(problem: GaitProblem, x: Sequence[float] | Array | Mapping[str, flo
         if dense is None or dense_values is None
         else build_exact_model(dense).find_violated(dense_values),
         dense_intervals=None if dense is None else factor * parts,
-        guaranteed=guarantee(problem, point) if values.violation <= FEASIBILITY_TOLERANCE else None,
+        guaranteed=guarantee(problem, point) if prove and values.violation <= FEASIBILITY_TOLERANCE else None,
     )

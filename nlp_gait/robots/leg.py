@@ -24,7 +24,7 @@ SHORTEST_M = 1e-3
 class Leg:
     """Six turning joints from the torso to a foot, at zero angles, in the torso's axes and from its origin [m].
 
-    Raises InputError without a bending knee, a hip with three different axes, or an ankle with two.
+    Legs with the same content are equal. Raises InputError without a bending knee, a hip with three different axes, or an ankle with two.
     """
 
     joints: tuple[str, ...]  # names, the hip's first
@@ -45,6 +45,17 @@ class Leg:
         else:
             return
         raise InputError(f"a leg of joints {', '.join(self.joints)} is not supported: {what}")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Leg) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    @cached_property
+    def _content(self) -> tuple[object, ...]:
+        arrays = (self.axes, self.points, self.foot_m, self.limits_rad)
+        return self.joints, *(np.asarray(array, dtype=float).tobytes() for array in arrays)
 
     @cached_property
     def hip_m(self) -> Array:

@@ -23,10 +23,21 @@ PUBLISHED = 1e-12
 # Central differences with steps of 1e-6 of each range.
 STEP, DIFFERENCES = 1e-6, 1e-5
 QUICK = ("walk12-w015", "ssp-v5", "ssp-v5-time10")
+# The others' exact functions are interpreted, which takes less time than to compile them; a compiled kernel is itself checked
+# against the interpreted one when it is built. Objectives of the last one reach 1e25, where rounding is amplified to 2e-9.
+COMPILED = (*QUICK, "dsp-v5", "cycle-v5", "stairs-energy", "dsp-v5-free-spline4")
 
 
 def points(instance: gaitbench.Instance, count: int = 6) -> Array:
     return np.random.default_rng(3).uniform(instance.lower, instance.upper, (count, len(instance.names)))
+
+
+@pytest.fixture
+def published(id: str, monkeypatch: pytest.MonkeyPatch) -> gaitbench.Instance:
+    if id not in COMPILED:
+        for name in ("CXX", "CC", "PATH"):
+            monkeypatch.setenv(name, "")  # no compiler is found
+    return gaitbench.load(id)
 
 
 def check_probes(id: str) -> None:
@@ -50,20 +61,20 @@ def test_probe_values_never_change(id: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("id", [id for id in gaitbench.names() if id not in QUICK])
-def test_probe_values_of_all_others_never_change(id: str) -> None:
+def test_probe_values_of_all_others_never_change(id: str, published: gaitbench.Instance) -> None:
     check_probes(id)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("id", gaitbench.names())
-def test_the_best_known_point_is_feasible_and_has_its_value(id: str) -> None:
+def test_the_best_known_point_is_feasible_and_has_its_value(published: gaitbench.Instance) -> None:
     """Violation exactly zero; no random point nearby is feasible and better by more than a millionth."""
-    instance = gaitbench.load(id)
+    instance = published
     f, violation = instance(instance.best_x[None])
     assert violation[0] == 0.0
     assert f[0] == pytest.approx(instance.best_known, rel=PUBLISHED, abs=PUBLISHED)
     width = 1e-4 * (instance.upper - instance.lower)
-    near = instance.best_x + np.random.default_rng(0).uniform(-width, width, (2000, len(width)))
+    near = instance.best_x + np.random.default_rng(0).uniform(-width, width, (2000 if instance.id in COMPILED else 128, len(width)))
     f, violation = instance(np.clip(near, instance.lower, instance.upper))
     better = f[violation == 0.0] - instance.best_known
     assert not better.size or better.min() >= -1e-6 * max(1.0, abs(instance.best_known))

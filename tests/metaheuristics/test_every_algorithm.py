@@ -236,7 +236,8 @@ DISC = {
 @pytest.mark.parametrize("name", [name for name in ALL if name not in FLOOR])
 @pytest.mark.parametrize("n", [1, 4])
 def test_sphere_converges(name: str, n: int) -> None:
-    assert minimize(sphere(n), ALL[name](), evaluations=5000, seed=1).objective < SPHERE[name]
+    evaluations = 1000 if n == 1 and name in OTHERS else 5000
+    assert minimize(sphere(n), ALL[name](), evaluations=evaluations, seed=1).objective < SPHERE[name]
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The papers' problems against themselves, written once more from the papers: every value by name, at a thousand random x.
+"""The papers' problems against themselves, written once more from the papers: every value by name, at many random x.
 
 What a paper does not define (a pose out of reach, the centre of pressure under a foot that nothing loads) is left out, and the
 number of points says how much that is.
@@ -16,7 +16,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
 from tests.referee import nao, stairs, stairs_ideal, walk12
 
-POINTS = 1000
+POINTS = 250
 AGREEMENT = 1e-9  # of a row's scale, or of its value where that is larger
 
 Referee = Callable[[Array], Mapping[str, Array]]
@@ -25,7 +25,7 @@ Referee = Callable[[Array], Mapping[str, Array]]
 def drawn(
     problem: GaitProblem, referee: Referee, drafts: int, allowed: Callable[[Array], Array] | None = None
 ) -> Array:
-    """A thousand random x (P, n) within the bounds whose legs reach at every sample."""
+    """Random x (P, n) within the bounds whose legs reach at every sample."""
     X = np.random.default_rng(21).uniform(problem.lower, problem.upper, (drafts, len(problem.names)))
     if allowed is not None:
         X = X[allowed(X)]
@@ -78,7 +78,7 @@ def test_nao_phases_by_momentum_alone(phase: str) -> None:
     def referee(X: Array) -> Mapping[str, Array]:
         return getattr(nao, phase)(X, robot)  # type: ignore[no-any-return]
 
-    found = compared(problem, referee, drawn(problem, referee, 1200))
+    found = compared(problem, referee, drawn(problem, referee, 300))
     assert len(found) == 12 * 11 + 22 * 10 + 2 * 12 + 6
     assert worst(found)[0] < AGREEMENT, worst(found)
 
@@ -91,7 +91,7 @@ def test_the_walk_of_twelve_joints(reading: str, static: bool) -> None:
     def referee(X: Array) -> Mapping[str, Array]:
         return walk12.walk(X, static_load=static)
 
-    found = compared(problem, referee, drawn(problem, referee, 1200))
+    found = compared(problem, referee, drawn(problem, referee, 300))
     assert len(found) == 22 + 10
     assert worst(found)[0] < AGREEMENT, worst(found)
 
@@ -113,7 +113,7 @@ def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: floa
     def referee(X: Array) -> Mapping[str, Array]:
         return stairs.step(X, length, ratio)
 
-    found = compared(problem, referee, drawn(problem, referee, 3600, in_order))
+    found = compared(problem, referee, drawn(problem, referee, 900, in_order))
     assert len(found) == 44 * 22 + 3 * 82 + 4 + 5
     assert worst(found)[0] < agreement, worst(found)
 
@@ -151,5 +151,5 @@ def test_the_referee_sees_a_wrong_sign() -> None:
     def referee(X: Array) -> Mapping[str, Array]:
         return nao.single_support(X, robot)
 
-    found = compared(problem, referee, drawn(problem, referee, 1200), "dbm")
+    found = compared(problem, referee, drawn(problem, referee, 300), "dbm")
     assert worst(found)[0] > 1e-3

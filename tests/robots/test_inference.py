@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,15 @@ def test_a_biped_is_its_legs_and_one_body_in_a_posture(robot: Robot) -> None:
     expected = (TORSO_KG * 0.15 + 2 * (ARM_KG + HAND_KG) * arm[2]) / base.mass_kg
     assert base.com_m[2] == pytest.approx(expected)
     assert base.com_m[0] == pytest.approx(2 * (ARM_KG + HAND_KG) * arm[0] / base.mass_kg)
+
+
+def test_legs_with_the_same_content_are_equal(tmp_path: Path, robot: Robot) -> None:
+    """So that what is computed from a leg is computed once, however often its file is read."""
+    (left, right), (again, _) = (
+        make_biped_model(found).legs.values() for found in (robot, load_robot(crooked(tmp_path)))
+    )
+    assert left == again and hash(left) == hash(again) and left is not again
+    assert left != right and left != replace(left, limits_rad=0.9 * left.limits_rad)
 
 
 def test_what_is_ignored_is_reported(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

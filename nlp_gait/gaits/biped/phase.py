@@ -186,23 +186,27 @@ class Phase:
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Joints whose angle changes over the phase."""
-        joints = self._symbolic_plan(Exact())[1].joints
+        joints = self._exact_plan[1].joints
         return tuple(name for name in self.body.joints if not joints[name].velocity.is_zero())
 
     @cached_property
     def _held(self) -> Array:
         """(J,) angles of the joints that do not move, zero for the others [rad]."""
-        still = {name: motion.position for name, motion in self._symbolic_plan(Exact())[1].joints.items()}
+        still = {name: motion.position for name, motion in self._exact_plan[1].joints.items()}
         return np.array([0.0 if name in self.moving else float(still[name]) for name in self.body.joints])
 
     @cached_property
     def _exact_kinematics(self) -> ca.Function:
-        return self._kinematics(Exact(), {})
+        return self._write_kinematics(*self._exact_plan, {})
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the variables."""
         return tuple(variable.name for variable in self.variables)
+
+    @cached_property
+    def _exact_plan(self) -> tuple[list[SX], Instant, InstantPoint]:
+        return self._symbolic_plan(Exact())
 
     def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant, InstantPoint]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
@@ -244,11 +248,15 @@ class Phase:
         return inputs, outputs
 
     def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
+        return self._write_kinematics(*self._symbolic_plan(ops), traces)
+
+    def _write_kinematics(
+        self, inputs: list[SX], plan: Instant, at: InstantPoint, traces: Mapping[str, Trace]
+    ) -> ca.Function:
         """One sample: moving angles and both derivatives, hip, planned angles, reach, world, attitude, and traces.
 
         ``world`` is the centre of mass, both feet and the planned wrench in one column.
         """
-        inputs, plan, at = self._symbolic_plan(ops)
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
         tree = tree_from(self.body.robot, self.body.robot.feet["left"].link)
         angles = {name: joint.position for name, joint in plan.joints.items()}
@@ -268,7 +276,7 @@ class Phase:
     @cached_property
     def _dynamics(self) -> ca.Function:
         """One sample: torques, those of the moving joints, and ZMP."""
-        inputs, loads = self._loads()
+        inputs, loads = self._loads
         torque, moving = (
             ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.body.joints, self.moving)
         )
@@ -277,12 +285,13 @@ class Phase:
     @cached_property
     def _ground(self) -> ca.Function:
         """One sample: wrenches (6,) on both soles."""
-        inputs, loads = self._loads()
+        inputs, loads = self._loads
         return ca.Function("ground", inputs, simplify([loads.wrenches[side] for side in BOTH_FEET]))
 
+    @cached_property
     def _loads(self) -> tuple[list[SX], Instant]:
         """Return angles, both derivatives, hip and world (see ``_kinematics``), and the loads as functions of these."""
-        plan = self._symbolic_plan(Exact())[1]
+        plan = self._exact_plan[1]
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         hip, world = SX.sym("hip", 3), SX.sym("world", 9 + plan.wrench.shape[0])
         _, left, right, *wrench = ca.vertsplit(world, 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -193,6 +194,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
     )
 
 
+@lru_cache(maxsize=64)
 def count_newton_steps(leg: Leg) -> int:
     """Return the steps that a leg needs after the guess: none if that is exact, else one more than closes nearly all poses.
 

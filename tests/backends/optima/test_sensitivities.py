@@ -121,7 +121,7 @@ def test_a_flat_optimum_is_refused_with_the_reason() -> None:
     ],
 )
 def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...]) -> None:
-    problem = load(name)
+    problem = load(name, intervals=5) if name == "nao-dsp" else load(name)
     near, at = solved(problem)
     assert at.residual < 1e-12
     answer = parameter_sensitivities(at)
@@ -163,9 +163,9 @@ def test_casadis_own_sensitivities_agree() -> None:
 
 @pytest.mark.slow
 def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
-    problem = load("nao-dsp")
+    problem = load("nao-dsp", intervals=5)
     near, at = solved(problem)
-    heavier, lighter = (load("nao-dsp", robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP))
+    heavier, lighter = (load("nao-dsp", intervals=5, robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP))
     answer = model_sensitivities(at, [(heavier, lighter, 2 * STEP)])
     ends = [sharp(p, near) for p in (heavier, lighter)]
     assert answer.objective[0] == pytest.approx((ends[0].cost - ends[1].cost) / (2 * STEP), rel=RESOLVED)

@@ -14,7 +14,7 @@ from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.leaning_torso import check_yaw_pitches
 from nlp_gait.robots import Robot, load_robot
 from tests.backends.toys import row_violations
-from tests.evaluation import evaluated
+from tests.evaluation import check_power, evaluated
 from tests.pinocchio_oracle import Standing, floating_model, stand
 
 pin = pytest.importorskip("pinocchio")  # needs NumPy 2
@@ -23,8 +23,6 @@ pin = pytest.importorskip("pinocchio")  # needs NumPy 2
 TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSE_TOLERANCE = 1e-8, 1e-8, 1e-9
 # Central differences over 1/1000 of the phase.
 DIFFERENCE_TOLERANCE = 1e-4
-# The same sums in another order.
-ROUNDING = 1e-12
 OWN = 8
 PAPER = (0.30, 0.006, 0.0006, 0.03, 0.03, -0.05, -0.05, 1.0)
 ANKLES_XY = {"L": (0.06, 0.05), "R": (0.12, -0.05)}
@@ -118,12 +116,7 @@ def test_velocities_and_accelerations_are_derivatives_of_the_angles() -> None:
 
 @pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
-    problem = problem_of()
-    for seed in range(4):
-        arrays = problem.signals(leaning(seed)).arrays
-        tau, qd, t = (arrays[key] for key in ("tau", "qd", "t"))
-        power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        assert evaluated(problem, leaning(seed)).cost == pytest.approx(power, rel=ROUNDING)
+    check_power(problem_of(), map(leaning, range(2)))
 
 
 @pytest.mark.slow

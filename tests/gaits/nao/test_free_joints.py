@@ -13,13 +13,11 @@ from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.free_joints import fit_joints
 from nlp_gait.robots import load_robot
 from tests.backends.toys import row_violations
-from tests.evaluation import evaluated
+from tests.evaluation import check_power, evaluated
 from tests.pinocchio_oracle import floating_model, stand
 
 # Two double-precision algorithms on torques of some Nm, a ZMP and a pose.
 TORQUE_TOLERANCE_NM, ZMP_TOLERANCE_M, POSITION_TOLERANCE_M = 1e-8, 1e-8, 1e-12
-# The same sums in another order.
-ROUNDING = 1e-12
 # Joint angles of a cubic hip and foot are smooth: with 8 spans a fit is this near in power.
 FIT_SHARE = 0.01
 OWN = 9
@@ -60,12 +58,7 @@ def test_torques_zmp_and_poses_are_those_of_a_floating_base_with_the_foot_held(s
 
 @pytest.mark.slow
 def test_the_objective_is_the_power_of_the_signals() -> None:
-    problem = problem_of()
-    for seed in range(4):
-        arrays = problem.signals(leaning(seed)).arrays
-        tau, qd, t = (arrays[key] for key in ("tau", "qd", "t"))
-        power = np.trapezoid((np.abs(tau * qd) + 0.025 * tau**2).sum(axis=1), t) / t[-1]
-        assert evaluated(problem, leaning(seed)).cost == pytest.approx(power, rel=ROUNDING)
+    check_power(problem_of(), map(leaning, range(2)))
 
 
 @pytest.mark.slow
