@@ -74,7 +74,9 @@ def test_the_best_known_point_is_feasible_and_has_its_value(published: gaitbench
     assert violation[0] == 0.0
     assert f[0] == pytest.approx(instance.best_known, rel=PUBLISHED, abs=PUBLISHED)
     width = 1e-4 * (instance.upper - instance.lower)
-    near = instance.best_x + np.random.default_rng(0).uniform(-width, width, (2000 if instance.id in COMPILED else 128, len(width)))
+    near = instance.best_x + np.random.default_rng(0).uniform(
+        -width, width, (2000 if instance.id in COMPILED else 128, len(width))
+    )
     f, violation = instance(np.clip(near, instance.lower, instance.upper))
     better = f[violation == 0.0] - instance.best_known
     assert not better.size or better.min() >= -1e-6 * max(1.0, abs(instance.best_known))

@@ -165,7 +165,9 @@ def test_casadis_own_sensitivities_agree() -> None:
 def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
     problem = load("nao-dsp", intervals=5)
     near, at = solved(problem)
-    heavier, lighter = (load("nao-dsp", intervals=5, robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP))
+    heavier, lighter = (
+        load("nao-dsp", intervals=5, robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP)
+    )
     answer = model_sensitivities(at, [(heavier, lighter, 2 * STEP)])
     ends = [sharp(p, near) for p in (heavier, lighter)]
     assert answer.objective[0] == pytest.approx((ends[0].cost - ends[1].cost) / (2 * STEP), rel=RESOLVED)
