@@ -24,7 +24,9 @@ SHORTEST_M = 1e-3
 class Leg:
     """Six turning joints from the torso to a foot, at zero angles, in the torso's axes and from its origin [m].
 
-    Legs with the same content are equal. Raises InputError without a bending knee, a hip with three different axes, or an ankle with two.
+    Legs of equal content are equal.
+
+    Raises InputError without a bending knee, a hip with three different axes, or an ankle with two.
     """
 
     joints: tuple[str, ...]  # names, the hip's first
