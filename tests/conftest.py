@@ -15,7 +15,6 @@ from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
-from tests.compare.pictures import save_coarsely
 from tests.extras import skip_without_extra
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
@@ -69,6 +68,8 @@ def pytest_fixture_setup() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def coarse_pages() -> Iterator[None]:
     """Draw each picture of a page once and small, for files whose tests do not measure the pictures of their pages."""
+    from tests.compare.pictures import save_coarsely  # Matplotlib takes half of the time of an empty run
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("compare.report.writing.save", save_coarsely)
         yield
@@ -77,6 +78,8 @@ def coarse_pages() -> Iterator[None]:
 @pytest.fixture
 def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Do so for a test."""
+    from tests.compare.pictures import save_coarsely
+
     monkeypatch.setattr("compare.report.writing.save", save_coarsely)
 
 
