@@ -5,20 +5,17 @@ Every point is evaluated again by the exact functions, all points of a problem a
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.study.definition import select_shared
-from compare.study.origin import hash_installed_code
+from compare.study.consistency import Reasons, check_claims, check_code, check_history, find_copies, group_by, is_same
+from compare.study.origin import Origin
 from compare.study.record import RunRecord, Verdict, load_problem
 from compare.study.record_files import read_each
 from compare.study.references import SAME_VALUE, find_reference
@@ -33,9 +30,6 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 MOST_INTERPRETED = 1000
 # A total violation of up to 1e-6 may improve the objective by up to this much, relatively.
 SLACK = 1e-4
-# Relative difference of the last value of a history from the judged one: exact for searches, lifted for NLP solvers, and rounded
-# for imported runs.
-END_OF_SEARCH, END_OF_SOLVER, END_OF_IMPORT = 1e-9, 1e-5, 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,10 +56,6 @@ class Evidence(NamedTuple):
     excluded: list[Exclusion]
 
 
-Reasons = list[list[str]]
-"""What is wrong with each record."""
-
-
 def check_records(
     records: Sequence[RunRecord],
     *,
@@ -83,7 +73,7 @@ def check_records(
             every solver, all or none.
     """
     reasons: Reasons = [[] for _ in records]
-    for group in _group(records, lambda r: hash_json(r.definition["problem"])):
+    for group in group_by(records, lambda r: hash_json(r.definition["problem"])):
         own, wrong = [records[k] for k in group], [reasons[k] for k in group]
         try:
             problem = (find_problem or load_problem)(own[0])
@@ -95,9 +85,10 @@ def check_records(
         _check_bound(problem.objective, own, wrong)
         _check_between_samples(problem, own, wrong, between_samples)
     for record, why in zip(records, reasons, strict=True):
-        why += _check_history(record)
-    _check_repeats(records, reasons)
-    _check_code(records, reasons, needs_origin)
+        why += check_history(record)
+        why += check_claims(record)
+    find_copies(records, reasons)
+    check_code(records, reasons, needs_origin)
     kept = [record for record, why in zip(records, reasons, strict=True) if not why]
     excluded = [
         Exclusion(name=name_record(record), reasons=tuple(why), record=record)
@@ -131,22 +122,14 @@ def name_record(record: RunRecord) -> str:
     return f"{record.problem}, {record.solver}, run {record.run}"
 
 
-def _group(records: Sequence[RunRecord], key: Callable[[RunRecord], object]) -> list[list[int]]:
-    """Return the positions of records with equal keys."""
-    found: dict[object, list[int]] = {}
-    for k, record in enumerate(records):
-        found.setdefault(key(record), []).append(k)
-    return list(found.values())
-
-
 def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: Reasons) -> None:
     """Compare objective, violation, feasibility and indexes with the exact functions at x."""
-    identity, described = identify_problem(problem), asdict(problem.objective)
+    identity, described, here = identify_problem(problem), asdict(problem.objective), Origin.make()
     placed: list[int] = []
     points: list[Array] = []
     for k, (record, why) in enumerate(zip(records, reasons, strict=True)):
         known = record.definition["problem"].get(HASH)
-        other_casadi = record.origin is not None and record.origin.casadi != version("casadi")
+        other_casadi = record.origin is not None and record.origin.casadi != here.casadi
         if known != identity[HASH] and not other_casadi:
             why.append("its problem has changed since: the hashes of the exact functions or values differ")
         if record.definition["objective"] != described:
@@ -190,10 +173,10 @@ def _evaluate_one(problem: GaitProblem, x: Array) -> _Values:
 
 
 def _compare_verdict(verdict: Verdict, found: _Values) -> Iterator[str]:
-    if not _is_same(verdict.objective, found.objective):
+    if not is_same(verdict.objective, found.objective):
         yield f"its objective is {verdict.objective:.9g}, but that of its x is {found.objective:.9g}"
     violation = math.inf if math.isnan(found.violation) else found.violation
-    if not _is_same(verdict.violation, violation, 1.0):
+    if not is_same(verdict.violation, violation, 1.0):
         yield f"its violation is {verdict.violation:.3g}, but that of its x is {violation:.3g}"
     if verdict.feasible != (verdict.violation <= FEASIBILITY_TOLERANCE):
         yield f"it is called {'feasible' if verdict.feasible else 'infeasible'} with a violation of {verdict.violation:.3g}"
@@ -201,15 +184,8 @@ def _compare_verdict(verdict: Verdict, found: _Values) -> Iterator[str]:
         if verdict.indexes.keys() != found.indexes.keys():
             yield "its indexes have other names than those of the problem"
         for name in verdict.indexes.keys() & found.indexes.keys():
-            if not _is_same(verdict.indexes[name], found.indexes[name], 1.0):
+            if not is_same(verdict.indexes[name], found.indexes[name], 1.0):
                 yield f"its index {name} is {verdict.indexes[name]:.9g}, but that of its x is {found.indexes[name]:.9g}"
-
-
-def _is_same(a: float, b: float, scale: float = 0.0) -> bool:
-    """Return whether two numbers agree to nine digits; numbers that are not finite agree with their kind."""
-    if not (math.isfinite(a) and math.isfinite(b)):
-        return a == b or (math.isnan(a) and not math.isfinite(b)) or (math.isnan(b) and not math.isfinite(a))
-    return abs(a - b) <= SAME_VALUE * max(abs(a), abs(b), scale)
 
 
 def _check_failed(record: RunRecord) -> Iterator[str]:
@@ -235,7 +211,7 @@ def _check_between_samples(problem: GaitProblem, records: Sequence[RunRecord], r
     chosen = list(range(len(records))) if scope == "all" else []
     if scope == "best":
         cost = [problem.objective.sign * r.verdict.objective if r.verdict.feasible else math.inf for r in records]
-        chosen = [min(own, key=lambda k: cost[k]) for own in _group(records, lambda r: r.solver)]
+        chosen = [min(own, key=lambda k: cost[k]) for own in group_by(records, lambda r: r.solver)]
         chosen = [k for k in chosen if math.isfinite(cost[k])]
     for k in chosen:
         if reasons[k] or not records[k].x:
@@ -252,73 +228,8 @@ def _check_between_samples(problem: GaitProblem, records: Sequence[RunRecord], r
 def _are_same(a: Mapping[str, float] | None, b: Mapping[str, float] | None) -> bool:
     if a is None or b is None:
         return a is b
-    return a.keys() == b.keys() and all(_is_same(a[name], b[name], 1.0) for name in a)
+    return a.keys() == b.keys() and all(is_same(a[name], b[name], 1.0) for name in a)
 
 
 def _describe_guarantee(verdict: Verdict) -> str:
     return "nothing" if verdict.guaranteed is None else verdict.guaranteed.word
-
-
-def _check_history(record: RunRecord) -> Iterator[str]:
-    """Check that the best so far never worsens and ends at the judged value, and that the counts add up."""
-    history, definition, imported = record.history, record.definition, "imported" in record.definition
-    is_search, f = "handling" in definition, record.evaluations["f"]
-    known = [value for value in history.objective if value is not None]
-    if any(not math.isfinite(value) for value in known):
-        yield "its history has a value that is not finite"
-    sign = 1.0 if definition["objective"]["sense"] == "minimise" else -1.0
-    if is_search and any(sign * (b - a) > 0.0 for a, b in itertools.pairwise(known)):
-        yield "the best value of its history worsens"
-    if is_search and None in history.objective[len(history.objective) - len(known) :]:
-        yield "its history loses a feasible point"
-    if known and (is_search or "polishes" not in definition):
-        last, judged = known[-1], record.verdict.objective
-        tolerance = END_OF_IMPORT if imported else END_OF_SEARCH if is_search else END_OF_SOLVER
-        if not abs(last - judged) <= tolerance * max(abs(last), abs(judged)):
-            yield f"its history ends at {last:.9g}, but the judge finds {judged:.9g}"
-    if any(a > b for a, b in itertools.pairwise((0.0, *record.time_s.history))):
-        yield "the times of its history do not ascend from 0"
-    budget = (definition.get("stop") or {}).get("evaluations")
-    if is_search and budget is not None and f > budget:
-        yield f"it counts {f} evaluations, more than its budget of {budget}"
-    if is_search and history.evaluations and history.evaluations[-1] != f:
-        yield f"its history ends after {history.evaluations[-1]} evaluations, but it counts {f}"
-    if record.failed_evaluations > f:
-        yield f"it counts {record.failed_evaluations} failed evaluations of {f}"
-
-
-def _check_repeats(records: Sequence[RunRecord], reasons: Reasons) -> None:
-    """Find runs that count twice: with the seed of another run of the same solver, or with all its times."""
-
-    def make_key(record: RunRecord) -> tuple[str, str, str]:
-        return record.problem, record.solver, hash_json(select_shared(record.definition))
-
-    for group in _group(records, make_key):
-        group.sort(key=lambda k: records[k].run)
-        seeds: dict[int, int] = {}
-        times: dict[tuple[float, ...], int] = {}
-        for k in group:
-            record = records[k]
-            first = seeds.setdefault(record.seed, record.run)
-            if first != record.run:
-                reasons[k].append(f"its seed {record.seed} repeats that of run {first}")
-            if record.origin is None or not record.time_s.solve > 0.0:
-                continue
-            first = times.setdefault((record.time_s.solve, *record.time_s.history), record.run)
-            if first != record.run:
-                reasons[k].append(f"all its times are those of run {first}: it is a copy")
-
-
-def _check_code(records: Sequence[RunRecord], reasons: Reasons, needs_origin: bool) -> None:
-    """Find runs of other code than the installed one, or, if no record is of that, than most records."""
-    found = Counter(r.origin.code_sha256 for r in records if r.origin is not None)
-    installed = hash_installed_code()
-    usual = installed if installed in found or not found else found.most_common(1)[0][0]
-    for record, why in zip(records, reasons, strict=True):
-        if "imported" in record.definition:
-            continue
-        if record.origin is None:
-            if needs_origin:
-                why.append("it does not say which code computed it")
-        elif record.origin.code_sha256 != usual:
-            why.append(f"it was computed by other code ({record.origin.code}; the others by {usual[:8]})")

@@ -28,6 +28,7 @@ class Origin:
     machine: str  #: processor and system
 
     @classmethod
+    @cache
     def make(cls) -> Origin:
         """Return the origin of a run in this process."""
         return cls(
@@ -40,7 +41,7 @@ class Origin:
     @property
     def code(self) -> str:
         """Version and hash, for messages."""
-        return f"{self.version}, code {self.code_sha256[:8]}"
+        return f"{self.version}, code {self.code_sha256[:8]}, CasADi {self.casadi}"
 
 
 def format_now() -> str:
