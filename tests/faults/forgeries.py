@@ -1,4 +1,4 @@
-"""Forged records: each changes one stored run of an honest study, as a file that somebody edits."""
+"""Forged records: each changes one stored run of an honest study, as edited by hand."""
 
 from __future__ import annotations
 
