@@ -45,8 +45,8 @@ class Instants:
     def inputs(self) -> tuple[Array, Array, Array]:
         """Desired states (m + 1, 18), other inputs (m, n), and both ends of the support polygon (m, 2) [m]."""
         at = self.problem.at([1.0, 1.0, self.torso_rad])
-        desired, given = (np.array(ca.evalf(part)).T for part in self.loop.inputs(at, Exact()))
-        ends = [np.array(ca.evalf(part)) for part in support_polygon(at, self.loop.quanta)]
+        desired, given = (np.array(ca.evalf(part)).T for part in self.loop.inputs(at, Exact())[:2])
+        ends = [np.array(ca.evalf(part)) for part in support_polygon(at, self.loop)]
         return desired, given, np.hstack(ends)
 
     @cached_property

@@ -13,8 +13,8 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED, solve_legs_by_network
-from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, biped_dynamics, centres, link_angles, points
-from nlp_gait.gaits.stairs.planned_motion import Stair, posture, stair_height
+from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, biped_dynamics, centres, points
+from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, posture, stair_height
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
@@ -32,12 +32,10 @@ Scheme = Literal["implicit", "explicit"]
 InverseKinematics = Literal["closed-form", "network", "printed-network"]
 Rates = Literal["exact", "differences"]
 Coordinates = Literal["joint", "printed", "link"]
-Base = Literal["stance-ankle", "hip"]
+Base = Literal["stance-foot", "hip"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
-# Points that may touch the ground, all but the base: the stance ankle as base never leaves it.
-CONTACTS = ("T", "S", "A", "S'", "T'", "A'")
-BASES: Mapping[Base, str] = {"stance-ankle": "A'", "hip": "H"}
+CONTACTS = ("T", "S", "A", "S'", "T'", "A'")  # points that may touch the ground, all but the base
 N = len(LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
 # k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
@@ -80,6 +78,7 @@ class Rollout(NamedTuple):
     state: MX  # (18, m) angles [rad] and rates [rad/s] of the nine links
     torque: MX  # (9, m) torques on the controlled angles [Nm]
     zmp: MX  # (1, m) ahead of the stance ankle, on the virtual slope in double support [m]
+    place: MX  # (2, m) of the base [m]
 
 
 class QuantumInputs(NamedTuple):
@@ -87,6 +86,7 @@ class QuantumInputs(NamedTuple):
 
     desired: MX  # (18, m + 1) link angles and rates at the ends of all quanta
     given: MX  # (n, m), see GIVEN
+    place: MX  # (2, m) of the base at the end of each quantum [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,7 +98,8 @@ class ClosedLoop:
     gains: int  # number of different K_p, and of different K_d: 1 or one for each link
     inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
     coordinates: Coordinates = "joint"  # what the controller measures and drives
-    base: Base = "stance-ankle"  # pinned to its step; or the hip, on its planned curve
+    base: Base = "stance-foot"  # pinned to its step; or the hip, on its planned curve
+    kind: StepKind = "next"
     rates: Rates = "exact"  # desired ones: derivatives of the plan, or differences of its angles over a quantum
 
     @cached_property
@@ -106,20 +107,25 @@ class ClosedLoop:
         """(9, 9) from link angles to the controlled angles."""
         return measure_joints(self.coordinates)
 
+    @property
+    def base_point(self) -> str:
+        """The hip; or of the stance foot the ankle, or the tip of the toe where the foot turns about it."""
+        return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
+
     def inputs(self, point: Point, ops: Nonsmooth) -> QuantumInputs:
         """Return the desired motion and the other inputs of all quanta."""
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
-        planned = _make_desired(ops).map(self.quanta + 1)(DM(times[None, :]), plan)
+        planned = _make_desired(ops, self.kind).map(self.quanta + 1)(DM(times[None, :]), plan)
         desired, place, speed = ca.vertsplit(planned, [0, 2 * N, 2 * N + 2, 2 * N + 4])
         if self.inverse_kinematics != "closed-form":
             settings = ONLINE if self.inverse_kinematics == "network" else PRINTED
             desired = solve_legs_by_network(desired, settings)
         if self.rates == "differences":
             differences = (desired[:N, 1:] - desired[:N, :-1]) / QUANTUM
-            desired = ca.vertcat(desired[:N, :], ca.horzcat(desired[N:, 0], differences))
+            desired = ca.vertcat(desired[:N, :], ca.horzcat(differences[:, 0], differences))
         constants = ca.vertcat(
             size,
             *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
@@ -127,27 +133,36 @@ class ClosedLoop:
             point["disturbance_Nm"],
         )
         acted = slice(1, None) if self.scheme == "implicit" else slice(None, -1)
+        if self.base == "stance-foot":
+            ahead = toe_foot_biped().foot_m * (self.base_point == "T'")
+            place, speed = MX(DM([[ahead] * (self.quanta + 1), [0] * (self.quanta + 1)])), MX(2, self.quanta + 1)
         base = ca.vertcat(place[:, :-1], speed[:, acted], (speed[:, 1:] - speed[:, :-1]) / QUANTUM)
         on_slope = ca.fmax(DM(times[None, 1:]) < point["t2_s"], point["slope_in_single_support"])
         given = ca.vertcat(
             desired[:, acted],
             DM(times[None, :-1]),
             ca.repmat(constants, 1, self.quanta),
-            base if self.base == "hip" else DM(6, self.quanta),
-            stair.rise / stair.tread * on_slope,
+            base,
+            0 * on_slope if self.kind == "first" else stair.rise / stair.tread * on_slope,
             ca.repmat(point["spin_in_zmp"], 1, self.quanta),
             DM(N, self.quanta),
         )
-        return QuantumInputs(desired, given)
+        return QuantumInputs(desired, given, place[:, 1:])
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
         """Return states, torques and ZMP for tuned K_p (gains,), K_d (gains,) >= 0 and desired torso pitch."""
-        desired, given = self.inputs(point, ops)
+        desired, given, place = self.inputs(point, ops)
         inputs = given, ca.repmat(tuned, 1, self.quanta)
         states = ops.rollout(self.step, desired[:, 0], *inputs)
         before = ca.horzcat(desired[:, 0], states[:, :-1])
         torque, zmp = self.outcome.map(self.quanta)(before, states, *inputs)
-        return Rollout(desired[:, 1:], states, torque, zmp)
+        return Rollout(desired[:, 1:], states, torque, zmp, place)
+
+    def find_stance_ankle(self, rollout: Rollout) -> MX:
+        """Return its place (2, m) in a rollout [m]."""
+        q, place = SX.sym("q", N), SX.sym("place", 2)
+        found = points(toe_foot_biped().rods, q, place, self.base_point)["A'"]
+        return ca.Function("ankle", [q, place], [found]).map(self.quanta)(rollout.state[:N, :], rollout.place)
 
     @cached_property
     def step(self) -> ca.Function:
@@ -162,19 +177,19 @@ class ClosedLoop:
         """Return the equations of the acceleration within one quantum."""
         (q, v), rods = state, toe_foot_biped().rods
         place, speed, push = ca.vertsplit(parts["base"], [0, 2, 4, 6])
-        found = points(rods, q, place, BASES[self.base])
-        motion = biped_dynamics(rods, GRAVITY, q, v, q, BASES[self.base])
+        found = points(rods, q, place, self.base_point)
+        motion = biped_dynamics(rods, GRAVITY, q, v, q, self.base_point)
         momentum = sum((rods[link].mass * middle for link, middle in centres(found).items()), SX(2, 1))
         stair = Stair(parts["size"][0], parts["size"][1])
         contacts = [
             Contact(
-                found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH),
+                found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, self.kind),
                 ca.jacobian(found[name][1], q).T,
                 ca.jacobian(found[name][0], q).T,
                 speed[::-1],
             )
             for name in CONTACTS
-            if name != BASES[self.base]
+            if name != self.base_point
         ]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
         inertia = ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push  # of links that the base accelerates
@@ -188,7 +203,7 @@ class ClosedLoop:
         """Function of (state, next state, given, tuned) to torques (9,) and ZMP, with a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
-        rods, base = toe_foot_biped().rods, BASES[self.base]
+        rods, base = toe_foot_biped().rods, self.base_point
         G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q, base).G
         acted = following if self.scheme == "implicit" else state
         torque = controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
@@ -227,16 +242,17 @@ class ClosedLoop:
         return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
-def _make_desired(ops: Nonsmooth) -> ca.Function:
+def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)
     step = posture(
-        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops
+        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops, kind
     )
     given = ca.vertcat(values, size, margin)
-    motion = [link_angles(step.q.position), link_angles(step.q.velocity), step.hip.position, step.hip.velocity]
+    angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
+    motion = [*angles, step.hip.position, step.hip.velocity]
     pose = ca.Function("pose", [s, passing, given], motion)
     time = SX.sym("time")
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])

@@ -34,6 +34,7 @@ _SWING = (("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1))
 _FOOT = (("A'S'", 1), ("S'T'", 1))
 _PATHS: Mapping[str, tuple[tuple[str, int], ...]] = {
     "A'": (("K'A'", -1), ("HK'", -1), *_SWING, *_FOOT),
+    "T'": (("S'T'", -1), ("A'S'", -1), ("K'A'", -1), ("HK'", -1), *_SWING),
     "H": (*_SWING, ("HK'", 1), ("K'A'", 1), *_FOOT),
 }
 
@@ -57,7 +58,7 @@ def direction(link: str, angle: SX) -> SX:
 def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
     """Return positions of all joints and ends by name, (2,) each [m], from nine angles [rad] and the place of the base (2,) [m].
 
-    The base is the stance ankle A' or the hip H.
+    The base is the stance ankle A', the tip of the stance toe T' or the hip H.
     """
     return sum_along_links(base, place, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
 

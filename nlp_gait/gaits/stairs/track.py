@@ -40,6 +40,7 @@ from nlp_gait.gaits.stairs.closed_loop import (
 )
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
 from nlp_gait.gaits.stairs.planar_biped import LINKS
+from nlp_gait.gaits.stairs.planned_motion import StepKind
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -99,7 +100,8 @@ def stairs_track(
     scheme: Scheme = "implicit",
     inverse_kinematics: InverseKinematics = "closed-form",
     coordinates: Coordinates = "joint",
-    base: Base = "stance-ankle",
+    step: StepKind = "next",
+    base: Base = "stance-foot",
     rates: Rates = "exact",
     zmp: ZmpRule = "limits",
     tracking_limit: bool = True,
@@ -117,7 +119,10 @@ def stairs_track(
             of iterations, with which few poses converge.
         coordinates: what the controller measures and drives, and the disturbance acts on: joint angles and torques; as printed
             only the knees are joints (27), (28), and other angles are those of links; or all angles are those of links.
-        base: stance ankle, pinned to its step, with five contacts; or the hip on its planned curve, with the paper's six.
+        step: ``next`` over a flat stance foot; ``landing``, the same with the reverse double support, in which the stance foot
+            turns down about the tip of its toe; or ``first`` from standing.
+        base: stance foot, pinned at its ankle (in landing at its toe), with five contacts; or the hip on its planned curve, with
+            the paper's six.
         rates: desired rates of the angles: exact, or as printed by differences over a quantum.
         zmp: within the supporting polygon (Algorithm 3), with the least margin maximised; or a penalty outside it.
         tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
@@ -137,6 +142,7 @@ def stairs_track(
         inverse_kinematics=inverse_kinematics,
         coordinates=coordinates,
         base=base,
+        kind=step,
         rates=rates,
     )
     limits = {"lower": 0.0, "upper": LARGEST_GAIN, "minimum": 0.0, "maximum": 1e6}
@@ -157,7 +163,9 @@ def stairs_track(
         return about * (1 + SCATTER * rng.standard_normal(len(variables)))
 
     def motion(at: NumericPoint) -> Signals:
-        desired, state, torque, zmp = (np.array(ca.evalf(part)).T for part in rollout(at, Exact()))
+        found = rollout(at, Exact())
+        parts = (*found[:4], loop.find_stance_ankle(found))
+        desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
         joints = loop.joints.full().T
         return Signals(
             joints=LINKS,
@@ -171,9 +179,11 @@ def stairs_track(
                 "link_qd": state[:, N:],
                 "tau": torque,
                 "zmp": zmp[:, 0],
+                "stance_ankle": stance_ankle,
             },
             columns={
                 "zmp": stair.COLUMNS["zmp"],
+                "stance_ankle": stair.COLUMNS["stance_ankle"],
                 "q_desired": Columns(unit="rad", labels=LINKS),
                 "qd_desired": Columns(unit="rad/s", labels=LINKS),
                 "link_q": Columns(unit="rad", labels=LINKS),
@@ -187,36 +197,39 @@ def stairs_track(
         on_links = arrays["tau"] @ loop.joints.full()
         return make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
 
+    model = simulation_model(step_motion) if step == "next" else None
     return GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
-        assemble=lambda point, ops: _assemble(point, rollout(point, ops), loop.joints, zmp, tracking_limit, ops),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion)),
+        assemble=lambda point, ops: _assemble(point, rollout(point, ops), loop, zmp, tracking_limit, ops),
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=model),
         hints=SolverHints(start=start, starts=1, amplifies_rounding=True),
     )
 
 
-def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_limit: bool, ops: Nonsmooth) -> Assembly:
+def _assemble(
+    point: Point, rollout: Rollout, loop: ClosedLoop, rule: ZmpRule, tracking_limit: bool, ops: Nonsmooth
+) -> Assembly:
     """Return the mean of (53) over all quanta with the worth of the ZMP margin or its penalty, and the limits of both."""
-    quanta = loop.state.shape[1]
-    errors = ca.diagcat(joints, joints) @ (loop.state - loop.desired)
-    power = loop.torque * (joints @ loop.state[N:, :])
-    rear, front = support_polygon(point, quanta)
+    quanta, zmp = loop.quanta, rollout.zmp.T
+    errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
+    power = rollout.torque * (loop.joints @ rollout.state[N:, :])
+    rear, front = support_polygon(point, loop)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
-    balance = _outside(loop.zmp.T, rear, front, ops) if rule == "penalty" else -_margin(loop.zmp.T, rear, front, ops)
+    balance = _outside(zmp, rear, front, ops) if rule == "penalty" else -_margin(zmp, rear, front, ops)
     instants, constraints = range(1, quanta + 1), []
     if rule == "limits":  # (Algorithm 3)
-        constraints.append(stair.rows("zmp", loop.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
+        constraints.append(stair.rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
     if tracking_limit:
         most, limited = point["tracking_tolerance_rad"], errors[:N, :]
         constraints.append(
             stair.rows("tracking", limited, LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants)
         )
-    finite = exact.abs(ca.sum1(loop.state)) < LARGEST_STATE
+    finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
     return Assembly(
         objective=tracking + effort + point["zmp_weight"] * balance,
         constraints=tuple(constraints),
@@ -225,22 +238,23 @@ def _assemble(point: Point, loop: Rollout, joints: DM, rule: ZmpRule, tracking_l
             "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
             "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
             "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
-            "peak_torque_Nm": exact.largest(ca.vec(loop.torque)),
-            "zmp_margin_min_m": _margin(loop.zmp.T, rear, front, exact),
+            "peak_torque_Nm": exact.largest(ca.vec(rollout.torque)),
+            "zmp_margin_min_m": _margin(zmp, rear, front, exact),
             "quanta_before_divergence": ca.sum2(finite),
         },
     )
 
 
-def support_polygon(point: Point, quanta: int) -> tuple[MX, MX]:
+def support_polygon(point: Point, loop: ClosedLoop) -> tuple[MX, MX]:
     """Return the rear and front end of the support polygon at the end of each quantum, (m, 1) ahead of the stance ankle [m].
 
-    The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe.
+    The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe. In
+    the first step both feet begin side by side.
     """
     foot = toe_foot_biped().foot_m
-    times = DM(np.arange(1, quanta + 1) * QUANTUM)
-    rear = (times < point["t2_s"]) * (foot - point["stair_length_m"] / 2)
-    return rear, MX(DM([foot] * quanta))
+    times = DM(np.arange(1, loop.quanta + 1) * QUANTUM)
+    behind = 0 if loop.kind == "first" else foot - point["stair_length_m"] / 2
+    return (times < point["t2_s"]) * behind, MX(DM([foot] * loop.quanta))
 
 
 def _outside(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
