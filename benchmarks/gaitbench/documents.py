@@ -33,7 +33,10 @@ def main() -> None:
 
 def format_instances() -> str:
     """Return a table with a row for each instance."""
-    rows = ["| id | what | n | rows | feasible | cost | best known | evidence |", "|---|---|--:|--:|--:|--:|--:|---|"]
+    rows = [
+        "| id | what | n | inequalities | feasible | cost | best known | evidence |",
+        "|---|---|--:|--:|--:|--:|--:|---|",
+    ]
     for id in gaitbench.names():
         instance = gaitbench.load(id)
         share, small = instance.facts.feasible_share, instance.definition.small

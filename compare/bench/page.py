@@ -11,6 +11,7 @@ from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard
 from compare.drawing.comparison_figures import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, text_table
+from compare.report.provenance import TERMS
 from nlp_gait import gaitbench
 
 PER_INSTANCE_TARGET = 1e-3
@@ -24,6 +25,7 @@ def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) ->
         title=title if solver is None else f"{solver} on {title}",
         verdict=() if solver is None else make_verdict(board, solver),
         parts=(
+            TERMS,
             _make_standings_table(board),
             Figure(
                 name="gaitbench-runtime",
@@ -38,8 +40,7 @@ def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) ->
                 parts=(
                     f"Each solver makes {RUNS} runs on each instance with {EVALUATIONS} evaluations each, run k with the seed k; "
                     "IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within "
-                    "60 s. Calls of derivatives count as forward differences would: n + 1 evaluations for a gradient or a "
-                    "Jacobian, (n + 1)(n + 2)/2 for a Hessian. What counts is the exact functions' verdict. The mean rank is "
+                    "60 s. What counts is the exact functions' verdict. The mean rank is "
                     "that of the expected running time over all instances and the targets "
                     + ", ".join(f"{100 * target:g} %" for target in TARGETS)
                     + " above the best known; equals share a rank, and pairs that no solver reached are left out.",

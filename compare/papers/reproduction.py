@@ -32,7 +32,7 @@ from compare.papers.claims import (
 )
 from compare.papers.paper_runs import Effort, Runner
 from compare.report.document import Rows, Section, Table, text_table
-from compare.report.provenance import format_settings, make_session_section, make_solver_table
+from compare.report.provenance import TERMS, format_settings, make_session_section, make_solver_table
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 from compare.study.manifest import Session
@@ -130,6 +130,7 @@ class Reproduction(Generic[E, F]):
                 text_table(
                     ("effort", "value"), [(k, format_settings(v)) for k, v in asdict(effort).items()], prose=True
                 ),
+                TERMS,
                 make_solver_table(runner.records),
                 *(make_session_section(k, session) for k, session in enumerate(sessions, start=1)),
             ),

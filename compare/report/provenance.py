@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any
 
-from compare.report.document import Section, Table, text_table
+from compare.report.document import Prose, Section, Table, text_table
 from compare.study.manifest import Session
 from compare.study.record import RunRecord
+from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
+from metaheuristics.errors import SearchError
+from metaheuristics.registry import ALGORITHMS, algorithm
+from nlp_gait.backends.solvers.registry import make_solver
+from nlp_gait.errors import GaitError
+
+# The one explanation of each term, on every page that uses it.
+TERMS = Prose(
+    "*Terms.* **Run**: one solver with one seed; a start of a gradient method is a run. **Gap**: distance from the best "
+    "known value, relative to it. **Reached to 1e-6**: a gap of at most 1e-6, which is 0.0001 %. **Evaluations** are "
+    "equivalent ones: the objective with all constraints at one point counts 1; for n variables a gradient or a Jacobian "
+    "counts n + 1, a Hessian (n + 1)(n + 2)/2, like finite differences. **Constraint**: one value between a lower and an "
+    "upper bound; the bounds of the variables are not counted."
+)
 
 
 def make_session_section(number: int, session: Session) -> Section:
@@ -24,21 +40,75 @@ def make_session_section(number: int, session: Session) -> Section:
 
 
 def make_solver_table(records: Iterable[RunRecord]) -> Table:
-    """Return settings, seeds and evaluations of the solvers of all records, a row for each difference."""
-    rows: dict[tuple[str, str], list[RunRecord]] = {}
+    """Return settings, budget and seeds of the solvers of all records, a row for each difference."""
+    rows: dict[tuple[str, str, str], list[RunRecord]] = {}
     for record in records:
-        rows.setdefault((record.solver, format_settings(record.settings)), []).append(record)
+        rows.setdefault((record.solver, format_settings(record.settings), describe_budget(record)), []).append(record)
     cells = [
         (
             solver,
-            settings,
+            *compare_with_defaults(group[0]),
             f"{min(r.seed for r in group)} to {max(r.seed for r in group)}",
             str(len(group)),
             str(len({r.problem for r in group})),
         )
-        for (solver, settings), group in rows.items()
+        for (solver, _, _), group in rows.items()
     ]
-    return text_table(("solver", "settings", "seeds", "runs", "problems"), cells, prose=True)
+    return text_table(("solver", *SETTINGS, "seeds", "runs", "problems"), cells, prose=True)
+
+
+# Recorded as the solver chose it.
+CHOSEN = "linear_solver"
+SETTINGS = ("evaluations allowed", "changed settings", "default settings")
+
+
+def compare_with_defaults(record: RunRecord) -> tuple[str, str, str]:
+    """Return a run's budget, its solver's settings that differ from the defaults, and the others, under ``SETTINGS``."""
+    settings, defaults = dict(record.settings), _find_defaults(record)
+    if defaults is None:
+        return describe_budget(record), format_settings(settings) or "-", "unknown"
+    handling = settings.pop("handling", None)
+    if isinstance(handling, Mapping):
+        settings["constraint handling"] = handling.get("kind") if handling.keys() == {"kind"} else handling
+        defaults = {**defaults, "constraint handling": "Deb"}
+    given = record.definition["settings"]
+    changed = {
+        name: value
+        for name, value in settings.items()
+        if name in defaults and value != defaults[name] and not (name == CHOSEN and name not in given)
+    }
+    texts = [
+        f"{name}: {format_settings(value)} (default {format_settings(defaults[name])})"
+        for name, value in changed.items()
+    ]
+    others = {name: value for name, value in settings.items() if name not in changed and name != "kind"}
+    return describe_budget(record), ", ".join(texts) or "none", format_settings(others) or "-"
+
+
+def describe_budget(record: RunRecord) -> str:
+    """Return the number of evaluations that a run was allowed."""
+    stop = record.definition.get("stop") or {}
+    return f"{stop['evaluations']:,}".replace(",", "\u202f") if stop.get("evaluations") else "no limit"
+
+
+def _find_defaults(record: RunRecord) -> Mapping[str, Any] | None:
+    """Return the default settings of a run's solver; None for user code and imported results."""
+    solver = record.definition.get("solver")
+    if "polishes" in record.definition:
+        solver = GRADIENT_SOLVERS[0]
+    if isinstance(solver, Mapping):  # settings of a search, by its class
+        kind = solver.get("kind")
+        solver = next((name for name in ALGORITHMS if _load_defaults(name).get("kind") == kind), None)
+    known = isinstance(solver, str) and solver in list_solvers() and "imported" not in record.definition
+    return (_load_defaults(str(solver)) or None) if known else None
+
+
+@cache
+def _load_defaults(name: str) -> Mapping[str, Any]:
+    try:
+        return make_solver(name).to_dict() if name in GRADIENT_SOLVERS else describe_settings(algorithm(name))
+    except (GaitError, SearchError):  # a package is not installed
+        return {}
 
 
 def format_settings(settings: object) -> str:

@@ -13,7 +13,7 @@ from compare.analysis.verdict import write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.document import Document, Figure, Section, text_table
 from compare.report.problem_section import HOW, problem_section
-from compare.report.provenance import format_settings, make_session_section
+from compare.report.provenance import SETTINGS, TERMS, compare_with_defaults, format_settings, make_session_section
 from compare.report.writing import write_document
 from compare.study.description import describe_solver, list_described_names
 from compare.study.evidence import Exclusion, read_evidence
@@ -65,6 +65,7 @@ def make_study_document(
         verdict=write_verdict(comparisons),
         parts=(
             *_list_excluded(excluded),
+            TERMS,
             *sections,
             *(() if simulated else (HOW,)),
             _make_method_section(comparisons, manifest, weighting),
@@ -114,13 +115,11 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
     return Section(
         title="Counting",
         parts=(
-            "One evaluation is the objective and all constraints at one point. By default a first derivative counts n + 1, a "
-            "Hessian (n + 1)(n + 2)/2 for n variables, objective and constraints separately, like finite differences,"
-            " so gradient methods are never favoured. A gradient run reaches its targets at its end. A "
-            "polished run includes the cost of its search. Times are wall times of the solve, without building or "
-            "compiling.",
-            "Searches with equal seeds start from the same points; run k has the study's seed plus k. Settings of all "
-            "algorithms are the defaults of their sources; none was tuned on these problems.",
+            "Objective and constraints count separately where they are called separately, so gradient methods are never "
+            "favoured. A gradient run reaches its targets at its end. A polished run includes the cost of its search. Times are "
+            "wall times of the solve, without building or compiling.",
+            "Searches with equal seeds start from the same points; run k has the study's seed plus k. The table of settings says "
+            "what was changed; the defaults are those of the sources, and none was tuned on these problems.",
             text_table(("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"), rows),
         ),
     )
@@ -130,21 +129,23 @@ def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
     rows = []
     for comparison in comparisons:
         for solver in comparison.solvers:
-            settings = next((r.settings for r in solver.records if r.settings), {})
+            run = next((r for r in solver.records if r.settings), solver.records[0])
             seeds = f"{solver.records[0].seed} to {solver.records[-1].seed}"
             what = describe_solver(solver.name).title if solver.name in list_described_names() else "-"
-            rows.append((comparison.problem, solver.name, seeds, format_settings(settings), what))
+            rows.append((comparison.problem, solver.name, seeds, *compare_with_defaults(run), what))
         problem = comparison.records[0].definition.get("problem", {})
         rows.append(
             (
                 comparison.problem,
                 "(problem)",
                 "-",
-                format_settings({**problem.get("options", {}), **problem.get("parameters", {})}),
                 "-",
+                format_settings(problem.get("parameters", {})) or "none",
+                format_settings(problem.get("options", {})),
+                "options of the problem, and changed values",
             )
         )
-    header = ("problem", "solver", "seeds", "settings", "what")
+    header = ("problem", "solver", "seeds", *SETTINGS, "what")
     return Section(title="Settings and seeds", parts=(text_table(header, rows, prose=True),))
 
 

@@ -188,8 +188,14 @@ def _rows(problem: GaitProblem) -> str:
         )
         for name, group in groups.items()
     ]
-    words = f"{len(values)} rows in {len(groups)} groups, and the variables' bounds. Times of instants are the problem's samples."
-    return page("## Rows", words, table(("group", "rows", "unit", "lower", "upper", "of each"), rows)).strip()
+    sides = sum((row.lower is not None) + (row.upper is not None) for row in values)
+    words = (
+        f"{len(values)} constraints in {len(groups)} groups, and the bounds of the variables. Each is one value between a lower "
+        f"and an upper bound; written as one-sided inequalities, as GaitBench does, they are {sides}. Times of instants are the "
+        "problem's samples."
+    )
+    header = ("group", "constraints", "unit", "lower", "upper", "of each")
+    return page("## Constraints", words, table(header, rows)).strip()
 
 
 def _range(bounds: list[float | None]) -> str:

@@ -74,7 +74,7 @@ class Instance:
         return partial(load, self.id, unit_cube=self.unit_cube), ()
 
     def __repr__(self) -> str:
-        return f"<GaitBench {self.id}: {len(self.names)} variables, {len(self.row_names)} rows>"
+        return f"<GaitBench {self.id}: {len(self.names)} variables, {len(self.row_names)} inequalities>"
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
         """Evaluate points X (P, n), one a row.

@@ -169,7 +169,7 @@ def test_bounds_of_a_constant_are_removed() -> None:
 
 def test_an_instance_says_what_it_is_and_keeps_its_bounds() -> None:
     instance = gaitbench.load("walk12-w015")
-    assert repr(instance) == f"<GaitBench walk12-w015: 4 variables, {len(instance.row_names)} rows>"
+    assert repr(instance) == f"<GaitBench walk12-w015: 4 variables, {len(instance.row_names)} inequalities>"
     for bounds in (instance.lower, instance.upper):
         with pytest.raises(ValueError, match="read-only"):
             bounds[0] = 0.0
