@@ -1,0 +1,108 @@
+"""Power of the check of certificates: ``python -m benchmarks.guarantees.forgeries OUT.md [COUNT [NAME ...]]``.
+
+A forged certificate has a feasible incumbent that is worse than the best known one by a given share, and a bound right below its
+objective, which is false. The table says how many of COUNT forgeries of each size are refused by the whole check, without shipped
+certificates, and by paths alone.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+import nlp_gait
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.files import write_text
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.proofs import check
+from nlp_gait.proofs.branch_and_bound import Certificate
+from nlp_gait.proofs.certificate import CertificateFile, make_certificate_file
+from nlp_gait.proofs.check import check_certificate
+from tests.proofs.soundness import best_x, feasible_gaits
+
+COUNT, SEED = 10, 11
+NAMES = ("walk12", "nao-dsp", "nao-ssp")
+SIZES = (2e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03)
+PATHS = 40
+
+
+def forge(problem: GaitProblem, best: Array, size: float, rng: np.random.Generator) -> CertificateFile:
+    """Return a certificate whose bound is false by about ``size``, relatively."""
+    model = build_exact_model(problem)
+    cost = model.at(best, problem.p).cost
+    while True:
+        worse = feasible_gaits(problem, best, 1, rng)[0]
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            part = (low + high) / 2
+            below = model.at(best + part * (worse - best), problem.p).cost < cost + size * abs(cost)
+            low, high = (part, high) if below else (low, part)
+        x = best + high * (worse - best)
+        at = model.at(x, problem.p)
+        if at.violation <= check.FEASIBILITY_TOLERANCE and abs(at.cost - cost - size * abs(cost)) < 0.1 * size * abs(
+            cost
+        ):
+            break
+    sign, tolerance = problem.objective.sign, size / 100
+    proof = Certificate(
+        objective=sign * at.cost,
+        bound=sign * (at.cost - tolerance * abs(at.cost)),
+        tolerance=tolerance,
+        closed=True,
+        boxes=100_000,
+        left=0,
+        time_s=60.0,
+        cpu_s=60.0,
+        x=tuple(x.tolist()),
+    )
+    return make_certificate_file(problem, proof)
+
+
+def is_refused(file: CertificateFile, ship: bool, **settings: int) -> bool:
+    """Return whether a check refuses a certificate."""
+    hide = mock.patch.object(check, "find_certificate", lambda problem: None)
+    try:
+        if ship:
+            check_certificate(file, paths=PATHS, **settings)
+        else:
+            with hide:
+                check_certificate(file, paths=PATHS, **settings)
+    except InputError:
+        return True
+    return False
+
+
+CHECKS: dict[str, Callable[[CertificateFile, int], bool]] = {
+    "all": lambda file, seed: is_refused(file, True, seed=seed),
+    "no shipped certificate": lambda file, seed: is_refused(file, False, seed=seed),
+    "paths only": lambda file, seed: is_refused(file, False, starts=0, seed=seed),
+}
+
+
+def main() -> None:
+    """Write the table."""
+    out, count = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else COUNT
+    lines = [f"| problem | size | {' | '.join(CHECKS)} |", f"|---|---|{'---|' * len(CHECKS)}"]
+    for name in sys.argv[3:] or NAMES:
+        problem, best, rng, started = (
+            nlp_gait.load(name),
+            best_x(name),
+            np.random.default_rng(SEED),
+            time.perf_counter(),
+        )
+        for size in SIZES:
+            files = [forge(problem, best, size, rng) for _ in range(count)]
+            refused = [sum(one(file, seed) for seed, file in enumerate(files)) for one in CHECKS.values()]
+            lines.append(f"| `{name}` | {size:g} | {' | '.join(f'{r} of {count}' for r in refused)} |")
+            print(lines[-1], f"{time.perf_counter() - started:.0f} s", flush=True)
+    write_text(out, "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
