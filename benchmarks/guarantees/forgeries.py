@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from unittest import mock
 
@@ -20,10 +21,11 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_text
 from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs import check
 from nlp_gait.proofs.branch_and_bound import Certificate
 from nlp_gait.proofs.certificate import CertificateFile, make_certificate_file
-from nlp_gait.proofs.check import check_certificate
+from nlp_gait.proofs.check import STARTS, check_certificate
 from tests.proofs.soundness import best_x, feasible_gaits
 
 COUNT, SEED = 10, 11
@@ -45,9 +47,7 @@ def forge(problem: GaitProblem, best: Array, size: float, rng: np.random.Generat
             low, high = (part, high) if below else (low, part)
         x = best + high * (worse - best)
         at = model.at(x, problem.p)
-        if at.violation <= check.FEASIBILITY_TOLERANCE and abs(at.cost - cost - size * abs(cost)) < 0.1 * size * abs(
-            cost
-        ):
+        if at.violation <= FEASIBILITY_TOLERANCE and abs(at.cost - cost - size * abs(cost)) < 0.1 * size * abs(cost):
             break
     sign, tolerance = problem.objective.sign, size / 100
     proof = Certificate(
@@ -64,24 +64,20 @@ def forge(problem: GaitProblem, best: Array, size: float, rng: np.random.Generat
     return make_certificate_file(problem, proof)
 
 
-def is_refused(file: CertificateFile, ship: bool, **settings: int) -> bool:
+def is_refused(file: CertificateFile, seed: int, starts: int = STARTS, ship: bool = True) -> bool:
     """Return whether a check refuses a certificate."""
-    hide = mock.patch.object(check, "find_certificate", lambda problem: None)
-    try:
-        if ship:
-            check_certificate(file, paths=PATHS, **settings)
-        else:
-            with hide:
-                check_certificate(file, paths=PATHS, **settings)
-    except InputError:
-        return True
+    with nullcontext() if ship else mock.patch.object(check, "find_certificate", lambda problem: None):
+        try:
+            check_certificate(file, paths=PATHS, starts=starts, seed=seed)
+        except InputError:
+            return True
     return False
 
 
 CHECKS: dict[str, Callable[[CertificateFile, int], bool]] = {
-    "all": lambda file, seed: is_refused(file, True, seed=seed),
-    "no shipped certificate": lambda file, seed: is_refused(file, False, seed=seed),
-    "paths only": lambda file, seed: is_refused(file, False, starts=0, seed=seed),
+    "all": is_refused,
+    "no shipped certificate": lambda file, seed: is_refused(file, seed, ship=False),
+    "paths only": lambda file, seed: is_refused(file, seed, starts=0, ship=False),
 }
 
 

@@ -1,8 +1,8 @@
 """The 12-joint walk's proof once more, from the printed formulas, with nothing of the package: intervals and their gradients.
 
-Constants of time are series of `python-flint` with 200 bits. Over boxes of (s, n, H, h), values and gradients are intervals of NumPy,
-each operation rounded outward by ``nextafter``; only operations that IEEE 754 rounds correctly are used. A box is dropped by the
-mean-value form of the cost or of a knee's reach, loses the slabs that these exclude, and is halved otherwise.
+Constants of time are series of `python-flint` with 200 bits. Over boxes of (s, n, H, h), values and gradients are intervals of
+NumPy, each operation rounded outward by ``nextafter``; only operations that IEEE 754 rounds correctly are used. A box is dropped
+by the mean-value form of the cost or of a knee's reach, loses the slabs that these exclude, and is halved otherwise.
 
 Source:
     Goswami, Vadakkepat, Phung (2008), Table I, eqs. (2)-(11), (14).
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ KNEE, WAIST, FOOT, HIP = 0.07, 0.02, 0.14, 0.21
 THIGH, SHANK, SOLE, WIDTH = 0.19, 0.15, 0.02, 0.12
 GRAVITY, F1_MAX, F2_MAX, KAPPA = 9.81, 442.522, 0.13, 0.05
 ROOT = ((0.05, 0.13), (0.001, 0.13), (0.001, 0.13), (0.001, 0.13))  # (7)
+NODES, ROUNDED = 16, 1e-14  # of Gauss's rule
 SLACK = 1e-6  # with which a row counts as satisfied
 BATCH = 512
 # Weight of an edge's width against its effect on the cost, for the choice of the cut; it decides the time, not the result.
@@ -151,59 +152,85 @@ class Moving(NamedTuple):
         return Moving(f, first * self.v, second * (self.v * self.v) + first * self.a)
 
 
+Point: TypeAlias = tuple[Moving, Moving, Moving]
+Variables: TypeAlias = tuple[Slope, Slope, Slope, Slope]
 
 
-class Step(NamedTuple):
-    """Constants of time of the first step at K samples: values and two derivatives, each (K,)."""
+class Samples(NamedTuple):
+    """Constants of time of the first step at K instants: values and two derivatives, each (K,)."""
 
     share: list[Ends]  # P12x / s (4)
     lift: list[Ends]  # P12z / H (4)
     shift: list[Ends]  # P6y / n (6)
-    weights: Ends  # of the integral (9)
-    limited: Any  # samples at which the reach is limited
 
 
-def sample_step(times: list[Any], weights: list[Any], limited: Any) -> Step:
-    """Return the constants at rational times of a step of 1 s."""
+class Step(NamedTuple):
+    """Instants of a step of 1 s."""
 
-    def ends(values: list[Any]) -> Ends:
-        return widen(np.array([float(v.lower()) for v in values]), np.array([float(v.upper()) for v in values]))
+    nodes: Samples  # of the rule for the integral (9)
+    weights: Ends  # (K,)
+    limited: Samples  # at which the reach is limited
 
+
+def sample(times: list[Any]) -> Samples:
+    """Return the constants at instants, which are balls."""
+    half, pi, found = arb(1) / 2, arb.pi(), []
+    for time in times:
+        t = arb_series([time, 1], prec=3)
+        share = ((t - half) * pi).sin() * half
+        swell = (((t * (pi / 2)).sin() + 1) * (pi / 2)).sin()
+        found.append((share, ((share + half) * pi).sin(), swell * (t * pi).sin()))
+    return Samples(*([ends([row[k][i] * (1, 1, 2)[i] for row in found]) for i in range(3)] for k in range(3)))
+
+
+def ends(balls: list[Any]) -> Ends:
+    return widen(np.array([float(v.lower()) for v in balls]), np.array([float(v.upper()) for v in balls]))
+
+
+def make_step(rule: str, intervals: int = 20) -> Step:
+    """Return the instants by Simpson's rule, or by Gauss's rule with 16 nodes on each panel of two intervals."""
+    panels = intervals // 2
     with ctx.workprec(200):
-        half, pi, found = arb(1) / 2, arb.pi(), []
-        for time in times:
-            t = arb_series([time, 1], prec=3)
-            share = ((t - half) * pi).sin() * half
-            swell = (((t * (pi / 2)).sin() + 1) * (pi / 2)).sin()
-            found.append((share, ((share + half) * pi).sin(), swell * (t * pi).sin()))
-        parts = [[ends([row[k][order] * (1, 1, 2)[order] for row in found]) for order in range(3)] for k in range(3)]
-        return Step(parts[0], parts[1], parts[2], ends(weights), limited)
+        if rule == "simpson":
+            times = [arb(k) / intervals for k in range(intervals + 1)]
+            parts = [1 if k in (0, intervals) else 4 if k % 2 else 2 for k in range(intervals + 1)]
+            weights = [arb(part) / (3 * intervals) for part in parts]
+        else:  # the judge rounds nodes and weights to 14 digits
+            rounded = arb(0, ROUNDED)
+            roots = [arb.legendre_p_root(NODES, k, weight=True) for k in range(NODES)]
+            times = [(k + (node + rounded + 1) / 2) / panels for k in range(panels) for node, _ in roots]
+            weights = [(weight + rounded) / (2 * panels) for _ in range(panels) for _, weight in roots]
+        return Step(sample(times), ends(weights), sample([arb(k) / panels for k in range(panels + 1)]))
 
 
-def simpson(intervals: int) -> Step:
-    """Return the samples of Simpson's rule; the reach is limited at the ends of its panels."""
-    with ctx.workprec(200):
-        parts = [1 if k in (0, intervals) else 4 if k % 2 else 2 for k in range(intervals + 1)]
-        weights = [arb(part) / (3 * intervals) for part in parts]
-        return sample_step([arb(k) / intervals for k in range(intervals + 1)], weights, slice(0, None, 2))
+def move(x: Variables, at: Samples, zero: Slope) -> tuple[Point, Point]:
+    """Return the swing ankle (4) and the stance hip (6), both over the stance foot; the ankle's y is that of the hip's foot."""
+    s, n, H, h = x
+    still = Moving(zero, zero, zero)
+    ankle_x, ankle_z = (
+        Moving(*(variable * part for part in parts)) for variable, parts in ((s, at.share), (H, at.lift))
+    )
+    hip_y = Moving(*(n * part for part in at.shift))
+    hip_z = still._replace(p=h * number(-1.0) + (number(THIGH) + number(SHANK)))
+    return (ankle_x, still, ankle_z), (ankle_x.scaled(number(0.5)), hip_y, hip_z)
 
 
-def evaluate(boxes: Ends, step: Step, weight: float, gradients: bool = True) -> tuple[Slope, Slope]:
-    """Return the cost -f (P,) and the cosines of the knees (P, R) over boxes (P, 4)."""
+def make_variables(boxes: Ends, gradients: bool) -> tuple[Variables, Slope]:
+    """Return the variables s, n, H, h and zero, with gradients or with none."""
     unit = np.eye(4)[:, None, :] if gradients else np.empty((0, 1, 4))
     s, n, H, h = (
-        Slope(boxes.at(slice(None), slice(i, i + 1)), Ends(unit[..., i : i + 1], unit[..., i : i + 1])) for i in range(4)
+        Slope(boxes.at(slice(None), slice(i, i + 1)), Ends(unit[..., i : i + 1], unit[..., i : i + 1]))
+        for i in range(4)
     )
-    zero = Slope(Ends(np.zeros((1, 1)), np.zeros((1, 1))), Ends(np.zeros_like(unit[..., :1]), np.zeros_like(unit[..., :1])))
-    still = Moving(zero, zero, zero)
+    none = np.zeros_like(unit[..., :1])
+    return (s, n, H, h), Slope(Ends(np.zeros((1, 1)), np.zeros((1, 1))), Ends(none, none))
 
-    def follow(variable: Slope, parts: list[Ends]) -> Moving:
-        return Moving(*(variable * part for part in parts))
 
-    half = number(0.5)
-    ankle_x, ankle_z = follow(s, step.share), follow(H, step.lift)  # (4); the ankle is w to the right of the other
-    hip_x, hip_y = ankle_x.scaled(half), follow(n, step.shift)  # (6)
-    hip_z = still._replace(p=h * number(-1.0) + (number(THIGH) + number(SHANK)))
+def evaluate(boxes: Ends, step: Step, weight: float, gradients: bool = True) -> Slope:
+    """Return the cost -f (P,) over boxes (P, 4)."""
+    x, zero = make_variables(boxes, gradients)
+    still, half = Moving(zero, zero, zero), number(0.5)
+    swing, hip = move(x, step.nodes, zero)
     moments = [zero, zero]
 
     def add_mass(mass: float, x: Moving, y: Moving, z: Moving) -> None:
@@ -214,15 +241,13 @@ def evaluate(boxes: Ends, step: Step, weight: float, gradients: bool = True) -> 
     aside = number(WIDTH) * number(-1.0)
     lower, upper = number(SHANK) * number(SHANK), number(THIGH) * number(THIGH)
     difference = (lower - upper) * half
-    height, cosines = number(SOLE) * reciprocal(number(SHANK)), list[Slope]()
-    for ankle, y_ankle, line in (
-        ((still, still, still), number(0.0), (hip_x, hip_y, hip_z)),
-        ((ankle_x, still, ankle_z), aside, (hip_x.minus(ankle_x), hip_y, hip_z.minus(ankle_z))),
-    ):
+    height = number(SOLE) * reciprocal(number(SHANK))
+    legs = ((still, still, still), number(0.0)), (swing, aside)
+    for ankle, y_ankle in legs:
         # The knee is off the line from ankle to hip, in front of it (2), (3); `share` and `off` are shares of the line.
-        x, y, z = line
-        up_squared = y.times(y).plus(z.times(z))
-        q = x.times(x).plus(up_squared)
+        ahead, across_line, above = (to.minus(start) for to, start in zip(hip, ankle, strict=True))
+        up_squared = across_line.times(across_line).plus(above.times(above))
+        q = ahead.times(ahead).plus(up_squared)
         y_q = q.p.inverse()
         by_q = q.through(y_q, y_q.squared() * number(-1.0), y_q * y_q.squared() * number(2.0))
         share = by_q.scaled(difference)
@@ -235,23 +260,37 @@ def evaluate(boxes: Ends, step: Step, weight: float, gradients: bool = True) -> 
         by_root = root.inverse()
         up = up_squared.through(root, by_root * half, by_root * by_root.squared() * number(-0.25))
         by_up = up.through(by_root, by_root.squared() * number(-1.0), by_root * by_root.squared() * number(2.0))
-        sideways = share.minus(across.times(x.times(by_up)))
-        knee = share.times(x).plus(across.times(up)), sideways.times(y), sideways.times(z)
+        sideways = share.minus(across.times(ahead.times(by_up)))
+        knee = share.times(ahead).plus(across.times(up)), sideways.times(across_line), sideways.times(above)
         for mass, part in ((KNEE, number(1.0)), (FOOT, height)):
-            place = [base.plus(off_.scaled(part)) for base, off_ in zip(ankle, knee, strict=True)]
+            place = [base.plus(length.scaled(part)) for base, length in zip(ankle, knee, strict=True)]
             add_mass(mass, place[0], place[1]._replace(p=place[1].p + y_ankle), place[2])
-        by_twice = reciprocal(number(2.0) * number(THIGH) * number(SHANK))
-        cosines.append((q.p + (lower + upper) * number(-1.0)) * by_twice)
     for mass, shift in ((HIP, number(0.0)), (HIP, aside), (WAIST, aside * half)):
-        add_mass(mass, hip_x, hip_y._replace(p=hip_y.p + shift), hip_z)
+        add_mass(mass, hip[0], hip[1]._replace(p=hip[1].p + shift), hip[2])
     total = number(2.0) * (number(KNEE) + number(FOOT) + number(HIP)) + number(WAIST)
     zmp = [moment * reciprocal(total * number(GRAVITY)) for moment in moments]  # (14)
     Q = sum_last((zmp[0].squared() + zmp[1].squared()) * step.weights)  # (9)
     stability = Q.inverse() * (number(weight) * reciprocal(number(F1_MAX)))  # (10)
-    speed = sum_last(s) * ((number(1.0) - number(weight)) * reciprocal(number(F2_MAX)))
-    reach = [part.at(step.limited) for part in cosines]
-    joined = Slope(*(Ends(*(np.concatenate([getattr(r, name)[k] for r in reach], axis=-1) for k in (0, 1))) for name in ("value", "gradient")))
-    return (stability + speed) * number(-1.0), joined  # (11)
+    speed = sum_last(x[0]) * ((number(1.0) - number(weight)) * reciprocal(number(F2_MAX)))
+    return (stability + speed) * number(-1.0)  # (11)
+
+
+def evaluate_knees(boxes: Ends, step: Step, gradients: bool = True) -> Slope:
+    """Return the cosines of both knees (P, R) over boxes (P, 4)."""
+    x, zero = make_variables(boxes, gradients)
+    swing, hip = move(x, step.limited, zero)
+    links = number(SHANK) * number(SHANK) + number(THIGH) * number(THIGH)
+    by_twice = reciprocal(number(2.0) * number(THIGH) * number(SHANK))
+    found = []
+    for ankle in ((zero, zero, zero), tuple(part.p for part in swing)):
+        line = [to.p - start for to, start in zip(hip, ankle, strict=True)]
+        q = line[0].squared() + line[1].squared() + line[2].squared()
+        found.append((q + links * number(-1.0)) * by_twice)
+    value, gradient = (
+        Ends(*(np.concatenate([getattr(part, name)[k] for part in found], axis=-1) for k in (0, 1)))
+        for name in ("value", "gradient")
+    )
+    return Slope(value, gradient)
 
 
 def sum_last(x: Slope) -> Slope:
@@ -270,62 +309,78 @@ class Tree(NamedTuple):
     left: int  # neither dropped nor halved; 0 if the bound is proven
 
 
-def prove(step: Step, weight: float, bound: float, root: Any = ROOT, at_most: int = 10**9, progress: Any = None) -> Tree:
+def prove(
+    step: Step,
+    weight: float,
+    bound: float,
+    *,
+    root: Any = ROOT,
+    at_most: int = 10**9,
+    progress: Callable[[int, int], None] = lambda boxes, left: None,
+) -> Tree:
     """Prove that no x in a box that the judge accepts has f above a bound, or stop after so many boxes."""
-    ends = np.array(root, dtype=float).T[:, None, :]
-    open_, boxes, target = Ends(ends[0], ends[1]), 0, number(-bound)
-    limit = float(np.cos(KAPPA)) + 1e-12 + SLACK
+    both = np.array(root, dtype=float).T[:, None, :]
+    left, boxes = Ends(both[0], both[1]), 0
     with np.errstate(all="ignore"):
-        while len(open_.lo) and boxes < at_most:
-            now, open_ = open_.at(slice(-BATCH, None)), open_.at(slice(0, -BATCH))
+        while len(left.lo) and boxes < at_most:
+            now, rest = left.at(slice(-BATCH, None)), left.at(slice(0, -BATCH))
             boxes += len(now.lo)
-            new = Ends(*(np.concatenate(pair) for pair in zip(open_, _prune(now, step, weight, target, limit), strict=True)))
-            open_ = new
-            if progress is not None:
-                progress(boxes, open_)
-    return Tree(boxes, len(open_.lo))
+            halves = prune(now, step, weight, -bound)
+            left = Ends(*(np.concatenate(pair) for pair in zip(rest, halves, strict=True)))
+            progress(boxes, len(left.lo))
+    return Tree(boxes, len(left.lo))
 
 
-def _prune(now: Ends, step: Step, weight: float, target: Ends, limit: float) -> Ends:
-    """Return what remains of boxes, halved where little was cut off."""
-    cost, reach = evaluate(now, step, weight)
-    keep = (cost.value.lo < target.lo) & (reach.value.lo <= limit).all(axis=-1)
-    now, cost, reach = now.at(keep), _choose(cost, keep), _choose(reach, keep)
-    middle = 0.5 * now.lo + 0.5 * now.hi
-    cost_there, reach_there = evaluate(Ends(middle, middle), step, weight, gradients=False)
-    # Rows value <= limit, the cost first: value(middle) + gradient (x - middle) <= limit.
-    there = np.concatenate([cost_there.value.lo[:, None], reach_there.value.lo], axis=1)
-    limits = np.concatenate([target.hi, np.full(reach.value.lo.shape[-1], limit)])
-    low, high = (
-        np.concatenate([c[..., None], r], axis=-1).transpose(1, 2, 0)
-        for c, r in zip(cost.gradient, reach.gradient, strict=True)
-    )
-    offset = Ends(now.lo, now.hi) - Ends(middle, middle)
-    part = Ends(low, high) * Ends(offset.lo[:, None, :], offset.hi[:, None, :])
-    room = limits - there  # rounded to nearest: the slack below is far more
-    least = part.lo.sum(axis=-1, keepdims=True)
-    room = (room[..., None] - (least - part.lo)) + 1e-13 * (1.0 + np.abs(part.lo).sum(axis=-1, keepdims=True) + np.abs(there[..., None]))
-    known = np.isfinite(room)
-    to_high = np.where(known & (low > 0.0), room / np.where(room >= 0.0, low, high), np.inf).min(axis=1)
-    to_low = np.where(known & (high < 0.0), room / np.where(room >= 0.0, high, low), -np.inf).max(axis=1)
-    lo = np.maximum(now.lo, np.nextafter(middle + to_low, -np.inf) - 1e-15)
-    hi = np.minimum(now.hi, np.nextafter(middle + to_high, np.inf) + 1e-15)
-    # A row that is violated anywhere: its least value is above the limit.
-    lost = (np.where(known[..., 0], room[..., 0] - part.lo[..., 0], np.inf) < 0.0).any(axis=1) | (lo > hi).any(axis=1)
-    lo, hi, width = lo[~lost], hi[~lost], (now.hi - now.lo)[~lost]
-    effect = np.maximum(np.abs(low[~lost, 0]), np.abs(high[~lost, 0])) * (hi - lo)
-    effect = np.where(np.isfinite(effect), effect, 1.0)
-    relative = (hi - lo) / (np.array(ROOT)[:, 1] - np.array(ROOT)[:, 0])
+def prune(boxes: Ends, step: Step, weight: float, target: float) -> Ends:
+    """Return what remains of boxes, in halves where little was cut off: first by the reach of the knees, then by the cost."""
+    width = boxes.hi - boxes.lo
+    limit = float(np.cos(KAPPA)) + 1e-12 + SLACK
+    knees, there = (evaluate_knees(box, step, slopes) for box, slopes in ((boxes, True), (middle(boxes), False)))
+    boxes, left = contract(boxes, knees, there.value.lo, limit)
+    boxes, width = boxes.at(left), width[left]
+    cost = evaluate(boxes, step, weight)
+    at_middle = evaluate(middle(boxes), step, weight, gradients=False)
+    rows = Slope(cost.value.at(..., None), cost.gradient.at(..., None))
+    effect = np.maximum(np.abs(cost.gradient.lo), np.abs(cost.gradient.hi)).T
+    boxes, left = contract(boxes, rows, at_middle.value.lo[:, None], target)
+    lo, hi, width, effect = boxes.lo[left], boxes.hi[left], width[left], effect[left]
+    relative = (hi - lo) / np.diff(np.array(ROOT))[:, 0]
+    effect = np.where(np.isfinite(effect), effect, 1.0) * (hi - lo)
     shares = effect / effect.sum(axis=1, keepdims=True) + WIDTH_WEIGHT * relative / relative.max(axis=1, keepdims=True)
-    cut = shares.argmax(axis=1)
-    again = (hi - lo < SHRUNK * width).any(axis=1)  # narrow enough to be bounded again as it is
-    index = np.arange(len(cut))[~again], cut[~again]
-    split = 0.5 * lo[index] + 0.5 * hi[index]
-    left_hi, right_lo = hi[~again].copy(), lo[~again].copy()
-    rows = np.arange(len(split))
-    left_hi[rows, index[1]], right_lo[rows, index[1]] = split, split
+    again = (hi - lo < SHRUNK * width).any(axis=1)  # these are bounded again as they are
+    index = np.arange(np.count_nonzero(~again)), shares[~again].argmax(axis=1)
+    left_hi, right_lo = hi[~again], lo[~again]
+    left_hi[index] = right_lo[index] = 0.5 * left_hi[index] + 0.5 * right_lo[index]
     return Ends(np.concatenate([lo[again], lo[~again], right_lo]), np.concatenate([hi[again], left_hi, hi[~again]]))
 
 
-def _choose(x: Slope, keep: Any) -> Slope:
-    return Slope(Ends(x.value.lo[keep], x.value.hi[keep]), Ends(x.gradient.lo[:, keep], x.gradient.hi[:, keep]))
+def middle(boxes: Ends) -> Ends:
+    point = 0.5 * boxes.lo + 0.5 * boxes.hi
+    return Ends(point, point)
+
+
+def contract(boxes: Ends, rows: Slope, there: Array, limit: float) -> tuple[Ends, Any]:
+    """Cut off the slabs of boxes (P, n) in which a row (P, R) is above a limit.
+
+    By the mean-value theorem row(x) >= there + gradient (x - middle), with values ``there`` (P, R) in the middle.
+
+    Returns:
+        The boxes, and (P,) whether anything is left of each.
+    """
+    centre = middle(boxes)
+    gradient = Ends(*(part.transpose(1, 2, 0) for part in rows.gradient))
+    offset = boxes - centre
+    least = (gradient * Ends(offset.lo[:, None, :], offset.hi[:, None, :])).lo
+    total = least.sum(axis=-1, keepdims=True)
+    slack = 1e-13 * (1.0 + abs(limit) + np.abs(there)[..., None] + np.abs(least).sum(axis=-1, keepdims=True))
+    room = (
+        (limit - there)[..., None] - (total - least) + slack
+    )  # in nearest rounding, whose errors the slack is far above
+    known = np.isfinite(room)
+    above = np.where(known & (gradient.lo > 0.0), room / np.where(room >= 0.0, gradient.lo, gradient.hi), np.inf)
+    below = np.where(known & (gradient.hi < 0.0), room / np.where(room >= 0.0, gradient.hi, gradient.lo), -np.inf)
+    far = 1e-15  # above the rounding errors of the sums
+    lo = np.maximum(boxes.lo, np.nextafter(centre.lo + below.max(axis=1), -np.inf) - far)
+    hi = np.minimum(boxes.hi, np.nextafter(centre.lo + above.min(axis=1), np.inf) + far)
+    violated = (rows.value.lo > limit) | (known & (room < least)).any(axis=-1)
+    return Ends(lo, hi), ~(violated.any(axis=1) | (lo > hi).any(axis=1))
