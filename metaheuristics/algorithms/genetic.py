@@ -63,7 +63,7 @@ class GeneticAlgorithm:
 
     @classmethod
     def goswami2008(cls) -> GeneticAlgorithm:
-        """Give the settings of the 12-link walking paper; its budget of 30 epochs is 900 evaluations.
+        """Give the settings of the 12-link walking paper; 30 epochs after the first population are 930 evaluations.
 
         The paper names neither the size of a tournament nor survival nor elites; 2, generational and 1 are our choice.
 

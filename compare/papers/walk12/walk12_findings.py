@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,6 +16,7 @@ from compare.papers.walk12.walk12_runs import (
     PAPER,
     PathPoint,
     Walk12Effort,
+    WalkedGait,
     compute_f1,
     find_f1max,
     load_walk12,
@@ -25,7 +26,7 @@ from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
-from nlp_gait.gaits.walk12.walk12_steps import compute_steps
+from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 
 STEP_M = 1e-4  # of a difference quotient
 
@@ -38,6 +39,8 @@ class Walk12Findings:
     runs: Runs  # by title of the problem and solver
     weighted: Sequence[PathPoint]  # optima of the weighted sum over lambda
     front: Sequence[PathPoint]  # largest f1 for each step length
+    printed_step: Mapping[str, float]  # optimal f with the paper's integration step, by lambda
+    walks: Sequence[WalkedGait]  # in the engine; none without it
     f1_of_table_3: Sequence[float] = field(default_factory=lambda: [compute_f1(row) for row in TABLE_3])
 
     def records(self, label: str, weight: float, solver: str) -> Sequence[RunRecord]:
@@ -59,7 +62,7 @@ class Walk12Findings:
         return [compute_stable_share(row.x) for row in TABLE_3]
 
     def f_of_printed_gaits(self, label: str) -> list[float]:
-        """Return f of the printed gaits in the model under a normalisation, on the dense grid."""
+        """Return f of the printed gaits in the model under a normalisation."""
         f1max = F1MAX if label == PAPER else self.own_f1max
         known = zip(TABLE_3, self.f1_of_table_3, strict=True)
         return [row.weight * f1 / f1max + (1 - row.weight) * row.x[0] / F2MAX for row, f1 in known]
@@ -115,3 +118,10 @@ def compute_hip_miss() -> float:
     along = d2 * math.sin(ankle) + d1 * math.sin(thigh)
     up = d2 * math.cos(ankle) + d1 * math.cos(thigh)
     return math.hypot(along, up - distance)
+
+
+def compute_straightest_knee(x: Sequence[float]) -> float:
+    """Return the least angle of a knee in a step [rad]."""
+    arrays = compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=1000).arrays
+    knees = [JOINTS.index(name) for name in ("theta_3", "theta_10")]
+    return float(arrays["q"][:, knees].min())

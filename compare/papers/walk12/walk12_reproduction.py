@@ -12,12 +12,28 @@ from compare.judge import DENSE_INTERVALS
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
 from compare.papers.walk12 import walk12_runs as runs
+from compare.papers.walk12.walk12_claims import CHECKS
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
-from compare.papers.walk12.walk12_findings import Walk12Findings, compute_corner_slopes, compute_hip_miss
+from compare.papers.walk12.walk12_findings import (
+    Walk12Findings,
+    compute_corner_slopes,
+    compute_hip_miss,
+    compute_straightest_knee,
+)
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
-from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
+from compare.papers.walk12.walk12_runs import (
+    CORNER_M,
+    HORIZONS,
+    MODEL,
+    PAPER,
+    PathPoint,
+    Walk12Effort,
+    WalkedGait,
+    compute_f1,
+)
 from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
+from compare.study.references import find_reference
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
@@ -34,7 +50,15 @@ def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     records |= runner.run_tasks(runs.make_second_tasks(effort, records))
     paths = runner.compute(runs.make_paths(effort), code=(runs,))
     weighted, front = ([PathPoint(**row) for row in rows] for rows in paths.values())
-    return Walk12Findings(effort=effort, runs=records, weighted=weighted, front=front)
+    last = runner.compute(runs.make_last(effort, records), code=(runs,))
+    return Walk12Findings(
+        effort=effort,
+        runs=records,
+        weighted=weighted,
+        front=front,
+        printed_step=last["printed-step"],
+        walks=[WalkedGait(**row) for row in last["walks"]],
+    )
 
 
 def make_trajectories(findings: Walk12Findings) -> list[Table]:
@@ -54,6 +78,7 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
     problem, robot, lengths = load("walk12"), load_point_mass_biped(), _get_step_lengths()
     return {
         "effort": findings.effort,
+        "steps": runs.WALKED_STEPS,
         "ga_evaluations": runs.GA_EVALUATIONS,
         "f1max": F1MAX,
         "f2max": F2MAX,
@@ -74,6 +99,7 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         **_compute_normalisation(findings),
         **_compute_tradeoff(findings),
         **_compute_errata(findings),
+        **_compute_choices(findings),
     }
 
 
@@ -138,10 +164,52 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "corner_slopes": compute_corner_slopes(),
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
+        "lift_mm": 1e3 * find_row(0.15).x[2],
         "stable": findings.stable[-1],
         "trend": {name: _describe_trend(values) for name, values in (("implied", implied), *f1.items())},
-        "horizon_gap": compute_range(100 * abs(f / wanted - 1) for f, wanted in zip(f1["1s"], implied, strict=True)),
+        "step_gap": _compute_gap(f1["step"], implied),
+        "horizon_gap": _compute_gap(f1["1s"], implied),
     }
+
+
+def _compute_gap(values: Iterable[float], wanted: Iterable[float]) -> tuple[float, float]:
+    """Least and greatest difference in percent."""
+    return compute_range(100 * abs(f / expected - 1) for f, expected in zip(values, wanted, strict=True))
+
+
+def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
+    """Effects of the reach limit, the quadrature and the GA's settings that are not as printed."""
+    weights = runs.BENT_FREELY_WEIGHTS
+    unbent = [choose_best(findings.runs[f"no-reach-margin-{weight:g}", IPOPT]) for weight in weights]
+    simpson = [choose_best(findings.runs[f"simpson-{row.weight:g}", IPOPT]) for row in TABLE_3]
+    shifts = [abs(f - findings.optimum(PAPER, float(w)).verdict.objective) for w, f in findings.printed_step.items()]
+    ga = {name: findings.records(PAPER, runs.VARIANTS_WEIGHT, name) for name in ("ga", *runs.GA_VARIANTS)}
+    epoch = runs.GA_EVALUATIONS - runs.GA.population
+    earlier = [
+        f for r in ga["ga"] for e, f in zip(r.history.evaluations, r.history.objective, strict=True) if e == epoch
+    ]
+    bounds = {
+        name: _find_bound(record)
+        for name, record in (("bound", findings.optimum(PAPER, 1.0)), ("simpson_bound", simpson[-1]))
+    }
+    return {
+        "unbent": list_objectives(unbent),
+        "bent": [findings.optimum(PAPER, weight).verdict.objective for weight in weights],
+        "straightest": min(compute_straightest_knee(get_point(best)) for best in _list_optima(findings, PAPER)),
+        "printed_step": f"the optima at λ = {', '.join(findings.printed_step)} change by at most {max(shifts):.0e} in f",
+        "simpson_claim": max(r.verdict.objective - get_dense(r)["f"] for r in simpson),
+        "simpson_f1max": simpson[-1].verdict.objective * F1MAX,
+        **{name: "none is shipped" if bound is None else f"{bound:.6f}" for name, bound in bounds.items()},
+        "ga_900": float(np.median([f for f in earlier if f is not None])),
+        "ga_median": float(np.median(list_f(ga["ga"]))),
+        "ga_no_elite": float(np.median(list_f(ga["ga-no-elite"]))),
+        "ga_tournament_3": float(np.median(list_f(ga["ga-tournament-3"]))),
+    }
+
+
+def _find_bound(record: RunRecord) -> float | None:
+    """Return the shipped proven bound on f of a record's problem."""
+    return find_reference(record.definition["problem"]).bound
 
 
 def _describe_trend(values: Iterable[float]) -> str:
@@ -173,7 +241,25 @@ def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
         "table3-model": _list_table_3(findings, MODEL),
         "gaits": _list_gaits(findings),
         "table4": _list_table_4(findings),
+        "quadrature": _list_quadratures(findings),
+        "walks": [
+            [walk.weight, walk.by, walk.step_time_s, walk.steps, walk.fell_at_s, walk.walked_share]
+            for walk in findings.walks
+        ],
     }
+
+
+def _list_quadratures(findings: Walk12Findings) -> Rows:
+    """Optimal f under the paper's normalisation by each rule for Q, with the shipped proven bounds."""
+    rows = []
+    for row in TABLE_3:
+        best, simpson = (
+            findings.optimum(PAPER, row.weight),
+            choose_best(findings.runs[f"simpson-{row.weight:g}", IPOPT]),
+        )
+        ours = [best.verdict.objective, _find_bound(best), findings.printed_step.get(f"{row.weight:g}")]
+        rows.append([row.weight, *ours, simpson.verdict.objective, get_dense(simpson)["f"], _find_bound(simpson)])
+    return rows
 
 
 def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
@@ -224,5 +310,6 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
+    checks=CHECKS,
     csv_tables=make_trajectories,
 )

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import pytest
 
+from compare.papers.claims import Verdict
+from compare.papers.walk12 import walk12_runs
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
+from nlp_gait.gaits.walk12 import walk12_problem
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return reproduce("walk12", tmp_path_factory.mktemp("walk12"))
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
+    """The least of the quick reproduction: one start, one step in the engine, few of the paper's time steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(vars(REPRODUCTION), "quick", replace(REPRODUCTION.quick, starts=1, runs=1))
+        patch.setattr(walk12_runs, "WALKED_STEPS", 1)
+        patch.setattr(walk12_problem, "PRINTED_STEPS", 100)
+        yield reproduce("walk12", tmp_path_factory.mktemp("walk12"), coarse=True)
 
 
 def test_f1_that_table_4_implies() -> None:
@@ -23,8 +34,24 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "tradeoff fig08 fig09 fig10 fig12-13 fig14-15 fig16-17 circle",
-        "table3-paper table3-model table4 gaits differences walk-straight walk-circle",
+        "claims differences table3-paper table3-model table4 gaits quadrature walks walk-straight walk-circle",
     )
+
+
+def test_claims_are_decided_by_sizes(finished: Finished) -> None:
+    claims = {row["claim"]: row for row in finished.rows("claims")}
+    assert len(claims) >= 10 and set(row["verdict"].partition(" (")[0] for row in claims.values()) <= set(Verdict)
+    assert claims["The largest f1"]["verdict"].startswith("does not hold (printed 442.5, here 470")
+    assert claims["Time steps in one generation"]["verdict"] == "holds"
+    slower = claims["Walking becomes slower with higher stability margin"]["verdict"]
+    assert slower == "direction holds, size does not (printed -70, here -80)"
+
+
+def test_the_effect_of_the_quadrature_is_a_number(finished: Finished) -> None:
+    rows = {float(row["lambda"]): row for row in finished.rows("quadrature")}
+    ours, printed_step, simpson, exact = list(rows[0.9].values())[1::2][:1] + list(rows[0.9].values())[3:6]
+    assert float(printed_step) == pytest.approx(float(ours), abs=1e-6)
+    assert float(simpson) - float(exact) > 1e-4  # what IPOPT gains by Simpson's rule alone
 
 
 def test_tables_agree_with_the_records(finished: Finished) -> None:
@@ -39,10 +66,10 @@ def test_tables_agree_with_the_records(finished: Finished) -> None:
 
 
 def test_a_second_call_computes_only_what_is_missing(finished: Finished) -> None:
-    first = finished.folder / "records" / f"table3-paper-{TABLE_3[1].weight:g}" / "ga-0001.json"
+    first = finished.folder / "records" / f"table3-paper-{TABLE_3[1].weight:g}" / "ga-0000.json"
     path = finished.folder / "store" / "front.json"
     stored = read_record(first), path.read_text()
     first.unlink()
     path.unlink()
-    assert recompute(finished) == ["table3-paper-0.15, ga 1", "front", "figures, tables and report"]
+    assert recompute(finished) == ["table3-paper-0.15, ga 0", "front", "figures, tables and report"]
     assert (read_record(first).x, path.read_text()) == (stored[0].x, stored[1])

@@ -1,0 +1,225 @@
+"""Checks of the claims of the 12-joint walk's paper against our numbers, by id in ``walk12_claims.toml``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise, product
+
+import numpy as np
+
+from compare.papers.claims import Check, Verdict, compare_changes, compare_levels, decide, require_change
+from compare.papers.paper_runs import choose_best, get_point, list_objectives
+from compare.papers.walk12.walk12_findings import Walk12Findings, compute_stable_share
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, PaperRow, find_row
+from compare.papers.walk12.walk12_runs import GA, HORIZONS, PAPER, ROBOT_STEP_S, compute_f1, find_f1max, title_table_4
+from compare.study.task import IPOPT
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_problem import PRINTED_STEPS
+from nlp_gait.gaits.walk12.walk12_steps import compute_steps
+
+STATIC_WEIGHT = 0.2  # the paper: dynamic walking below
+CONVERGED_EPOCH = 15
+CONVERGED = 1e-3  # relative gain after that epoch
+DIGIT_M, DIGIT_F = 5e-4, 5e-4  # half the last printed digit
+CIRCLE_M = 1e-3
+
+
+def _check_most_stable(findings: Walk12Findings) -> Check:
+    *others, last = findings.f1_of_table_3
+    return require_change(100 * (last / max(others) - 1), f1=last, next=max(others))
+
+
+def _check_short_steps(findings: Walk12Findings) -> Check:
+    f1, s = [1 / point.Q_m2s for point in findings.front], [point.at for point in findings.front]
+    falls = all(after < before for before, after in pairwise(f1))
+    return require_change(100 * (f1[0] / f1[-1] - 1) if falls else -math.inf, ends=(f1[0], f1[-1]), s=(s[0], s[-1]))
+
+
+def _check_f_of_table_3(findings: Walk12Findings) -> Check:
+    ours = findings.f_of_printed_gaits(PAPER)
+    changes = [100 * (f1 / row.implied_f1 - 1) for row, f1 in zip(TABLE_3, findings.f1_of_table_3, strict=True)]
+    return compare_levels(
+        [row.f for row in TABLE_3], ours, low=min(changes), high=max(changes), rounding=sum(map(_is_rounding, TABLE_3))
+    )
+
+
+def _is_rounding(row: PaperRow) -> bool:
+    """Return whether the printed f is that of a gait whose variables have the printed digits."""
+    corners = [PaperRow(weight=row.weight, x=_shift(row, signs), f=row.f) for signs in product((-1, 0, 1), repeat=4)]
+    f = [c.weight * compute_f1(c) / F1MAX + (1 - c.weight) * c.x[0] / F2MAX for c in corners]
+    return min(f) - DIGIT_F <= row.f <= max(f) + DIGIT_F
+
+
+def _shift(row: PaperRow, signs: Sequence[int]) -> tuple[float, float, float, float]:
+    s, n, lift, bend = (value + sign * DIGIT_M for value, sign in zip(row.x, signs, strict=True))
+    return s, n, lift, bend
+
+
+def _check_optimal(findings: Walk12Findings) -> Check:
+    best = _list_optima(findings)
+    gaps = [100 * (1 - f / b) for f, b in zip(findings.f_of_printed_gaits(PAPER), best, strict=True)]
+    return compare_levels(best, findings.f_of_printed_gaits(PAPER), low=min(gaps), high=max(gaps))
+
+
+def _list_optima(findings: Walk12Findings) -> list[float]:
+    return list_objectives(findings.optimum(PAPER, row.weight) for row in TABLE_3)
+
+
+def _list_steps(findings: Walk12Findings) -> list[float]:
+    """Step length of the optima of Table III [mm]."""
+    return [1e3 * get_point(findings.optimum(PAPER, row.weight))[0] for row in TABLE_3]
+
+
+def _check_slower(findings: Walk12Findings) -> Check:
+    printed, ours = [1e3 * row.x[0] for row in TABLE_3], _list_steps(findings)
+    return compare_changes(printed[-1] - printed[0], ours[-1] - ours[0], change=printed[-1] - printed[0])
+
+
+def _check_steps(findings: Walk12Findings) -> Check:
+    ours = _list_steps(findings)
+    return compare_levels([1e3 * row.x[0] for row in TABLE_3], ours, found=", ".join(f"{s:.0f}" for s in ours))
+
+
+def _check_margin(findings: Walk12Findings) -> Check:
+    f1 = [(findings.optimum(PAPER, row.weight).verdict.dense or {})["f1_per_m2s"] for row in TABLE_3]
+    falls = any(after < (1 - 1e-3) * before for before, after in pairwise(f1))
+    return require_change(-math.inf if falls else 100 * (f1[-1] / f1[0] - 1), found=", ".join(f"{v:.0f}" for v in f1))
+
+
+def _check_static(findings: Walk12Findings) -> Check:
+    best = compute_stable_share(tuple(get_point(findings.optimum(PAPER, 1.0))))
+    return compare_levels(1.0, findings.stable[-1].share, stable=findings.stable[-1], optimum=best.share)
+
+
+def _check_static_above(findings: Walk12Findings) -> Check:
+    shares = [stable.share for row, stable in zip(TABLE_3, findings.stable, strict=True) if row.weight >= STATIC_WEIGHT]
+    return compare_levels(np.ones(len(shares)), shares, low=min(shares), high=max(shares))
+
+
+def _check_dynamic(findings: Walk12Findings) -> Check:
+    shares = [stable.share for row, stable in zip(TABLE_3, findings.stable, strict=True) if row.weight < STATIC_WEIGHT]
+    return require_change([1 - share for share in shares], low=min(shares), high=max(shares))
+
+
+def _check_speed(weight: float, printed_m_s: float) -> Check:
+    s = find_row(weight).x[0]
+    return compare_levels(printed_m_s, s / 2, foot=s, slow=s / 2 / ROBOT_STEP_S)
+
+
+def _check_faster(findings: Walk12Findings) -> Check:
+    table = 1e3 * (find_row(0.1).x[0] - find_row(0.15).x[0])
+    optima = _list_steps(findings)
+    return compare_changes(128.0 - 125.0, table, optima=optima[0] - optima[1], table=table)
+
+
+def _check_table_4_f1max(findings: Walk12Findings) -> Check:
+    f1max = {horizon: [_get_f1max(findings, row, horizon) for row in TABLE_4] for horizon in HORIZONS}
+    texts = {name: ", ".join(f"{value:.0f}" for value in values) for name, values in f1max.items()}
+    return compare_levels([row.f1max for row in TABLE_4], f1max["step"], step=texts["step"], second=texts["1s"])
+
+
+def _get_f1max(findings: Walk12Findings, row: PaperRow, horizon: str) -> float:
+    return find_f1max(findings.runs, title_table_4(row, horizon, most_stable=True))  # type: ignore[arg-type]
+
+
+def _check_trend(findings: Walk12Findings, horizon: str) -> Check:
+    slow, fast = TABLE_4[0], TABLE_4[-1]
+    ours = 100 * (_get_f1max(findings, slow, horizon) / _get_f1max(findings, fast, horizon) - 1)
+    return compare_changes(100 * (slow.f1max / fast.f1max - 1), ours, slow=slow.step_time_s, fast=fast.step_time_s)
+
+
+def _list_table_4(findings: Walk12Findings, horizon: str) -> list[tuple[float, list[float]]]:
+    best = [choose_best(findings.runs[title_table_4(row, horizon), IPOPT]) for row in TABLE_4]  # type: ignore[arg-type]
+    return [(record.verdict.objective, get_point(record)) for record in best]
+
+
+def _check_f_over_time(findings: Walk12Findings) -> Check:
+    f = {horizon: [f for f, _ in _list_table_4(findings, horizon)] for horizon in HORIZONS}
+    texts = {name: ", ".join(f"{value:.4f}" for value in values) for name, values in f.items()}
+    return compare_levels([row.f for row in TABLE_4], f["step"], step=texts["step"], second=texts["1s"])
+
+
+def _check_variables_over_time(findings: Walk12Findings) -> Check:
+    rows = [TABLE_3[1].x, *(row.x for row in TABLE_4)]
+    optima = [get_point(findings.optimum(PAPER, 0.15)), *(x for _, x in _list_table_4(findings, "step"))]
+    printed, ours = (1e3 * np.ptp(np.array(values), axis=0) for values in (rows, optima))
+    texts = [", ".join(f"{value:.0f}" for value in values) for values in (printed, ours)]
+    return compare_levels(printed, ours, ranges=texts[0], found=texts[1])
+
+
+def _check_epochs(findings: Walk12Findings) -> Check:
+    histories = [run.history for run in findings.records(PAPER, 0.15, "ga")]
+    gains = [
+        1 - float(np.array(h.objective, dtype=float)[np.searchsorted(h.evaluations, GA.population * (1 + CONVERGED_EPOCH))])
+        / float(h.objective[-1] or math.nan)
+        for h in histories
+    ]  # fmt: skip
+    return decide(float(np.median(gains)) < CONVERGED, gain=100 * float(np.median(gains)), worst=100 * max(gains))
+
+
+def _check_time_steps(_: Walk12Findings) -> Check:
+    return compare_levels(300_000, GA.population * PRINTED_STEPS, steps=PRINTED_STEPS, population=GA.population)
+
+
+def _check_walks(findings: Walk12Findings, step_time_s: float) -> Check:
+    walks = [walk for walk in findings.walks if walk.step_time_s == step_time_s]
+    if not walks:
+        return decide(Verdict.UNTESTABLE, found="the simulator is not installed (extra sim)")
+    texts = []
+    for by in ("paper", IPOPT.upper()):
+        own = [walk for walk in walks if walk.by == by]
+        upright = [walk for walk in own if walk.fell_at_s is None]
+        falls = [walk.fell_at_s for walk in own if walk.fell_at_s is not None]
+        shares = [walk.walked_share for walk in upright if walk.walked_share is not None]
+        walked = (
+            f", over {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the planned distance" if shares else ""
+        )
+        fell = f"; the others fall after {min(falls):.1f} to {max(falls):.1f} s" if falls else ""
+        texts.append(f"{len(upright)} of {len(own)} gaits of {'the paper' if by == 'paper' else by}{walked}{fell}")
+    return decide(all(walk.fell_at_s is None for walk in walks if walk.by == "paper"), found=". ".join(texts))
+
+
+def _check_below(findings: Walk12Findings) -> Check:
+    below = get_point(choose_best(findings.runs["below", IPOPT]))
+    apart = 1e3 * max(abs(a - b) for a, b in zip(below, get_point(findings.optimum(PAPER, 0.1)), strict=True))
+    return require_change(apart, apart=apart)
+
+
+def _check_circle(findings: Walk12Findings) -> Check:
+    turn, x = math.radians(8.0), np.array(get_point(findings.optimum(PAPER, 0.9)))
+    arrays = compute_steps(load_point_mass_biped(), x, steps=90, intervals=2, turn_rad=turn).arrays
+    prints = np.unique(np.round(arrays["left_ankle"][arrays["left_stance"] == 1.0][:, :2], 7), axis=0)
+    radii = np.linalg.norm(prints - prints.mean(axis=0), axis=1)
+    return decide(
+        float(np.ptp(radii)) < CIRCLE_M, radius=radii.mean(), spread=1e3 * float(np.ptp(radii)), prints=len(prints)
+    )
+
+
+CHECKS: dict[str, Callable[[Walk12Findings], Check]] = {
+    "most-stable": _check_most_stable,
+    "short-steps": _check_short_steps,
+    "circle": _check_circle,
+    "f1max": lambda findings: compare_levels(F1MAX, findings.own_f1max, own=findings.own_f1max),
+    "f": _check_f_of_table_3,
+    "optimal": _check_optimal,
+    "steps": _check_steps,
+    "slower": _check_slower,
+    "below": _check_below,
+    "walks": lambda findings: _check_walks(findings, 1.0),
+    "walks-slowly": lambda findings: _check_walks(findings, ROBOT_STEP_S),
+    "dynamic": _check_dynamic,
+    "static-above": _check_static_above,
+    "epochs": _check_epochs,
+    "time-steps": _check_time_steps,
+    "speed-0.15": lambda _: _check_speed(0.15, 0.125),
+    "margin": _check_margin,
+    "static": _check_static,
+    "speed-1": lambda _: _check_speed(1.0, 0.05),
+    "faster": _check_faster,
+    "trend": lambda findings: _check_trend(findings, "step"),
+    "trend-1s": lambda findings: _check_trend(findings, "1s"),
+    "f1max-over-time": _check_table_4_f1max,
+    "f-over-time": _check_f_over_time,
+    "variables-over-time": _check_variables_over_time,
+}
