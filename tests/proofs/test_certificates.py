@@ -111,7 +111,9 @@ def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
 def test_shipped_certificates_record_all_options_of_their_problems() -> None:
     for name, file in load_certificates().items():
         assert file.certificate.closed, name
-        assert dict(nlp_gait.load(file.problem["name"], **file.problem["options"]).options) == file.problem["options"], name
+        assert (
+            dict(nlp_gait.load(file.problem["name"], **file.problem["options"]).options) == file.problem["options"]
+        ), name
 
 
 def test_evidence_is_what_certificates_prove() -> None:
