@@ -23,7 +23,7 @@ from nlp_gait.simulation.simulate import Simulation, simulate_plan  # noqa: E402
 
 # Optimum of stairs-plan for case 2, to four digits, and one of stairs-track.
 CLIMB = (0.6926, 0.0918, 0.2434, 0.0923, 0.709, 1.4, 0.5763, 0.7783, 1.3287, 0.3169, 0.2)
-TRACKED = (100.0, 100.0, 1.6223)
+TRACKED = (8700.0, 10_000.0, 1.463)
 PAPERS_GAINS = (2.6474, 7.3724, 1.2055)  # Bhardwaj et al., Table IV, case 2
 WALK = (0.130, 0.109, 0.014, 0.020)  # Goswami et al. (2008), Table III, lambda = 0.15
 SLOW_WALK = (0.126, 0.12, 0.014, 0.0215)  # Table IV, 2 s

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import casadi as ca
 import numpy as np
 
 from compare.drawing.figures import add_legend_below, new_figure
@@ -13,6 +14,7 @@ from compare.papers.stairs.stairs_motion import Leg, first_step, two_steps
 from compare.papers.stairs.stairs_paper import TABLE_4
 from compare.papers.stairs.stairs_runs import StairsFindings, make_plan_spec, roll_out
 from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.closed_loop import ANGLES, measure_joints
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import SETBACK
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 DENSITY = 5  # samples of a drawn plan, as a multiple of the problem's own
 DRAWN_CASE = 2  # where the paper draws one case only
 TRACKED_LINKS = LINKS[:7]  # q1 to q7
+# From joint angles to those of the paper, of which knees are relative (27), (28); of rows.
+PRINTED_ANGLES = (measure_joints("printed") @ ca.inv(measure_joints("joint"))).full().T
 
 
 def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
@@ -159,8 +163,9 @@ def _draw_tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit:
     panels = figure.subplots(4, 2, sharex=True).ravel()
     for i, link in enumerate(TRACKED_LINKS):
         for case, arrays in followed.items():
-            (line,) = panels[i].plot(arrays["t"], arrays[name][:, i], label=f"case {case}")
-            panels[i].plot(arrays["t"], arrays[f"{name}_desired"][:, i], ":", color=line.get_color(), linewidth=1.0)
+            values = [arrays[which] @ PRINTED_ANGLES for which in (name, f"{name}_desired")]
+            (line,) = panels[i].plot(arrays["t"], values[0][:, i], label=f"case {case}")
+            panels[i].plot(arrays["t"], values[1][:, i], ":", color=line.get_color(), linewidth=1.0)
         panels[i].set_title(f"q{i + 1} ({link})")
         panels[i].set_ylabel(unit)
     panels[-1].set_axis_off()
@@ -192,9 +197,10 @@ def _draw_torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
     for axes, (case, arrays) in zip(
         figure.subplots(1, len(followed), sharey=True, squeeze=False)[0], followed.items(), strict=True
     ):
-        for i, link in enumerate(LINKS):
-            foot = link.startswith(("A'S", "S'"))
-            axes.plot(arrays["t"], arrays["tau"][:, i], "--" if foot else "-", label=link, linewidth=1.0)
+        for i, joint in enumerate(ANGLES["joint"]):
+            axes.plot(
+                arrays["t"], arrays["tau"][:, i], "--" if joint.endswith("'") else "-", label=joint, linewidth=1.0
+            )
         axes.set(title=f"Fig. 29{'abc'[case - 1]}: case {case}", xlabel="time [s]")
     figure.axes[0].set_ylabel("joint torque [N m]")
     add_legend_below(figure)

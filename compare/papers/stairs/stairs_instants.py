@@ -38,7 +38,8 @@ class Instants:
             return np.stack([self.problem.lower, self.problem.upper])
         joints = rigid_bodies().joints
         hip, knee, ankle, toe = (joints[name].torque_limit_Nm for name in JOINTS[:4])
-        limits = np.array([hip, knee, hip, knee, hip, ankle, toe, ankle, toe])
+        fifth = ankle if self.loop.coordinates == "joint" else hip  # of the stance ankle, or of the torso
+        limits = np.array([hip, knee, hip, knee, fifth, ankle, toe, ankle, toe])
         return np.stack([-limits, limits])
 
     @cached_property

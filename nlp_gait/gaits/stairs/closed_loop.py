@@ -54,21 +54,35 @@ GIVEN = {
     "torque": N,
 }
 TORSO = LINKS.index("UH")
-# Link from which the angle of another one is measured, the others' from the forward axis. Knees are as in (27), (28).
-_KNEES = {"KA": "HK", "K'A'": "HK'"}
-PREVIOUS: Mapping[Coordinates, Mapping[str, str]] = {
-    "joint": {**_KNEES, "AS": "KA", "ST": "AS", "A'S'": "K'A'", "S'T'": "A'S'"},
-    "printed": _KNEES,
-    "link": {},
+# Controlled angles as sums of link angles, in the order of LINKS. Joint angles are between links; the ninth is that of the stance
+# sole, whose torque the ground gives. As printed, knees are relative to thighs (27), (28), other angles from the forward axis.
+_KNEES = {"knee": {"KA": 1, "HK": -1}, "knee'": {"K'A'": 1, "HK'": -1}}
+ANGLES: Mapping[Coordinates, Mapping[str, Mapping[str, int]]] = {
+    "joint": {
+        "hip": {"HK": 1, "UH": 1},
+        "knee": _KNEES["knee"],
+        "hip'": {"HK'": 1, "UH": 1},
+        "knee'": _KNEES["knee'"],
+        "ankle'": {"K'A'": 1, "A'S'": -1},
+        "ankle": {"AS": 1, "KA": -1},
+        "toe": {"ST": 1, "AS": -1},
+        "sole'": {"A'S'": 1},
+        "toe'": {"S'T'": 1, "A'S'": -1},
+    },
+    "printed": {
+        "HK": {"HK": 1},
+        "knee": _KNEES["knee"],
+        "HK'": {"HK'": 1},
+        "knee'": _KNEES["knee'"],
+        **{link: {link: 1} for link in LINKS[4:]},
+    },
+    "link": {link: {link: 1} for link in LINKS},
 }
 
 
 def measure_joints(coordinates: Coordinates) -> DM:
     """Return the matrix (9, 9) from link angles to the controlled angles."""
-    matrix = DM.eye(N)
-    for link, previous in PREVIOUS[coordinates].items():
-        matrix[LINKS.index(link), LINKS.index(previous)] = -1
-    return matrix
+    return DM([[parts.get(link, 0) for link in LINKS] for parts in ANGLES[coordinates].values()])
 
 
 class Rollout(NamedTuple):
@@ -105,7 +119,7 @@ class ClosedLoop:
     @cached_property
     def joints(self) -> DM:
         """(9, 9) from link angles to the controlled angles."""
-        return measure_joints(self.coordinates)
+        return ca.sparsify(measure_joints(self.coordinates))
 
     @property
     def base_point(self) -> str:

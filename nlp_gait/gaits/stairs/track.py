@@ -28,6 +28,7 @@ from nlp_gait.formulation import (
 )
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.closed_loop import (
+    ANGLES,
     QUANTUM,
     Base,
     ClosedLoop,
@@ -44,7 +45,7 @@ from nlp_gait.gaits.stairs.planned_motion import StepKind
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
-Gains = Literal["scalar", "per-link"]
+Gains = Literal["scalar", "per-joint"]
 ZmpRule = Literal["limits", "penalty"]
 
 # Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
@@ -112,13 +113,14 @@ def stairs_track(
     The plan is given by parameters; its torso pitch is a variable.
 
     Args:
-        gains: one K_p and K_d for all links as in the paper, or one for each link.
+        gains: one K_p and K_d for all joints as in the paper, or one for each.
         scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
             quantum's pose within each evaluation (which makes one many times slower); or that at the printed rate and number
             of iterations, with which few poses converge.
-        coordinates: what the controller measures and drives, and the disturbance acts on: joint angles and torques; as printed
-            only the knees are joints (27), (28), and other angles are those of links; or all angles are those of links.
+        coordinates: what the controller measures and drives, and the disturbance acts on: joint angles and torques, and those of
+            the stance sole, which stands on the ground; as printed only the knees are joints (27), (28), and other angles are
+            those of links; or all angles are those of links.
         step: ``next`` over a flat stance foot; ``landing``, the same with the reverse double support, in which the stance foot
             turns down about the tip of its toe; or ``first`` from standing.
         base: stance foot, pinned at its ankle (in landing at its toe), with five contacts; or the hip on its planned curve, with
@@ -133,7 +135,7 @@ def stairs_track(
     """
     if not QUANTUM <= duration_s <= 60.0:
         raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
-    suffixes = [""] if gains == "scalar" else [f"_{link}" for link in LINKS]
+    suffixes = [""] if gains == "scalar" else [f"_{angle}" for angle in ANGLES[coordinates]]
     quanta = round(duration_s / QUANTUM)
     loop = ClosedLoop(
         quanta=quanta,
@@ -148,7 +150,7 @@ def stairs_track(
     limits = {"lower": 0.0, "upper": LARGEST_GAIN, "minimum": 0.0, "maximum": 1e6}
     variables = (
         *(
-            Variable(name=name + suffix, unit=unit, description=f"{symbol} of {suffix[1:] or 'all links'}", **limits)
+            Variable(name=name + suffix, unit=unit, description=f"{symbol} of {suffix[1:] or 'all joints'}", **limits)
             for name, unit, symbol in (("kp", "N m/rad", "K_p"), ("kd", "N m s/rad", "K_d"))
             for suffix in suffixes
         ),
@@ -166,9 +168,9 @@ def stairs_track(
         found = rollout(at, Exact())
         parts = (*found[:4], loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
-        joints = loop.joints.full().T
+        joints, names = loop.joints.full().T, tuple(ANGLES[coordinates])
         return Signals(
-            joints=LINKS,
+            joints=names,
             arrays={
                 "t": np.linspace(QUANTUM, loop.quanta * QUANTUM, loop.quanta),
                 "q": state[:, :N] @ joints,
@@ -184,8 +186,8 @@ def stairs_track(
             columns={
                 "zmp": stair.COLUMNS["zmp"],
                 "stance_ankle": stair.COLUMNS["stance_ankle"],
-                "q_desired": Columns(unit="rad", labels=LINKS),
-                "qd_desired": Columns(unit="rad/s", labels=LINKS),
+                "q_desired": Columns(unit="rad", labels=names),
+                "qd_desired": Columns(unit="rad/s", labels=names),
                 "link_q": Columns(unit="rad", labels=LINKS),
                 "link_qd": Columns(unit="rad/s", labels=LINKS),
             },
@@ -227,7 +229,16 @@ def _assemble(
     if tracking_limit:
         most, limited = point["tracking_tolerance_rad"], errors[:N, :]
         constraints.append(
-            stair.rows("tracking", limited, LINKS, "rad", 0.1, lower=-most, upper=most, columns=instants)
+            stair.rows(
+                "tracking",
+                limited,
+                tuple(ANGLES[loop.coordinates]),
+                "rad",
+                0.1,
+                lower=-most,
+                upper=most,
+                columns=instants,
+            )
         )
     finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
     return Assembly(
