@@ -50,7 +50,9 @@ class Trace:
 
 
 def make_traces(solver: SolverRuns) -> Iterator[Trace]:
-    """Yield the trace of every run of a solver on one problem."""
+    """Yield the trace of every run of a solver on one problem; none if the evaluations of a run are unknown."""
+    if not solver.has_costs("evaluations"):
+        return
     for record, curve in zip(solver.records, solver.curves, strict=True):
         best = {1: NOTHING_FEASIBLE}
         for evaluations, gap in zip(curve.evaluations.tolist(), curve.gap.tolist(), strict=True):
@@ -84,11 +86,15 @@ class _Log:
 
 
 def _write_logs(comparisons: Sequence[Comparison], folder: Path, write: Callable[[_Log], Sequence[Path]]) -> list[Path]:
-    """Write the log of each solver on each problem, problem k as function k, from 1; return all files. Raises OutputError."""
+    """Write the log of each solver with known evaluations on each problem, problem k as function k, from 1; return all files.
+
+    Raises OutputError.
+    """
     return [
         path
         for number, comparison in enumerate(comparisons, start=1)
         for solver in comparison.solvers
+        if (runs := tuple(make_traces(solver)))
         for path in write(
             _Log(
                 folder=folder / make_file_name(solver.name),
@@ -97,7 +103,7 @@ def _write_logs(comparisons: Sequence[Comparison], folder: Path, write: Callable
                 problem=comparison.problem,
                 dimension=int(np.max([len(record.x) for record in comparison.records], initial=1)),
                 solver=solver.name,
-                runs=tuple(make_traces(solver)),
+                runs=runs,
             )
         )
     ]

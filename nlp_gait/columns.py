@@ -12,6 +12,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import read_text
 
 DELIMITERS = ",;\t"
+MOST = 2**63 - 1  # a whole number in 64 bits, as other programs read it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +51,22 @@ class Table:
 
     def count(self, name: str, row: int, value: float, at_least: int = 0) -> int:
         """Return the value of a cell as a whole number; raises InputError."""
-        if not (math.isfinite(value) and value == int(value) and value >= at_least):
+        if not (math.isfinite(value) and value == int(value) and at_least <= value <= MOST):
             raise InputError(
-                f"{self.owner}, line {self.lines[row]}: {name} must be a whole number >= {at_least}, got {value:g}"
+                f"{self.owner}, line {self.lines[row]}: {name} must be a whole number >= {at_least} and < 2^63, got {value:g}; "
+                "fix the cell"
             )
         return int(value)
+
+    def number(self, name: str, row: int, value: float, at_least: float = -math.inf) -> float:
+        """Return the value of a cell, a finite number or NaN where it is empty; raises InputError."""
+        if not (math.isnan(value) or (math.isfinite(value) and value >= at_least)):
+            allowed = "a finite number" if math.isinf(at_least) else f"a finite number >= {at_least:g}"
+            raise InputError(
+                f"{self.owner}, line {self.lines[row]}: {name} must be {allowed}, got {value:g}; leave the cell empty if it is "
+                "unknown"
+            )
+        return value
 
 
 def read_table(path: Path, what: str) -> Table:

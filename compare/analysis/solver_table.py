@@ -48,8 +48,8 @@ class SolverSummary:
     worst: float | None
     median_interval: tuple[float, float] | None  #: 95 % bootstrap interval of the median
     gap: float | None  #: relative distance of the median from the best known objective
-    evaluations: float  #: median equivalent evaluations of a run
-    time_s: float  #: median wall time of a run [s]
+    evaluations: float  #: median equivalent evaluations of a run; NaN if those of a run are unknown
+    time_s: float  #: median wall time of a run [s]; likewise
     build_s: float  #: longest time to build the symbolic problem [s]
     compile_s: float  #: longest time to compile the objective, or to make derivatives and solver [s]
     #: Expected running time to each of ``TARGETS``; infinite if it was never reached
@@ -82,7 +82,7 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         worst=comparison.value(costs[-1]) if costs else None,
         median_interval=(interval[0], interval[1]) if interval else None,
         gap=comparison.gap(median(costs)) if costs else None,
-        evaluations=median(c.total_cost() for c in solver.curves),
+        evaluations=_if_known(median, [c.total_cost() for c in solver.curves]),
         time_s=_if_known(median, [r.time_s.solve for r in records]),
         build_s=_if_known(max, [r.time_s.build for r in records]),
         compile_s=_if_known(max, [r.time_s.compile for r in records]),
@@ -121,8 +121,33 @@ def percent(share: float | None) -> str:
 
 
 def count(number: float) -> str:
-    """Format a number of evaluations; a dash if it is infinite."""
+    """Format a number of evaluations; a dash if it is infinite or unknown."""
     return f"{number:,.0f}".replace(",", "\u202f") if math.isfinite(number) else "-"
+
+
+def describe_unknown(comparison: Comparison) -> list[str]:
+    """Return a sentence for each solver with runs whose evaluations are unknown."""
+    found = []
+    for solver in comparison.solvers:
+        runs = [r.run for r in solver.records if not r.evaluations]
+        if runs:
+            which = f"run {runs[0]}" if len(runs) == 1 else f"runs {_join_numbers(runs)}"
+            found.append(
+                f"{solver.name}, {which} of {len(solver.records)}: the number of evaluations is unknown; all statistics of "
+                f"evaluations exclude {solver.name}."
+            )
+    return found
+
+
+def _join_numbers(numbers: Sequence[int]) -> str:
+    """Return ascending numbers with their gaps: ``0 to 3, 7``."""
+    parts: list[list[int]] = []
+    for number in numbers:
+        if parts and number == parts[-1][-1] + 1:
+            parts[-1].append(number)
+        else:
+            parts.append([number])
+    return ", ".join(f"{part[0]}" if len(part) == 1 else f"{part[0]} to {part[-1]}" for part in parts)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -120,13 +120,15 @@ def _cost(comparison: Comparison) -> str:
     target = 1e-3
     costs = [(s, s.expected_cost(target), s.expected_cost(target, "seconds")) for s in comparison.solvers]
     reached = sorted((item for item in costs if math.isfinite(item[1])), key=lambda item: item[1])
-    never = [solver.name for solver, cost, _ in costs if not math.isfinite(cost)]
+    never = [solver.name for solver, cost, _ in costs if math.isinf(cost)]
+    unknown = [solver.name for solver, cost, _ in costs if math.isnan(cost)]
     parts = [
         f"{solver.name} {count(cost)} evaluations" + ("" if math.isnan(seconds) else f" or {seconds:.2g} s")
         for solver, cost, seconds in reached
     ]
     text = f"on {comparison.problem} {join_words(parts) or 'no solver'}"
-    return text + (f", never by {join_words(never)}" if never else "")
+    text += f", never by {join_words(never)}" if never else ""
+    return text + (f", unknown for {join_words(unknown)}" if unknown else "")
 
 
 def describe_proof(comparison: Comparison) -> str:

@@ -186,7 +186,7 @@ HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best 
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Print the table of solvers for each problem, titled by the problem unless a title is given."""
     from compare.analysis.comparison import compare_problems
-    from compare.analysis.solver_table import HEADER, find_failures, format_cells, summarise
+    from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
     from compare.analysis.verdict import describe_best_known
 
     for comparison in compare_problems(records):
@@ -201,6 +201,8 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
+        for sentence in describe_unknown(comparison):
+            stdout.print(f"{comparison.problem}, {sentence}", soft_wrap=True)
         stdout.print(f"{comparison.problem}: {describe_best_known(comparison)}", soft_wrap=True)
     stdout.print(HOW_TO_READ)
 

@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_if_excluded, print_result, stdout
+from compare.cli.common import end_if_excluded, print_result, say, stdout
 from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.options import RESULTS, AsCsv, AsJson, NamedProblem
+from nlp_gait.columns import MOST
 
 
 @command
@@ -21,7 +22,7 @@ def import_results(
         Path,
         typer.Argument(
             metavar="FINALS.csv",
-            help="One row per run: the variables, and optionally run, seed, objective, violation, evaluations, time_s.",
+            help="One row per run: the variables, and where known run, seed, objective, violation, evaluations, time_s.",
         ),
     ],
     history: Annotated[
@@ -30,7 +31,12 @@ def import_results(
     ] = None,
     label: Annotated[str, typer.Option("--as", help='Name in the report, for example "GA (MATLAB)".')],
     evaluations: Annotated[
-        int | None, typer.Option(min=1, help="Evaluations of every run, if neither file has them.")
+        int | None,
+        typer.Option(
+            min=1,
+            max=MOST,
+            help="Evaluations of every run, if neither file has them; leave it out if they are unknown.",
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of a new or existing study.")] = RESULTS,
     as_csv: AsCsv = False,
@@ -78,12 +84,15 @@ def logs(
     Example: `nlp-gait logs results --to logs --format ioh`
     """
     from compare.analysis.comparison import compare_problems
+    from compare.analysis.solver_table import describe_unknown
     from compare.logs import write_coco, write_ioh
     from compare.study.evidence import read_evidence
 
     evidence = read_evidence(folder)
     records = evidence.records
     comparisons = compare_problems(records)
+    for sentence in (s for comparison in comparisons for s in describe_unknown(comparison)):
+        say(f"not in the logs: {sentence}")
     written = (write_ioh if form == "ioh" else write_coco)(comparisons, to)
     data = {"problems": [comparison.problem for comparison in comparisons], "runs": len(records)}
     print_result(

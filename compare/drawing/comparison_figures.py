@@ -165,6 +165,10 @@ def _draw_share(axes: Axes, at: Array, share: Array, name: str, look: Look, last
 
 
 def list_expected_costs(comparisons: Sequence[Comparison]) -> dict[str, list[float]]:
-    """Return expected evaluations for each problem and target by solver; only solvers that ran on all problems."""
+    """Return expected evaluations for each problem and target by solver.
+
+    Only solvers that ran on all problems with known evaluations.
+    """
     found, shared = index_solvers(comparisons)
+    shared = [name for name in shared if all(solvers[name].has_costs("evaluations") for solvers in found)]
     return {name: [solvers[name].expected_cost(target) for solvers in found for target in TARGETS] for name in shared}

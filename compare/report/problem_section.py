@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from compare.analysis.comparison import Comparison
 from compare.analysis.published import make_published_rows
 from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
-from compare.analysis.solver_table import HEADER, SolverSummary, count, format_cells, summarise
+from compare.analysis.solver_table import HEADER, SolverSummary, count, describe_unknown, format_cells, summarise
 from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import BY_UNIT, heading, seconds, with_unit
 from compare.analysis.verdict import compare_pairs, describe_better
@@ -122,10 +122,12 @@ def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
         [(solver.name, *_mean_calls(solver.records)) for solver in comparison.solvers],
         "Mean calls per run",
     )
-    return Section(title="Costs", parts=(runtime, times, calls))
+    return Section(title="Costs", parts=(*describe_unknown(comparison), runtime, times, calls))
 
 
 def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
+    if not all(r.evaluations for r in records):
+        return ["-"] * 6
     means = [
         sum(r.evaluations.get(kind, 0) for r in records) / len(records)
         for kind in ("f", "g", "gradient", "jacobian", "hessian")

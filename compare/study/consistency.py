@@ -68,9 +68,10 @@ def check_history(record: RunRecord) -> Iterator[str]:
 
 def check_claims(record: RunRecord) -> Iterator[str]:
     """Check claims and counts, which a run derives from the same functions as the judge; imported claims are anything."""
-    definition, f, verdict = record.definition, record.evaluations["f"], record.verdict
+    definition, verdict = record.definition, record.verdict
     if "imported" in definition:
         return
+    f = record.evaluations["f"]
     claim, is_search = record.claimed_objective, "handling" in definition
     if claim is not None and not is_same(claim, verdict.objective):
         yield f"it claims {claim:.9g}, but the judge finds {verdict.objective:.9g}"

@@ -23,6 +23,8 @@ from nlp_gait.formulation import Array, GaitProblem
 # Table next to the variables.
 FINALS = ("run", "seed", "objective", "violation", "evaluations", "time_s")
 HISTORY = ("run", "evaluations", "objective")
+# Least values of those that are numbers, not counts.
+LEAST = {"objective": -math.inf, "violation": 0.0, "time_s": 0.0}
 
 
 def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) -> tuple[Table, Array]:
@@ -61,7 +63,7 @@ def import_runs(
         finals: one row for each run: the variables and, where known, ``FINALS``, of which objective and violation are claims.
         label: of the solver in the study.
         histories: best so far: ``HISTORY``, objective empty before the first feasible point, and optionally ``time_s``.
-        evaluations: of every run, if neither file has them.
+        evaluations: of every run, if neither file has them; None if they are unknown: such runs have no history.
     """
     if not LABEL.fullmatch(label):
         raise InputError(f"--as takes letters, digits, spaces and . _ + : ( ) -, 64 at most, got {label!r}")
@@ -82,17 +84,14 @@ def import_runs(
     for k, (run, x) in enumerate(zip(runs, points, strict=True)):
         row = {name: math.nan if column is None else column[k] for name, column in given.items()}
         verdict = Verdict.from_evaluation(evaluate(problem, x))
-        history, seconds = known.get(run, (None, ()))
-        if history is None:
-            count = row["evaluations"] if given["evaluations"] else evaluations
-            if count is None:
-                raise InputError(
-                    f"{table.owner} has no evaluations: add a column 'evaluations', or use --history or --evaluations"
-                )
-            history = History(
-                evaluations=(table.count("evaluations", k, count, 1),),
-                objective=(verdict.objective if verdict.feasible else None,),
-            )
+        for name, least in LEAST.items():
+            table.number(name, k, row[name], least)
+        history, seconds = known.get(run, (History(evaluations=(), objective=()), ()))
+        count = math.nan if evaluations is None else evaluations
+        count = count if math.isnan(row["evaluations"]) else row["evaluations"]
+        if run not in known and not math.isnan(count):
+            end = verdict.objective if verdict.feasible else None
+            history = History(evaluations=(table.count("evaluations", k, count, 1),), objective=(end,))
             seconds = (row["time_s"],)
         claim = None if math.isnan(row["objective"]) else row["objective"]
         seed = run if math.isnan(row["seed"]) else table.count("seed", k, row["seed"])
@@ -111,12 +110,12 @@ def import_runs(
                 claimed_objective=claim,
                 claimed_violation=None if math.isnan(row["violation"]) else row["violation"],
                 verdict=verdict,
-                evaluations={"f": history.evaluations[-1]},
+                evaluations={"f": history.evaluations[-1]} if history.evaluations else {},
                 failed_evaluations=0,
                 iterations=0,
                 active_constraints=(),
                 history=history,
-                time_s=Times.make_unknown(seconds[-1], seconds),
+                time_s=Times.make_unknown(seconds[-1] if seconds else row["time_s"], seconds),
             )
         )
     return records
@@ -133,6 +132,9 @@ def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tupl
         evaluations = table.count("evaluations", k, count, 1)
         if entries and evaluations < entries[-1][0]:
             raise InputError(f"{table.owner}, line {table.lines[k]}: evaluations of run {run:g} must ascend")
+        table.number("objective", k, value)
+        least = entries[-1][2] if entries and not math.isnan(entries[-1][2]) else 0.0
+        table.number("time_s", k, time, least)
         entries.append((evaluations, None if math.isnan(value) else value, time))
     for run in found:
         if run not in runs:

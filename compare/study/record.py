@@ -119,7 +119,8 @@ class RunRecord:
     claimed_objective: float | None  #: in the problem's sense; None without a claim
     claimed_violation: float | None  #: total; None without a claim
     verdict: Verdict  #: what the judge finds at x
-    evaluations: Mapping[str, int]  #: calls by kind: f (with all constraints), g, gradient, jacobian, hessian
+    #: Calls by kind: f (with all constraints), g, gradient, jacobian, hessian; empty for an imported result without counts
+    evaluations: Mapping[str, int]
     failed_evaluations: int  #: calls that returned NaN or infinity
     iterations: int  #: generations of a population, iterations of an NLP solver
     #: Bounds with a price, largest first, from solvers with multipliers
@@ -227,7 +228,8 @@ def parse_record(raw: Any) -> RunRecord:
     counts = (record.run, record.seed, record.failed_evaluations, record.iterations, *record.evaluations.values())
     if min(counts) < 0 or any(a > b for a, b in itertools.pairwise((0, *history.evaluations))):
         raise ValueError("counts must be at least 0, and those of the history ascend")
-    if "f" not in record.evaluations or not set(CALLS).issuperset(record.evaluations):
+    unknown = "imported" in record.definition and not record.evaluations and not history.evaluations
+    if not unknown and ("f" not in record.evaluations or not set(CALLS).issuperset(record.evaluations)):
         raise ValueError(f"evaluations must be counts of {', '.join(sorted(CALLS))}, among them f")
     if record.definition["seed"] != record.seed:
         raise ValueError(f"seed is {record.seed}, but {record.definition['seed']} in the definition")
@@ -254,10 +256,12 @@ def make_row(record: RunRecord) -> list[object]:
     """Return a run under ``HEADER``; None for unknown values."""
     calls = [record.evaluations.get(kind) for kind in CALLS]
     claims = (record.claimed, record.status, record.claimed_objective, record.claimed_violation)
+    imported = "imported" in record.definition
+    counts = (None, None) if imported else (record.failed_evaluations, record.iterations)
     return [
         *(record.problem, record.solver, record.run, record.seed, *claims),
         *make_judged_cells(record),
-        *(*calls, record.failed_evaluations, record.iterations, record.time_s.solve),
+        *(*calls, *counts, record.time_s.solve),
     ]
 
 

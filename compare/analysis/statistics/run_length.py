@@ -52,8 +52,8 @@ class Curve:
     A gradient method has one entry, its end, as it may be infeasible earlier.
     """
 
-    evaluations: Array  #: (G,) equivalent evaluations
-    seconds: Array  #: (G,) wall time of the solve
+    evaluations: Array  #: (G,) equivalent evaluations; NaN where they are unknown, as of some imported results
+    seconds: Array  #: (G,) wall time of the solve; likewise
     gap: Array  #: (G,) relative distance from the reference, infinite while nothing was feasible; negative if better
 
     def cost_to_reach(self, target: float, axis: str = "evaluations") -> float:
@@ -68,7 +68,10 @@ class Curve:
 
 
 def make_curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
-    """Return the best so far of a run, with gaps from a reference objective."""
+    """Return the best so far of a run, with gaps from a reference objective; its end alone if its evaluations are unknown."""
+    if not record.evaluations:
+        gap = relative_gap(record.verdict.objective, reference, objective) if record.verdict.feasible else math.inf
+        return Curve(evaluations=np.array([math.nan]), seconds=np.array([record.time_s.solve]), gap=np.array([gap]))
     evaluations = np.array(record.history.evaluations, dtype=float)
     if evaluations.size:  # derivatives are counted at the end
         evaluations[-1] = max(evaluations[-1], weighting.equivalent(record.evaluations, len(record.x)))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import compare_problems, label_editions
-from compare.analysis.solver_table import format_cells, summarise
+from compare.analysis.solver_table import HEADER, describe_unknown, format_cells, summarise
 from compare.judge import evaluate
 from compare.report import rebuild_report
 from compare.study.import_runs import import_runs, read_imported_records, read_points
@@ -123,12 +123,60 @@ def test_a_damaged_file_is_refused_by_its_line(text: str, message: str, tmp_path
 
 
 def test_missing_settings_of_a_run_are_requested(tmp_path: Path) -> None:
-    with pytest.raises(GaitError, match="has no evaluations: add a column"):
-        import_runs(WALK, finals(tmp_path), "ga")
     with pytest.raises(GaitError, match="--as takes letters"):
         import_runs(WALK, finals(tmp_path), "../ga", evaluations=3)
     with pytest.raises(GaitError, match="unknown column of .* 'objectiv'; did you mean .*'objective'"):
         import_runs(WALK, finals(tmp_path, extra={"objectiv": [1, 2, 3]}), "ga", evaluations=3)
+
+
+@pytest.mark.slow
+def test_points_without_evaluations_are_excluded_from_statistics_of_them(tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    extra: dict[str, list[object]] = {"evaluations": [100, "", ""], "time_s": ["", 2.0, ""]}
+    partly = import_runs(WALK, finals(tmp_path, extra=extra), "paper")
+    assert [dict(r.evaluations) for r in partly] == [{"f": 100}, {}, {}]
+    assert math.isnan(partly[0].time_s.solve) and partly[1].time_s.solve == 2.0
+    for record in (*partly, *import_runs(WALK, finals(tmp_path), "GA", evaluations=50)):
+        write_record(record, out)
+    done = nlp_gait("import", "walk12", finals(tmp_path), "--as", "thesis", "--out", out, "--json", "--csv")
+    summaries = {summary["solver"]: summary for summary in json.loads(done.stdout)["problems"]["walk12"]}
+    for unknown in (summaries["paper"], summaries["thesis"]):
+        assert unknown["evaluations"] is None and unknown["expected_evaluations"] == [None] * 4
+    assert summaries["GA"]["evaluations"] == 50 and summaries["thesis"]["best"] == summaries["GA"]["best"]
+    (comparison,) = compare_problems(read_records(out))
+    assert "-" == format_cells(summarise(comparison)[-1], comparison)[HEADER.index("evaluations")]
+    page = " ".join((out / "report.md").read_text().split())
+    assert "nan" not in page.lower()
+    for solver, runs in (("paper", "1 to 2"), ("thesis", "0 to 2")):
+        sentence = (
+            f"{solver}, runs {runs} of 3: the number of evaluations is unknown; all statistics of evaluations exclude"
+        )
+        assert sentence in page and sentence in describe_unknown(comparison)[solver == "thesis"]
+    with open(out / "runs.csv") as file:
+        rows = [r for r in csv.DictReader(file) if r["solver"] == "paper"]
+    assert [(r["calls_f"], r["iterations"]) for r in rows] == [("100", ""), ("", ""), ("", "")]
+    done = nlp_gait("logs", out, "--to", tmp_path / "logs")
+    assert "not in the logs: thesis, runs 0 to 2 of 3" in " ".join(done.stderr.split())
+    assert {path.name for path in (tmp_path / "logs").iterdir()} == {"GA"}
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [
+        ("time_s", -5, "line 2: time_s must be a finite number >= 0, got -5; leave the cell empty if it is unknown"),
+        ("time_s", "-1e308", "time_s must be a finite number >= 0"),
+        ("time_s", "inf", "time_s must be a finite number >= 0, got inf"),
+        ("violation", -1, "violation must be a finite number >= 0, got -1"),
+        ("objective", "-inf", "objective must be a finite number, got -inf"),
+        ("run", 1e300, r"run must be a whole number >= 0 and < 2\^63, got 1e\+300; fix the cell"),
+        ("seed", 2**63, r"seed must be a whole number >= 0 and < 2\^63"),
+        ("evaluations", 1e19, r"evaluations must be a whole number >= 1 and < 2\^63"),
+        ("evaluations", 0, "evaluations must be a whole number >= 1"),
+    ],
+)
+def test_impossible_numbers_are_refused(column: str, value: object, message: str, tmp_path: Path) -> None:
+    with pytest.raises(GaitError, match=message):
+        import_runs(WALK, finals(tmp_path, extra={column: [value, 1, 2]}), "ga", evaluations=3)
 
 
 def test_editions_of_one_name_are_distinguished(tmp_path: Path) -> None:
@@ -165,10 +213,13 @@ def test_the_commands(tmp_path: Path) -> None:
         ("0,10,0.5\n1,1,\n2,1,\n7,1,\n", "run 7 has no final point"),
         ("0,10,0.5\n1,1,\n", "run 2 has no history"),
         ("0,0,0.5\n1,1,\n2,1,\n", "line 2: evaluations must be a whole number .*1"),
+        ("0,1,inf\n1,1,\n2,1,\n", "line 2: objective must be a finite number, got inf"),
+        ("0,1,0.5,2\n0,2,0.5,1\n1,1,,\n2,1,,\n", "line 3: time_s must be a finite number >= 2, got 1"),
     ],
 )
 def test_a_damaged_history_is_refused_by_its_line(text: str, message: str, tmp_path: Path) -> None:
-    (tmp_path / "h.csv").write_text(f"run,evaluations,objective\n{text}")
+    times = ",time_s" if text.partition("\n")[0].count(",") == 3 else ""
+    (tmp_path / "h.csv").write_text(f"run,evaluations,objective{times}\n{text}")
     with pytest.raises(GaitError, match=message):
         import_runs(WALK, finals(tmp_path), "ga", tmp_path / "h.csv")
 
