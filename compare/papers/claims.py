@@ -93,14 +93,14 @@ class Check:
         return replace(claim, **{**texts, "verdict": verdict, "detail": f"{detail} {note}".strip()})
 
 
-def decide(verdict: bool | Verdict, **values: Any) -> Check:
+def decide(verdict: bool | Verdict, /, **values: Any) -> Check:
     """Return a check whose verdict is given, or whether the claim holds; the claim states its criterion."""
     if not isinstance(verdict, Verdict):
         verdict = Verdict.HOLDS if verdict else Verdict.FAILS
     return Check(verdict, values)
 
 
-def compare_levels(printed: ArrayLike, ours: ArrayLike, **values: Any) -> Check:
+def compare_levels(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
     """Return a check of values without a direction: the claim holds if all of ours are within its tolerance."""
 
     def rule(claim: Claim) -> tuple[Verdict, str]:
@@ -110,7 +110,7 @@ def compare_levels(printed: ArrayLike, ours: ArrayLike, **values: Any) -> Check:
     return Check(rule, values)
 
 
-def compare_changes(printed: ArrayLike, ours: ArrayLike, **values: Any) -> Check:
+def compare_changes(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
     """Return a check of changes, whose signs are directions.
 
     The claim holds if all of ours are within its tolerance. Otherwise its direction holds if all have the printed sign.
@@ -126,7 +126,7 @@ def compare_changes(printed: ArrayLike, ours: ArrayLike, **values: Any) -> Check
     return Check(rule, values)
 
 
-def require_change(ours: ArrayLike, **values: Any) -> Check:
+def require_change(ours: ArrayLike, /, **values: Any) -> Check:
     """Return a check of a claim that prints a direction without a size.
 
     It holds if all of our changes, positive in the claimed direction, are at least as large as the claim's ``least``.

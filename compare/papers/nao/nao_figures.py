@@ -13,7 +13,7 @@ from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.gait_figure import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT
-from compare.papers.nao.nao_runs import ALGORITHMS
+from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
 from compare.papers.paper_runs import get_point
 from nlp_gait.formulation import Array, Result
 
@@ -45,8 +45,8 @@ def _draw_convergence(phase: PhaseFindings) -> Figure:
 
     A line begins where every run has found a feasible solution.
     """
-    figure = new_figure(6.3, 2.9)
-    for axes, name in zip(figure.subplots(1, 2, sharey=True), ALGORITHMS, strict=True):
+    figure = new_figure(7.5, 2.9)
+    for axes, name in zip(figure.subplots(1, len(SEARCHES), sharey=True), SEARCHES, strict=True):
         best = np.array([run.history.objective for run in phase.searches[name]], dtype=float)
         generations = np.arange(1, best.shape[1] + 1)
         colour = COLOURS[name]
@@ -62,25 +62,27 @@ def _draw_convergence(phase: PhaseFindings) -> Figure:
         axes.set_xlabel("generation")
         _scale_power(axes)
         axes.legend()
-    figure.axes[1].set_ylabel("")
+    for axes in figure.axes[1:]:
+        axes.set_ylabel("")
     return figure
 
 
 def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
     """Figs. 10 to 14, 16 to 19: power against each variable over all feasible solutions, with IPOPT's optimum as a line."""
-    figure = new_figure(6.3, 0.5 + 2.1 * len(positions))
-    grid = figure.subplots(len(positions), 2, sharey=True, sharex="row", squeeze=False)
+    figure = new_figure(7.5, 0.5 + 2.1 * len(positions))
+    grid = figure.subplots(len(positions), len(SEARCHES), sharey=True, sharex="row", squeeze=False)
     for row, position in zip(grid, positions, strict=True):
         variable = phase.problem.variables[position]
         label = rf"$x_{{{position + 1}}}$: {axis_label(variable.name, variable.unit)}"
-        for axes, name in zip(row, ALGORITHMS, strict=True):
+        for axes, name in zip(row, SEARCHES, strict=True):
             _plot_solutions(axes, phase.points[name], position, name)
             _plot_optima(axes, phase, position)
             axes.set_xlabel(label)
-            axes.locator_params(axis="x", nbins=6)
+            axes.locator_params(axis="x", nbins=4)
+            axes.set_title(f"{NAMES[name]}: {len(phase.points[name].power_W)} solutions", fontsize="small")
             _scale_power(axes)
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=2, handletextpad=0.4)
-        row[1].set_ylabel("")
+        for axes in row[1:]:
+            axes.set_ylabel("")
     return figure
 
 
@@ -89,9 +91,7 @@ def _plot_solutions(axes: Axes, points: Points, position: int, name: str) -> Non
     x, power = points.x[:, position], points.power_W
     cells = np.stack([_assign_cells(x), _assign_cells(np.log(power))])
     shown = np.unique(cells, axis=1, return_index=True)[1]
-    label = f"{NAMES[name]}: {len(power)} feasible solutions"
     axes.plot(x[shown], power[shown], ".", color=COLOURS[name], markersize=1.5, alpha=0.4, rasterized=True)
-    axes.plot([], [], ".", color=COLOURS[name], markersize=5, label=label)
 
 
 def _assign_cells(values: Array) -> Array:
@@ -102,7 +102,7 @@ def _assign_cells(values: Array) -> Array:
 def _plot_optima(axes: Axes, phase: PhaseFindings, position: int) -> None:
     sweep = phase.sweeps[position]
     power = [held.power_W if held.feasible else np.nan for held in sweep]
-    axes.plot([held.at for held in sweep], power, color=COLOURS["ipopt"], label="IPOPT", linewidth=1.2)
+    axes.plot([held.at for held in sweep], power, color=COLOURS["ipopt"], linewidth=1.2)
 
 
 def _draw_swing(findings: NaoFindings) -> Figure:
@@ -117,9 +117,10 @@ def _draw_swing(findings: NaoFindings) -> Figure:
 
     plot([held.power_W for held in findings.swing], "o-", COLOURS["ipopt"], "IPOPT")
     for name, marker in zip(ALGORITHMS, "sv", strict=True):
-        plot(PAPER.swing_power_W[name], f"{marker}--", PAPER_COLOUR, f"paper, {NAMES[name]}")
+        plot(PAPER.swing_power_W[name], f"{marker}--", PAPER_COLOUR, f"paper, {name.upper()}")
+    for name, marker in zip(SEARCHES, "s^v", strict=True):
         read = read_swing_powers(phase, name, phase.median_run(name))
-        plot(read, f"{marker}:", COLOURS[name], f"ours, read off the {NAMES[name]} run of median power")
+        plot(read, f"{marker}:", COLOURS[name], f"ours, {NAMES[name]}")
     axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / power at 0.015 m [1]")
     axes.legend()
     return figure

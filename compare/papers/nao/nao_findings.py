@@ -6,18 +6,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from compare.analysis.statistics.inference import RankSum, rank_sum_normal
-from compare.judge import evaluate
-from compare.papers.nao.nao_paper import PrintedPhase
-from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice
+from compare.papers.nao.nao_dh import compare_geometry
+from compare.papers.nao.nao_paper import PAPER, PrintedPhase
+from compare.papers.nao.nao_runs import ALGORITHMS, SweepPoint, compute_power_with_legs_twice, evaluate_indexes
+from compare.papers.nao.nao_torque_changes import compute_torque_changes
 from compare.papers.paper_runs import choose_best
-from compare.study.record import RunRecord, Verdict
+from compare.study.record import RunRecord
+from compare.study.task import ProblemSpec
 from nlp_gait.formulation import Array, GaitProblem
 
-NAMES = {"pso": "PSO", "ga": "GA", "ipopt": "IPOPT"}
+NAMES = {"pso-constant": "PSO, constant weight", "pso": "PSO, damped", "ga": "GA", "ipopt": "IPOPT"}
 FINE = 2001  # points at which a line between the points of a sweep is read
 # IPOPT's line bends most where solutions cost at most this share more than the best one.
 CHEAP = 0.02
@@ -50,6 +53,10 @@ class PhaseFindings:
     starts: Sequence[RunRecord]  # of IPOPT
     sweeps: Mapping[int, Sequence[SweepPoint]]  # IPOPT's optima over each variable, by its position in x
     points: Mapping[str, Points]  # by search
+    variants: Mapping[str, Sequence[RunRecord]]  # runs of the searches with other choices
+    choices: Mapping[str, ProblemSpec]  # the phase with each other choice of ``nao_paper.toml``
+    choice_starts: Mapping[str, Sequence[RunRecord]]  # of IPOPT, for the choices with an optimum
+    simulations: Mapping[str, Mapping[str, Any]]  # of the printed solutions, by search
 
     @cached_property
     def optimum(self) -> RunRecord:
@@ -63,7 +70,8 @@ class PhaseFindings:
 
     def final_powers(self, algorithm: str) -> list[float]:
         """Return the power at the end of each run [W]; infinite without a feasible solution."""
-        return [run.verdict.objective if run.verdict.feasible else math.inf for run in self.searches[algorithm]]
+        runs = {**self.searches, **self.variants}[algorithm]
+        return [run.verdict.objective if run.verdict.feasible else math.inf for run in runs]
 
     def median_run(self, algorithm: str) -> int:
         """Return the number of the run of median power, which the paper's tables show."""
@@ -79,22 +87,35 @@ class PhaseFindings:
         return float(np.median([run.verdict.indexes[name] for run in self.searches[algorithm]]))
 
     @cached_property
-    def printed_here(self) -> dict[str, Verdict]:
-        """The judge's verdicts on the paper's solutions, by search."""
+    def printed_here(self) -> dict[str, Mapping[str, float]]:
+        """Performance figures of the paper's solutions, by search."""
+        return {name: evaluate_indexes(self.problem, optimum.x) for name, optimum in self.paper.optima.items()}
+
+    @cached_property
+    def printed_by_choice(self) -> dict[str, dict[str, Mapping[str, float]]]:
+        """The same with each other choice, by choice and search."""
         return {
-            name: Verdict.from_evaluation(evaluate(self.problem, optimum.x))
-            for name, optimum in self.paper.optima.items()
+            choice: {name: evaluate_indexes(spec.load(), optimum.x) for name, optimum in self.paper.optima.items()}
+            for choice, spec in self.choices.items()
         }
+
+    def optimum_with(self, choice: str) -> RunRecord | None:
+        """Return IPOPT's best start with another choice; None if it was not solved."""
+        return choose_best(self.choice_starts[choice]) if choice in self.choice_starts else None
+
+    def evaluate_printed(self, **changes: float) -> Mapping[str, float]:
+        """Return the performance figures of the paper's PSO solution with other values of some variables, by name."""
+        x = self.problem.by_name(self.problem.check_x(self.paper.optima["pso"].x)) | changes
+        return evaluate_indexes(self.problem, list(x.values()))
 
     @cached_property
     def printed_with_legs_twice(self) -> dict[str, float]:
         """Power of the paper's solutions with the legs' mechanical term counted twice [W], by search."""
         return {name: compute_power_with_legs_twice(self.problem, o.x) for name, o in self.paper.optima.items()}
 
-    @cached_property
-    def test(self) -> RankSum:
-        """Rank-sum test of PSO's powers against GA's."""
-        return rank_sum_normal(self.final_powers("pso"), self.final_powers("ga"))
+    def test(self, algorithm: str, other: str = "ga") -> RankSum:
+        """Return the rank-sum test of a search's powers against another's."""
+        return rank_sum_normal(self.final_powers(algorithm), self.final_powers(other))
 
     def range_within(self, position: int, share: float) -> tuple[float, float]:
         """Return the least and the greatest value of a variable at which IPOPT's line is at most a share above the best."""
@@ -132,12 +153,28 @@ class NaoFindings:
     dsp: PhaseFindings  # double support
     swing: Sequence[SweepPoint]  # IPOPT's optima of single support over the paper's swing heights
     durations: Sequence[SweepPoint]  # likewise over durations
-    lever: Sequence[RunRecord]  # IPOPT's starts for double support with the lever rule for the torso's share
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:
         """Single and double support."""
         return self.ssp, self.dsp
+
+    @cached_property
+    def geometry_mm(self) -> dict[str, float]:
+        """Distances of our robot's ends from those of the printed tables, see ``compare_geometry``."""
+        return compare_geometry(str(self.ssp.problem.options["robot"]))
+
+    @cached_property
+    def torque_changes_Nm(self) -> dict[str, tuple[float, float]]:
+        """Torque change of the printed solutions of double support, by candidate for its cause and search."""
+        dsp, options = self.dsp, ("lever", "finite", "separate", "held", "v6")
+        pso, ga = (compute_torque_changes(dsp.problem, dsp.paper.optima[name].x) for name in ALGORITHMS)
+        others = {PAPER.choices[name].title: dsp.printed_by_choice[name] for name in options}
+        by_option = {
+            title: (found["pso"]["torque_change_Nm"], found["ga"]["torque_change_Nm"])
+            for title, found in others.items()
+        }
+        return {name: (pso[name], ga[name]) for name in pso} | by_option
 
     def swing_power(self, height_m: float) -> float:
         """Return the least power at one of the paper's swing heights [W]."""

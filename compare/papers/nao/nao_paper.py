@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from compare.analysis.statistics.inference import RankSum
@@ -45,6 +45,16 @@ class VelocityRange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """A choice other than ours, as options and parameters of the problems."""
+
+    title: str  # in words
+    phases: tuple[str, ...] = ("nao-ssp", "nao-dsp")  # problems
+    options: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NaoPaper:
     """Content of ``nao_paper.toml``."""
 
@@ -54,6 +64,7 @@ class NaoPaper:
     swing_power_W: Mapping[str, tuple[float, ...]]  # by search algorithm, at these heights
     durations_s: tuple[float, ...]  # of single support
     velocity_ranges: Mapping[str, VelocityRange]  # by id of the claim
+    choices: Mapping[str, Choice]
 
 
 PAPER = read_printed(NaoPaper, "nao/nao_paper.toml")

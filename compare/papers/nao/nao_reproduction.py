@@ -14,35 +14,42 @@ from compare.papers.nao import nao_runs as nao
 from compare.papers.nao.nao_claims import CHECKS
 from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
-from compare.papers.nao.nao_paper import PHASES, SWING_POWER_W, PrintedPhase
+from compare.papers.nao.nao_gait_claims import compute_joint_shares, describe_effect
+from compare.papers.nao.nao_paper import PAPER, PHASES, SWING_POWER_W, PrintedPhase
 from compare.papers.nao.nao_runs import ALGORITHMS, NaoEffort, SweepPoint
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
 from compare.report.document import Rows, Value
+from compare.study.record import RunRecord
 from compare.study.record_files import locate_record
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, Task
 from nlp_gait.backends.solvers import ipopt
+from nlp_gait.simulation import simulate
 
 
 def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
     """Run searches and IPOPT on both phases, and sweep over their variables."""
     store, tasks = Store(runner.folder), nao.make_tasks(effort)
-    searches = [task for task in tasks if task.is_search]
+    searches = [task for task in tasks if task.title in nao.SEARCHES]
     for task in searches:
         if nao.load_points(store, task) is None:
             locate_record(runner.folder, task).unlink(missing_ok=True)  # only a run gives its points
     runs = runner.run_tasks(tasks, partial(nao.run_and_store_points, runner.folder))
-    ssp, dsp = (_sweep_phase(runner, effort, phase, runs, _load_all_points(store, phase, searches)) for phase in PHASES)
+    simulated = runner.compute(nao.make_simulations(effort), code=(nao, simulate))
+    ssp, dsp = (
+        _sweep_phase(runner, effort, phase, runs, _load_all_points(store, phase, searches), simulated)
+        for phase in PHASES
+    )
     special = _solve_sweeps(runner, nao.make_special_sweeps(effort))
     swing, durations = special[nao.SWING_SWEEP], special[nao.DURATION_SWEEP]
-    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations, lever=runs[nao.LEVER, IPOPT])
+    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations)
 
 
 def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
     """Feasible solutions of all runs, by search."""
     points = {}
-    for name in ALGORITHMS:
+    for name in nao.SEARCHES:
         tasks = [task for task in searches if (task.problem.title, task.title) == (phase.problem, name)]
         runs = [found for task in tasks if (found := nao.load_points(store, task)) is not None]
         x, power = (np.concatenate(arrays) for arrays in zip(*runs, strict=True))
@@ -52,7 +59,12 @@ def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]
 
 
 def _sweep_phase(
-    runner: Runner, effort: NaoEffort, paper: PrintedPhase, runs: Runs, points: Mapping[str, Points]
+    runner: Runner,
+    effort: NaoEffort,
+    paper: PrintedPhase,
+    runs: Runs,
+    points: Mapping[str, Points],
+    simulated: Mapping[str, Any],
 ) -> PhaseFindings:
     """Sweep by IPOPT over each variable's feasible range."""
     spec, starts = nao.make_spec(paper.problem, effort), runs[paper.problem, IPOPT]
@@ -63,10 +75,14 @@ def _sweep_phase(
     return PhaseFindings(
         paper=paper,
         problem=spec.load(),
-        searches={name: runs[paper.problem, name] for name in ALGORITHMS},
+        searches={name: runs[paper.problem, name] for name in nao.SEARCHES},
         starts=starts,
         sweeps=dict(enumerate(_solve_sweeps(runner, sweeps).values())),
         points=points,
+        variants={name: runs[paper.problem, name] for name in nao.VARIANTS},
+        choices=nao.list_choices(paper.problem, effort, solved=False),
+        choice_starts={k: runs[spec.title, IPOPT] for k, spec in nao.list_choices(paper.problem, effort).items()},
+        simulations={name: simulated[f"simulate-{paper.problem}-{name}"] for name in ALGORITHMS},
     )
 
 
@@ -76,16 +92,17 @@ def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> dict[str, li
 
 
 def compute_values(findings: NaoFindings) -> dict[str, Any]:
-    """Return the values of the places in the report's text."""
+    """Return the values of the places in the report's text and in the table of differences."""
     ssp, dsp = findings.phases
     runs = ssp.searches["pso"]
-    solved = [start.verdict.objective for start in findings.lever if start.claimed]
-    lever = f"{min(solved):.5f} W instead of {dsp.best:.5f} W" if solved else "no optimum"
     printed = [
-        (optimum.power_W, phase.printed_here[name].objective, phase.printed_with_legs_twice[name])
+        (optimum.power_W, phase.printed_here[name]["power_W"], phase.printed_with_legs_twice[name])
         for phase in findings.phases
         for name, optimum in phase.paper.optima.items()
     ]
+    changes = np.array(list(findings.torque_changes_Nm.values()))
+    target = np.array([dsp.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS])
+    misses = 100 * np.abs(changes / target - 1).max(axis=1)
     return {
         "runs": len(runs),
         "generations": runs[0].iterations,
@@ -93,20 +110,37 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "robot": ssp.problem.options["robot"],
         "ssp": _compute_phase_values(ssp),
         "dsp": _compute_phase_values(dsp),
-        "costs": compute_range(100 * (here.objective / dsp.best - 1) for here in dsp.printed_here.values()),
-        "lever": f"{lever} ({len(solved)} of {len(findings.lever)} starts converged)",
+        "costs": compute_range(100 * (here["power_W"] / dsp.best - 1) for here in dsp.printed_here.values()),
         "gaps": compute_range(power - here for power, here, _ in printed),
         "misses": compute_range(100 * (twice / power - 1) for power, _, twice in printed),
+        "nearest": list(findings.torque_changes_Nm)[int(misses.argmin())],
+        "nearest_Nm": changes[misses.argmin()],
+        "nearest_miss": misses.min(),
+        "candidates": len(changes),
+        "geometry": list(findings.geometry_mm.values()),
+        "least_margin_mm": 1000 * min(min(m) for phase in findings.phases for m in _list_least_margins(phase)),
     }
+
+
+def _list_least_margins(phase: PhaseFindings) -> list[tuple[float, float]]:
+    ends = [run.verdict for runs in phase.searches.values() for run in runs if run.verdict.feasible]
+    return [(end.indexes["dbm_x_min_m"], end.indexes["dbm_y_min_m"]) for end in ends]
 
 
 def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
     """Values of one phase; ``broken`` counts final solutions that violate a constraint between the paper's samples."""
     ends = [run.verdict for runs in phase.searches.values() for run in runs if run.verdict.feasible]
     optimum = phase.optimum.verdict
+    shares = compute_joint_shares(phase.problem, phase.paper.optima["pso"].x)
+    medians = {
+        name.replace("-", "_"): float(np.median(phase.final_powers(name))) for name in (*nao.SEARCHES, *nao.VARIANTS)
+    }
     return {
+        "effects": {name: describe_effect(phase, name) for name in phase.choices},
+        "median_W": medians,
+        "yaw_mW": 1000 * shares["HipYawPitch"] * phase.printed_here["pso"]["power_W"],
         "converged": phase.converged,
-        "medians": ", ".join(f"{phase.median_run(name)} of {NAMES[name]}" for name in ALGORITHMS),
+        "medians": "; ".join(f"{phase.median_run(name)} of {NAMES[name]}" for name in nao.SEARCHES),
         "feasible": len(ends),
         "broken": sum(end.dense_feasible is False for end in ends),
         "optimum": "does not" if optimum.dense_feasible else f"violates {optimum.violated[0]}",
@@ -116,10 +150,19 @@ def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
 
 def make_tables(findings: NaoFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
-    tables = {
+    dsp = findings.dsp
+    tables: dict[str, Rows] = {
         nao.SWING_SWEEP: _list_swing_heights(findings),
         nao.DURATION_SWEEP: [(point.at, point.power_W) for point in findings.durations],
         "rank-sum-tests": [row for phase in findings.phases for row in _list_tests(phase)],
+        "choices": [row for phase in findings.phases for row in _list_choices(phase)],
+        "search-choices": [row for phase in findings.phases for row in _list_variants(phase)],
+        "torque-changes": [
+            ("printed", *(dsp.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS)),
+            *((name, *values) for name, values in findings.torque_changes_Nm.items()),
+        ],
+        "geometry": list(findings.geometry_mm.items()),
+        "simulations": [row for phase in findings.phases for row in _list_simulations(phase)],
         "power-gap": [row for phase in findings.phases for row in _list_gaps(phase)],
     }
     for phase in findings.phases:
@@ -133,33 +176,71 @@ def make_tables(findings: NaoFindings) -> dict[str, Rows]:
 
 
 def _list_variables(phase: PhaseFindings) -> Rows:
-    """Tables 6, 8: the optimal solutions; of PSO and GA the run of median power."""
+    """Tables 6, 8: the optimal solutions; of the searches the run of median power."""
+    other = phase.optimum_with("v6")
     rows = []
     for i, variable in enumerate(phase.problem.variables):
-        row: list[Value] = [f"x{i + 1} {variable.name} [{variable.unit}]"]
-        for name in ALGORITHMS:
-            row += [phase.paper.optima[name].x[i], phase.median(name).x[variable.name]]
-        rows.append([*row, phase.optimum.x[variable.name]])
+        ours = {name: phase.median(name).x[variable.name] for name in nao.SEARCHES}
+        paper = {name: phase.paper.optima[name].x[i] for name in ALGORITHMS}
+        row: list[Value] = [
+            f"x{i + 1} {variable.name} [{variable.unit}]",
+            paper["pso"],
+            ours["pso-constant"],
+            ours["pso"],
+        ]
+        row += [paper["ga"], ours["ga"], phase.optimum.x[variable.name], other.x[variable.name] if other else None]
+        rows.append(row)
     return rows
 
 
 def _list_indexes(phase: PhaseFindings) -> Rows:
-    """Tables 7, 9: performance figures; the paper's also of its solutions as the judge finds them here."""
+    """Tables 7, 9: performance figures; the paper's also of its solutions here, on NAO V5 and V6."""
+    other = phase.optimum_with("v6")
     rows = []
     for index, best in phase.optimum.verdict.indexes.items():
         row: list[Value] = [index]
-        for name in ALGORITHMS:
+        for name, ours in (("pso", ("pso-constant", "pso")), ("ga", ("ga",))):
             printed = phase.paper.optima[name]
-            value = printed.power_W if index == "power_W" else printed.indexes[index]
-            row += [value, phase.printed_here[name].indexes[index], phase.median(name).verdict.indexes[index]]
-        rows.append([*row, best])
+            row += [printed.power_W if index == "power_W" else printed.indexes[index], phase.printed_here[name][index]]
+            row += [phase.printed_by_choice["v6"][name][index]]
+            row += [phase.median(search).verdict.indexes[index] for search in ours]
+        rows.append([*row, best, other.verdict.indexes[index] if other else None])
+    return rows
+
+
+def _list_choices(phase: PhaseFindings) -> Rows:
+    """The printed solutions and IPOPT's optimum with each other choice."""
+    rows = [_list_choice(phase, "as here", phase.printed_here, phase.optimum)]
+    for name, printed in phase.printed_by_choice.items():
+        rows.append(_list_choice(phase, PAPER.choices[name].title, printed, phase.optimum_with(name)))
+    return rows
+
+
+def _list_choice(
+    phase: PhaseFindings, title: str, printed: Mapping[str, Mapping[str, float]], optimum: RunRecord | None
+) -> list[Value]:
+    row: list[Value] = [phase.paper.title, title]
+    for name in ALGORITHMS:
+        row += [printed[name]["power_W"], printed[name]["torque_change_Nm"]]
+    solved = optimum is not None and optimum.claimed and optimum.verdict.feasible
+    return [*row, optimum.verdict.objective if optimum is not None and solved else "not solved"]
+
+
+def _list_variants(phase: PhaseFindings) -> Rows:
+    """Median power of each choice that the paper leaves open, against both kinds of PSO and GA."""
+    rows: list[list[Value]] = []
+    for name in (*nao.SEARCHES, *nao.VARIANTS):
+        powers = phase.final_powers(name)
+        p = [phase.test(name, other).p_two_sided for other in nao.SEARCHES]
+        feasible = sum(map(math.isfinite, powers))
+        rows.append([phase.paper.title, NAMES.get(name, name), len(powers), feasible, float(np.median(powers)), *p])
     return rows
 
 
 def _list_swing_heights(findings: NaoFindings) -> Rows:
     """Table 7, rows 6 to 11: least power at a swing height; true optima, and what search histories show."""
     phase = findings.ssp
-    read = [read_swing_powers(phase, name, run) for name in ALGORITHMS for run in (phase.median_run(name), None)]
+    read = [read_swing_powers(phase, name, run) for name in nao.SEARCHES for run in (phase.median_run(name), None)]
     cheapest = findings.swing[0].power_W
     rows = []
     for k, held in enumerate(findings.swing):
@@ -185,9 +266,13 @@ def _list_runs(phase: PhaseFindings) -> Rows:
 
 def _list_tests(phase: PhaseFindings) -> Rows:
     """Section 5.3: Wilcoxon's rank-sum tests of PSO's powers against GA's, and the effect size."""
-    effect = a12(phase.final_powers("pso"), phase.final_powers("ga"))
+    tests = [("paper", phase.paper.test, compute_implied_a12(phase))]
+    for name in ("pso-constant", "pso"):
+        tests.append(
+            (f"here, {NAMES[name]}", phase.test(name), a12(phase.final_powers(name), phase.final_powers("ga")))
+        )
     rows: list[list[Value]] = []
-    for name, test, share in (("paper", phase.paper.test, compute_implied_a12(phase)), ("here", phase.test, effect)):
+    for name, test, share in tests:
         p_less: Value = "not given" if math.isnan(test.p_less) else test.p_less
         rows.append([phase.paper.title, name, test.rank_sum, test.z, test.p_two_sided, p_less, share])
     return rows
@@ -203,9 +288,21 @@ def _list_gaps(phase: PhaseFindings) -> Rows:
     """The paper's solutions: power as printed, as found here, and with the legs' mechanical term counted twice."""
     rows = []
     for name in ALGORITHMS:
-        printed, here = phase.paper.optima[name].power_W, phase.printed_here[name].objective
+        printed, here = phase.paper.optima[name].power_W, phase.printed_here[name]["power_W"]
         twice = phase.printed_with_legs_twice[name]
-        rows.append((f"{phase.paper.title}, {NAMES[name]}", printed, here, printed - here, twice))
+        rows.append((f"{phase.paper.title}, {name.upper()}", printed, here, printed - here, twice))
+    return rows
+
+
+def _list_simulations(phase: PhaseFindings) -> Rows:
+    """Section 5.4: the paper's solutions in MuJoCo."""
+    rows = []
+    for name, found in phase.simulations.items():
+        tilt, planned, simulated = (
+            math.degrees(found[key]) for key in ("tilt_rad", "planned_beyond_rad", "simulated_beyond_rad")
+        )
+        fell = "stays up" if found["fell_at_s"] is None else f"falls at {found['fell_at_s']:.2f} s"
+        rows.append((f"{phase.paper.title}, {name.upper()}", fell, tilt, -planned, -simulated))
     return rows
 
 

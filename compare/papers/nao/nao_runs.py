@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +16,34 @@ from compare.papers.paper_runs import Effort, make_computation
 from compare.study.record import RunRecord
 from compare.study.run_task import run_task
 from compare.study.store import Computation, Store
-from compare.study.task import IPOPT, ProblemSpec, Stop, Task
+from compare.study.task import IPOPT, Handling, ProblemSpec, Stop, Task
+from metaheuristics.algorithms.genetic import GeneticAlgorithm
+from metaheuristics.algorithms.genetic_operators import Polynomial, SimulatedBinary
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.optima.continuation import solve_both_ways
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.nao.joints import PLANNED_JOINTS
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import simulate_plan
 
-ALGORITHMS = ("pso", "ga")
-LEVER = "nao-dsp-lever"
+ALGORITHMS = ("pso", "ga")  # as the paper names them
+# PSO with the constant weight that the paper prints, PSO with the damping of the code that it cites, GA.
+SEARCHES = ("pso-constant", "pso", "ga")
+PENALTY = Handling(name="penalty", settings={"weight": 10.0})  # W per unit of violation
+# What the paper leaves open, chosen otherwise than in ``SEARCHES``.
+VARIANTS: Mapping[str, Mapping[str, Any]] = {
+    "ga-generational": {"solver": "ga", "settings": {"survival": "generational"}},
+    "ga-all-crossed": {
+        "solver": GeneticAlgorithm(crossover=SimulatedBinary(probability=1.0, variable_probability=1.0))
+    },
+    "ga-much-mutation": {"solver": GeneticAlgorithm(mutation=Polynomial(probability=0.3))},
+    "ga-penalty": {"solver": "ga", "handling": PENALTY},
+    "pso-penalty": {"solver": "pso", "handling": PENALTY},
+    "pso-constant-penalty": {"solver": "pso-constant", "handling": PENALTY},
+}
 SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
+WEBOTS_DRIVE = Drive(period_s=0.04, interpolation="held", feed_forward="none")  # section 5.4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,18 +51,20 @@ class NaoEffort(Effort):
     """Effort of the reproduction of the NAO paper."""
 
     runs: int = 11  # of each search, as in the paper
+    variant_runs: int = 11  # of each other choice of the searches
     evaluations: int = 10_000  # of a search, as in the paper
     starts: int = 20  # of IPOPT
-    lever_starts: int = 5  # of IPOPT with the lever rule for the torso's share
+    choices: tuple[str, ...] = tuple(PAPER.choices)  # with an optimum; all have values at the printed solutions
+    choice_starts: int = 5  # of IPOPT for each of them
     intervals: int = 10  # between the samples of a phase, as in the paper
     sweep_starts: int = 2  # at both ends of a sweep
     sweep_points: tuple[int, int] = (13, 10)  # over the range of all feasible solutions, and of the cheap ones
 
     @property
     def steps(self) -> int:
-        """Runs, two special sweeps and one over each variable, and the report."""
-        variables = sum(len(phase.optima["pso"].x) for phase in PHASES)
-        return len(PHASES) * (len(ALGORITHMS) * self.runs + self.starts) + self.lever_starts + 2 + variables + 1
+        """Runs, two special sweeps and one over each variable, a simulation of each printed solution, and the report."""
+        variables, solutions = sum(len(p.optima["pso"].x) for p in PHASES), sum(len(p.optima) for p in PHASES)
+        return len(make_tasks(self)) + 2 + variables + solutions + 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,18 +78,27 @@ class SweepPoint:
 
 def make_tasks(effort: NaoEffort) -> list[Task]:
     """Return searches and starts of IPOPT; equal runs of the searches start from the same population."""
-    stop = Stop(evaluations=effort.evaluations)
-    specs = [make_spec(phase.problem, effort) for phase in PHASES]
-    lever = replace(specs[1].with_options(torso_share="lever"), label=LEVER)
-    tasks = [
-        Task(problem=spec, solver=name, stop=stop, run=k)
-        for spec in specs
-        for name in ALGORITHMS
-        for k in range(effort.runs)
-    ]
-    for spec, starts in (*((spec, effort.starts) for spec in specs), (lever, effort.lever_starts)):
-        tasks += [Task(problem=spec, solver=IPOPT, run=k) for k in range(starts)]
+    stop, tasks = Stop(evaluations=effort.evaluations), []
+    for phase in PHASES:
+        spec = make_spec(phase.problem, effort)
+        for name in SEARCHES:
+            tasks += [Task(problem=spec, solver=name, stop=stop, run=k) for k in range(effort.runs)]
+        for label, kind in VARIANTS.items():
+            tasks += [Task(problem=spec, label=label, stop=stop, run=k, **kind) for k in range(effort.variant_runs)]
+        tasks += [Task(problem=spec, solver=IPOPT, run=k) for k in range(effort.starts)]
+        for chosen in list_choices(phase.problem, effort).values():
+            tasks += [Task(problem=chosen, solver=IPOPT, run=k) for k in range(effort.choice_starts)]
     return tasks
+
+
+def list_choices(problem: str, effort: NaoEffort, *, solved: bool = True) -> dict[str, ProblemSpec]:
+    """Return a phase with each other choice by name; only those with an optimum, or all of them."""
+    spec = make_spec(problem, effort)
+    return {
+        name: replace(spec.with_options(**choice.options), values=choice.values, label=f"{problem}-{name}")
+        for name, choice in PAPER.choices.items()
+        if problem in choice.phases and (name in effort.choices or not solved)
+    }
 
 
 def make_spec(problem: str, effort: NaoEffort) -> ProblemSpec:
@@ -76,7 +108,7 @@ def make_spec(problem: str, effort: NaoEffort) -> ProblemSpec:
 
 def run_and_store_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
     """Perform a run, and store every feasible solution that a search evaluated, see ``load_points``."""
-    if not task.is_search:
+    if task.title not in SEARCHES:
         return run_task(task, start)
     feasible: list[tuple[Array, Array]] = []
 
@@ -127,6 +159,36 @@ def solve_sweep(
         {"at": value, "power_W": solution.objective, "feasible": solution.converged}
         for value, solution in zip(values, solutions, strict=True)
     ]
+
+
+def make_simulations(effort: NaoEffort) -> list[Computation]:
+    """Return the simulation of each printed solution, as in section 5.4."""
+    return [
+        make_computation(f"simulate-{phase.problem}-{name}", spec, partial(simulate_solution, spec), x=list(optimum.x))
+        for phase in PHASES
+        for spec in [make_spec(phase.problem, effort)]
+        for name, optimum in phase.optima.items()
+    ]
+
+
+def simulate_solution(spec: ProblemSpec, x: Sequence[float]) -> dict[str, Any]:
+    """Return when the robot falls, its largest tilt, and how far joints come beyond their limits [rad], planned and simulated."""
+    problem = spec.load()
+    plan = make_plan(Result(problem=problem, x=problem.check_x(x)))
+    trace = simulate_plan(plan, drive=WEBOTS_DRIVE)
+    limits = np.array([plan.robot.joint(name).limits_rad for name in plan.joints]).T
+    beyond = [float(max((limits[0] - q).max(), (q - limits[1]).max())) for q in (plan.signals.arrays["q"], trace.q)]
+    return {
+        "fell_at_s": trace.fell_at_s,
+        "tilt_rad": float(trace.tilt.max()),
+        "planned_beyond_rad": beyond[0],
+        "simulated_beyond_rad": beyond[1],
+    }
+
+
+def evaluate_indexes(problem: GaitProblem, x: Sequence[float]) -> Mapping[str, float]:
+    """Return the performance figures of a solution by the exact functions."""
+    return build_exact_model(problem).at(problem.check_x(x), problem.p).indexes
 
 
 def compute_power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:

@@ -17,6 +17,7 @@ Options that the problems share:
                            cubics, 4 with splines and with planned loads, which would otherwise bend between the samples
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
     arms                   carried by the legs, or separate: in the torques the legs carry a torso without arms, and each arm
-                           moves on a torso at rest; the ZMP is that of all links
+                           moves on a torso at rest, the ZMP is that of all links; held: carried, at rest in the middle of
+                           their swing
     motors                 features of the real motors, separated by commas, see ``gaits.biped.motors``; none by default
 """

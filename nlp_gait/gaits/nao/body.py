@@ -34,7 +34,7 @@ from nlp_gait.symbolic.inverse_kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
-Arms = Literal["carried", "separate"]
+Arms = Literal["carried", "separate", "held"]
 
 GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 
@@ -179,6 +179,8 @@ def ankle_roll(pitch: MX, column: int) -> MX:
 class NaoBody(Body):
     """NAO, or a robot of its build: closed-form legs under an upright torso, arms that swing as in the paper."""
 
+    arms: Arms = "carried"  # held: at rest in the middle of their swing
+
     def round_place(self, x: float) -> float:
         """Round to a micrometre, so that the paper's numbers come out exactly."""
         return round(x, 6)
@@ -187,7 +189,10 @@ class NaoBody(Body):
         return tuple(ARM_SWING[phase])
 
     def angle_ends(self, phase: PhaseName, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
-        return {name: (SX(start), SX(end)) for name, (start, end) in ARM_SWING[phase].items()}
+        swing = ARM_SWING[phase]
+        if self.arms == "held":
+            swing = {name: (sum(ends) / 2, sum(ends) / 2) for name, ends in swing.items()}
+        return {name: (SX(start), SX(end)) for name, (start, end) in swing.items()}
 
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         """Return the joints of both arms, which swing against each other; elbows bend as their shoulders move."""
@@ -250,8 +255,9 @@ class NaoBody(Body):
 def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", arms: Arms = "carried") -> NaoBody:
     """Return NAO, or a robot of its build by name or file, as its gaits take it.
 
-    Arms are carried by the legs, or ``"separate"``: legs and torso are a chain without them, as the paper describes it. Without
-    rotational inertia every link is a point mass; for the motors see ``gaits.biped.motors``.
+    Arms are carried by the legs, or ``"separate"``: legs and torso are a chain without them, as the paper describes it;
+    ``"held"`` are carried and do not swing. Without rotational inertia every link is a point mass; for the motors see
+    ``gaits.biped.motors``.
 
     Raises:
         InputError: the robot or its motors do not suit the NAO problems.
@@ -275,6 +281,7 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
         gravity=GRAVITY,
         feet_y=(left.hip_m[1], right.hip_m[1]),
         leg_length_m=leg_length,
+        arms=arms,
         separate_joints=tuple(side + joint for side in "LR" for joint in ARM_JOINTS) if arms == "separate" else (),
         hip_height_m=(
             round(ground + LEAST_HEIGHT_SHARE * leg_length, 3),

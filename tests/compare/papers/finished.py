@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ class Finished:
 
     paper: str
     folder: Path
+    effort: Any
     findings: Any = None
     progress: list[str] = field(default_factory=list)
 
@@ -32,13 +33,17 @@ class Finished:
         return (self.folder / "report.md").read_text()
 
 
-def reproduce(paper: str, folder: Path, *, coarse: bool = False) -> Finished:
-    """Run in this process, since workers would build every problem again; coarse pictures are drawn once and small."""
-    finished, reproduction = Finished(paper=paper, folder=folder), load_reproduction(paper)
+def reproduce(paper: str, folder: Path, *, coarse: bool = False, **changes: Any) -> Finished:
+    """Run in this process, since workers would build every problem again; coarse pictures are drawn once and small.
+
+    ``changes`` are those of the quick effort.
+    """
+    reproduction = load_reproduction(paper)
+    finished = Finished(paper=paper, folder=folder, effort=replace(reproduction.quick, **changes))
     with pytest.MonkeyPatch.context() as patch:
         if coarse:
             patch.setattr(writing, "save", save_coarsely)
-        finished.findings = reproduction.reproduce(folder, reproduction.quick, finished.progress.append, jobs=1)
+        finished.findings = reproduction.reproduce(folder, finished.effort, finished.progress.append, jobs=1)
     return finished
 
 
@@ -54,7 +59,7 @@ def recompute(finished: Finished, stop_at: str = "figures") -> list[str]:
 
     reproduction = load_reproduction(finished.paper)
     try:
-        reproduction.reproduce(finished.folder, reproduction.quick, stop, jobs=1)
+        reproduction.reproduce(finished.folder, finished.effort, stop, jobs=1)
     except KeyboardInterrupt:
         return progress
     raise AssertionError(f"no line began with {stop_at}")
@@ -62,7 +67,7 @@ def recompute(finished: Finished, stop_at: str = "figures") -> list[str]:
 
 def check_report(finished: Finished, figures: str, tables: str) -> None:
     """Every place in the text is filled, and every table and figure written."""
-    folder, effort = finished.folder, load_reproduction(finished.paper).quick
+    folder, effort = finished.folder, finished.effort
     text = finished.report.partition("## Versions")[0]  # settings of solvers have braces
     assert "{" not in text and "nan" not in re.sub(r"\b[a-z]*nan[a-z]+\b", "", text)
     assert re.findall(r"\((\S+)\.png\)", finished.report) == figures.split()

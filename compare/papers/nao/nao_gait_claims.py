@@ -1,0 +1,237 @@
+"""Checks of the NAO paper's claims about gaits: values of its solutions, stability, arms, joints, and the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from compare.papers.claims import Check, compare_changes, compare_levels, decide, require_change
+from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings
+from compare.papers.nao.nao_runs import ALGORITHMS, WEBOTS_DRIVE
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.nao.joints import measure_leg
+from nlp_gait.robots import load_robot
+
+MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
+PACES = 9  # durations at which a printed gait is evaluated
+KINDS = {"HipYawPitch": "hip yaw-pitch", "Hip": "hip roll and pitch", "Knee": "knees", "Ankle": "ankles"}
+
+
+def compute_joint_shares(problem: GaitProblem, x: Sequence[float]) -> dict[str, float]:
+    """Return the share of each kind of joint in the power of a solution; the last is that of the arms."""
+    signals = problem.signals(problem.check_x(x))
+    drawn = (
+        np.abs(signals.arrays["tau"] * signals.arrays["qd"])
+        + problem.value("heat_loss_W_per_Nm2") * signals.arrays["tau"] ** 2
+    )
+    mean = np.trapezoid(drawn, signals.arrays["t"], axis=0)
+    shares = dict.fromkeys([*KINDS, "arms"], 0.0)
+    for joint, value in zip(signals.joints, mean / mean.sum(), strict=True):
+        shares[next((kind for kind in KINDS if joint[1:].startswith(kind)), "arms")] += float(value)
+    return shares
+
+
+def describe_effect(phase: PhaseFindings, choice: str) -> str:
+    """Return how another choice changes the printed solutions and the optimum, in words."""
+    before, after, optimum = phase.printed_here, phase.printed_by_choice[choice], phase.optimum_with(choice)
+    changes = {
+        words: [100 * (after[name][index] / before[name][index] - 1) for name in ALGORITHMS]
+        for index, words in (("power_W", "power"), ("torque_change_Nm", "torque change"))
+    }
+    margin = 1000 * max(abs(after[n][index] - before[n][index]) for n in ALGORITHMS for index in MARGINS)
+    best = ""
+    if optimum is not None and optimum.verdict.feasible:
+        best = f"; optimum {optimum.verdict.objective:.5f} W instead of {phase.best:.5f} W"
+    texts = [f"{words} {values[0]:+.1f} and {values[1]:+.1f} %" for words, values in changes.items()]
+    return f"{phase.paper.title}, printed solutions of PSO and GA: {', '.join(texts)}, margins by up to {margin:.1f} mm{best}"
+
+
+def _check_power(phase: PhaseFindings) -> Check:
+    printed, here = (
+        [o.power_W for o in phase.paper.optima.values()],
+        [h["power_W"] for h in phase.printed_here.values()],
+    )
+    return compare_levels(printed, here, printed=printed, here=here, gap=np.subtract(printed, here))
+
+
+def _check_levels(phase: PhaseFindings, indexes: Sequence[str]) -> Check:
+    """Check printed performance figures of both printed solutions."""
+    pairs = [(o.indexes[i], phase.printed_here[name][i]) for name, o in phase.paper.optima.items() for i in indexes]
+    printed, here = np.array(pairs).T
+    share, gap = 100 * np.abs(here / printed - 1), np.abs(here - printed)
+    values = {"printed": printed, "all_printed": ", ".join(f"{value:.4f}" for value in printed), "here": here}
+    return compare_levels(printed, here, **values, share=share.max(), gap_mm=1000 * gap.max())
+
+
+def _check_lead(phase: PhaseFindings, indexes: Sequence[str], sign: float) -> Check:
+    """Check by how much PSO's printed solution is above GA's, or below it for a negative sign [mm, to a tenth]."""
+    optima, here = phase.paper.optima, phase.printed_here
+    printed = [1000 * sign * (optima["pso"].indexes[i] - optima["ga"].indexes[i]) for i in indexes]
+    ours = np.round([1000 * sign * (here["pso"][i] - here["ga"][i]) for i in indexes], 1)
+    return compare_changes(np.round(printed, 1), ours, printed=printed, ours=ours)
+
+
+def _check_torque_lead(phase: PhaseFindings) -> Check:
+    name, optima, here = "torque_change_Nm", phase.paper.optima, phase.printed_here
+    printed = 100 * (optima["pso"].indexes[name] / optima["ga"].indexes[name] - 1)
+    ours = 100 * (here["pso"][name] / here["ga"][name] - 1)
+    return compare_changes(printed, ours, printed=printed, ours=ours)
+
+
+def _check_similar_power(phase: PhaseFindings) -> Check:
+    optima, here = phase.paper.optima, phase.printed_here
+    printed, ours = optima["ga"].power_W / optima["pso"].power_W, here["ga"]["power_W"] / here["pso"]["power_W"]
+    velocities = [(optima[name].x[3], optima[name].x[5]) for name in ALGORITHMS]
+    return compare_levels(printed, ours, printed=printed, ours=ours, velocities=velocities)
+
+
+def _check_more_stable(findings: NaoFindings) -> Check:
+    ssp, dsp = (phase.paper.optima["pso"].indexes for phase in findings.phases)
+    here = [phase.printed_here["pso"] for phase in findings.phases]
+    printed, ours = ([1000 * (b[m] - a[m]) for m in MARGINS] for a, b in ((ssp, dsp), (here[0], here[1])))
+    return compare_changes(printed, ours, printed=printed, ours=ours)
+
+
+def _check_lower_hip(findings: NaoFindings, axis: str) -> Check:
+    """Check how much larger a printed gait's least margin is with the hip at its lower bound [mm]."""
+    lowest = findings.ssp.problem.value("hip_height_m.lower")
+    index = f"dbm_{axis}_min_m"
+    ours = [
+        1000 * (phase.evaluate_printed(hip_height_m=lowest)[index] - phase.printed_here["pso"][index])
+        for phase in findings.phases
+    ]
+    return require_change(ours, ours=ours, lowest=lowest)
+
+
+def _check_arms(findings: NaoFindings) -> Check:
+    """Check how much larger the margins of printed gaits are with the arms' swing than with arms at rest [mm]."""
+    gains = [
+        [1000 * (phase.printed_here["pso"][m] - phase.printed_by_choice["held"]["pso"][m]) for m in MARGINS]
+        for phase in findings.phases
+    ]
+    cost = [
+        100 * (phase.printed_here["pso"]["power_W"] / phase.printed_by_choice["held"]["pso"]["power_W"] - 1)
+        for phase in findings.phases
+    ]
+    return require_change([max(gain) for gain in gains], gains=gains, cost=cost)
+
+
+def _check_pace(findings: NaoFindings, slow: bool) -> Check:
+    """Check how much smaller the least margin is at the slowest or the fastest pace than at the best [mm]."""
+    falls, found = [], []
+    for phase in findings.phases:
+        time = phase.problem.names[phase.paper.duration]
+        margins = {
+            at: 1000 * min(indexes["dbm_x_min_m"], indexes["dbm_y_min_m"])
+            for at, indexes in _vary_pace(phase, time).items()
+        }
+        best = max(margins, key=margins.__getitem__)
+        end = max(margins) if slow else min(margins)
+        falls.append(margins[best] - margins[end])
+        found.append(
+            f"{phase.paper.title} {margins[end]:.1f} mm in {end:.2g} s, {margins[best]:.1f} mm in {best:.2g} s"
+        )
+    return require_change(falls, found="; ".join(found))
+
+
+def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, float]]:
+    """Performance figures of the printed PSO gait along the same path in other times, by time [s]."""
+    x = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x))
+    rates = [name for name in x if name.startswith("hip_v")]
+    low, high = (phase.problem.value(f"{time}.{end}") for end in ("lower", "upper"))
+    times = np.geomspace(low, high, PACES).tolist()
+    return {at: phase.evaluate_printed(**{time: at}, **{v: x[v] * x[time] / at for v in rates}) for at in times}
+
+
+def _check_straight(findings: NaoFindings) -> Check:
+    """Check how much larger the least margins are without vertical motion of the hip [mm]."""
+    straight = [_straighten(phase) for phase in findings.phases]
+    ours = [
+        1000 * (found[m] - phase.printed_here["pso"][m])
+        for phase, found in zip(findings.phases, straight, strict=True)
+        for m in MARGINS[:2]
+    ]
+    return require_change(ours, ours=ours)
+
+
+def _check_oscillation(findings: NaoFindings) -> Check:
+    """Check how much less power the hip's vertical motion needs than a straight line [%]."""
+    ours = [
+        100 * (1 - phase.printed_here["pso"]["power_W"] / _straighten(phase)["power_W"]) for phase in findings.phases
+    ]
+    return require_change(ours, ours=ours)
+
+
+def _straighten(phase: PhaseFindings) -> Mapping[str, float]:
+    return phase.evaluate_printed(hip_vz_start_m_s=0.0, hip_vz_end_m_s=0.0)
+
+
+def _check_contradiction(findings: NaoFindings) -> Check:
+    """Check the price of the mean margins at IPOPT's optimum [mW per mm]."""
+    prices = [
+        max((abs(row.price) for row in phase.optimum.active_constraints if row.name.startswith("dbm")), default=0.0)
+        for phase in findings.phases
+    ]
+    return require_change(prices, prices=prices)
+
+
+def _check_joints(findings: NaoFindings, kind: str) -> Check:
+    """Check whether a kind of joint has the largest share in the power of the printed PSO solution."""
+    found = {p.paper.title: compute_joint_shares(p.problem, p.paper.optima["pso"].x) for p in findings.phases}
+    words = "; ".join(
+        f"{title}: {', '.join(f'{KINDS.get(k, k)} {100 * share:.0f} %' for k, share in shares.items())}"
+        for title, shares in found.items()
+    )
+    return decide(all(max(shares, key=shares.__getitem__) == kind for shares in found.values()), shares=words)
+
+
+def _check_stretched(findings: NaoFindings) -> Check:
+    leg = measure_leg(load_robot(str(findings.ssp.problem.options["robot"])), "L")
+    height = leg.ankle_height_m + leg.thigh_m + leg.tibia_m - leg.hip_m[2]
+    return compare_levels(0.334, height, height=height)
+
+
+def _check_simulations(findings: NaoFindings, key: str) -> Check:
+    found = {f"{p.paper.title}, {n.upper()}": s for p in findings.phases for n, s in p.simulations.items()}
+    tilts = ", ".join(f"{name} {np.degrees(s['tilt_rad']):.1f}" for name, s in found.items())
+    room = min(-np.degrees(s["simulated_beyond_rad"]) for s in found.values())
+    falls = [name for name, s in found.items() if s["fell_at_s"] is not None]
+    holds = not falls if key == "fell_at_s" else room >= 0.0
+    return decide(
+        holds, tilts=tilts, room=room, falls=", ".join(falls) or "no gait", period=1000 * WEBOTS_DRIVE.period_s
+    )
+
+
+Checked = Callable[[NaoFindings], Check]
+
+
+def _both(name: str, check: Callable[[PhaseFindings], Check]) -> dict[str, Checked]:
+    return {f"{name}-ssp": lambda f: check(f.ssp), f"{name}-dsp": lambda f: check(f.dsp)}
+
+
+GAIT_CHECKS: dict[str, Checked] = {
+    **_both("power", _check_power),
+    **_both("margins", partial(_check_levels, indexes=MARGINS)),
+    **_both("torque-level", partial(_check_levels, indexes=("torque_change_Nm",))),
+    **_both("torque-change", _check_torque_lead),
+    "mean-x-lead": lambda f: _check_lead(f.ssp, ("dbm_x_mean_m",), 1.0),
+    "mean-lead-dsp": lambda f: _check_lead(f.dsp, ("dbm_x_mean_m", "dbm_y_mean_m"), -1.0),
+    "min-lead-dsp": lambda f: _check_lead(f.dsp, ("dbm_x_min_m", "dbm_y_min_m"), 1.0),
+    "similar-power": lambda f: _check_similar_power(f.dsp),
+    "more-stable": _check_more_stable,
+    "lower-hip-x": partial(_check_lower_hip, axis="x"),
+    "lower-hip-y": partial(_check_lower_hip, axis="y"),
+    "arms": _check_arms,
+    "too-slow": partial(_check_pace, slow=True),
+    "too-fast": partial(_check_pace, slow=False),
+    "straight": _check_straight,
+    "oscillation": _check_oscillation,
+    "contradiction": _check_contradiction,
+    "knees": partial(_check_joints, kind="Knee"),
+    "hips": partial(_check_joints, kind="Hip"),
+    "stretched": _check_stretched,
+    "no-fall": partial(_check_simulations, key="fell_at_s"),
+    "joint-limits": partial(_check_simulations, key="simulated_beyond_rad"),
+}
