@@ -121,8 +121,9 @@ def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
     """Check GA's power at 0.024 m above PSO's, as read off the histories of all runs."""
     printed = 100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1)
     pso, ga = (phase.points[name].cheapest_near(SWING_HEIGHT, 0.024, 5e-4) for name in (swarm, "ga"))
-    values = {"swarm": NAMES[swarm], "pso": pso, "ga": ga, "printed_lead": printed}
-    if math.isnan(pso) or math.isnan(ga):
+    cheapest = ["none" if math.isnan(power) else f"{power:.4f} W" for power in (pso, ga)]
+    values = {"swarm": NAMES[swarm], "pso": cheapest[0], "ga": cheapest[1], "printed_lead": printed}
+    if "none" in cheapest:
         return decide(Verdict.UNTESTABLE, **values)
     return compare_changes(printed, 100 * (ga / pso - 1), **values)
 

@@ -14,7 +14,7 @@ from compare.papers.nao import nao_runs as nao
 from compare.papers.nao.nao_claims import CHECKS
 from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
-from compare.papers.nao.nao_gait_claims import compute_joint_shares, describe_effect
+from compare.papers.nao.nao_gait_claims import MARGINS, compute_joint_shares, describe_effect
 from compare.papers.nao.nao_paper import PAPER, PHASES, SWING_POWER_W, PrintedPhase
 from compare.papers.nao.nao_runs import ALGORITHMS, NaoEffort, SweepPoint
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
@@ -118,6 +118,12 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "nearest_miss": misses.min(),
         "candidates": len(changes),
         "geometry": list(findings.geometry_mm.values()),
+        "margin_gap_mm": 1000
+        * max(
+            abs(optimum.indexes[index] - dsp.printed_here[name][index])
+            for name, optimum in dsp.paper.optima.items()
+            for index in MARGINS
+        ),
         "least_margin_mm": 1000 * min(min(m) for phase in findings.phases for m in _list_least_margins(phase)),
     }
 
