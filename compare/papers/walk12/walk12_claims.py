@@ -12,7 +12,16 @@ from compare.papers.claims import Check, Verdict, compare_changes, compare_level
 from compare.papers.paper_runs import choose_best, get_point, list_objectives
 from compare.papers.walk12.walk12_findings import Walk12Findings, compute_stable_share
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, PaperRow, find_row
-from compare.papers.walk12.walk12_runs import GA, HORIZONS, PAPER, ROBOT_STEP_S, compute_f1, find_f1max, title_table_4
+from compare.papers.walk12.walk12_runs import (
+    GA,
+    HORIZONS,
+    PAPER,
+    ROBOT_STEP_S,
+    WalkedGait,
+    compute_f1,
+    find_f1max,
+    title_table_4,
+)
 from compare.study.task import IPOPT
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_problem import PRINTED_STEPS
@@ -23,6 +32,7 @@ CONVERGED_EPOCH = 15
 CONVERGED = 1e-3  # relative gain after that epoch
 DIGIT_M, DIGIT_F = 5e-4, 5e-4  # half the last printed digit
 CIRCLE_M = 1e-3
+NO_ENGINE = "the simulator is not installed (extra sim)"
 
 
 def _check_most_stable(findings: Walk12Findings) -> Check:
@@ -164,26 +174,47 @@ def _check_time_steps(_: Walk12Findings) -> Check:
 
 def _check_walks(findings: Walk12Findings, step_time_s: float) -> Check:
     walks = [walk for walk in findings.walks if walk.step_time_s == step_time_s]
-    if not walks:
-        return decide(Verdict.UNTESTABLE, found="the simulator is not installed (extra sim)")
-    texts = []
-    for by in ("paper", IPOPT.upper()):
-        own = [walk for walk in walks if walk.by == by]
-        upright = [walk for walk in own if walk.fell_at_s is None]
-        falls = [walk.fell_at_s for walk in own if walk.fell_at_s is not None]
-        shares = [walk.walked_share for walk in upright if walk.walked_share is not None]
-        walked = (
-            f", over {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the planned distance" if shares else ""
-        )
-        fell = f"; the others fall after {min(falls):.1f} to {max(falls):.1f} s" if falls else ""
-        texts.append(f"{len(upright)} of {len(own)} gaits of {'the paper' if by == 'paper' else by}{walked}{fell}")
-    return decide(all(walk.fell_at_s is None for walk in walks if walk.by == "paper"), found=". ".join(texts))
+    printed = [walk.fell_at_s is None for walk in walks if walk.by == "paper" and walk.as_printed]
+    texts = [
+        f"{_describe_walks([walk for walk in walks if walk.by == by and walk.as_printed == as_printed])} of {name} with "
+        f"{'the printed motor and set-points' if as_printed else 'our drives'}"
+        for by, name in (("paper", "the paper"), (IPOPT.upper(), "IPOPT"))
+        for as_printed in (True, False)
+    ]
+    return decide(all(printed) if walks else Verdict.UNTESTABLE, found="; ".join(texts) if walks else NO_ENGINE)
+
+
+def _describe_walks(walks: Sequence[WalkedGait]) -> str:
+    shares = [100 * walk.walked_share for walk in walks if walk.walked_share is not None]
+    walked = f" ({min(shares):.0f} to {max(shares):.0f} % of the planned distance)" if shares else ""
+    return f"{sum(walk.fell_at_s is None for walk in walks)} of {len(walks)} gaits{walked}"
+
+
+def _check_same_fate(findings: Walk12Findings) -> Check:
+    fates: dict[float, set[bool]] = {}
+    for walk in findings.walks:
+        if walk.by == "paper" and walk.as_printed:
+            fates.setdefault(walk.weight, set()).add(walk.fell_at_s is None)
+    other = [weight for weight, fate in fates.items() if len(fate) > 1]
+    found = f"{len(other)} of {len(fates)} walk at one of 1 s and {ROBOT_STEP_S:g} s, and fall at the other"
+    return decide(not other if fates else Verdict.UNTESTABLE, found=found if fates else NO_ENGINE)
 
 
 def _check_below(findings: Walk12Findings) -> Check:
     below = get_point(choose_best(findings.runs["below", IPOPT]))
     apart = 1e3 * max(abs(a - b) for a, b in zip(below, get_point(findings.optimum(PAPER, 0.1)), strict=True))
     return require_change(apart, apart=apart)
+
+
+def _check_ends(findings: Walk12Findings) -> Check:
+    *inner, last = _list_optima(findings)
+    return decide(max(inner) <= max(1.0, last), inner=max(inner), last=last)
+
+
+def _check_accuracy(findings: Walk12Findings) -> Check:
+    free = [compute_f1(row, zmp="moment-free") for row in TABLE_3]
+    changes = [100 * (f1 / exact - 1) for f1, exact in zip(findings.f1_of_table_3, free, strict=True)]
+    return compare_levels(free, findings.f1_of_table_3, low=min(changes), high=max(changes))
 
 
 def _check_circle(findings: Walk12Findings) -> Check:
@@ -199,6 +230,7 @@ def _check_circle(findings: Walk12Findings) -> Check:
 CHECKS: dict[str, Callable[[Walk12Findings], Check]] = {
     "most-stable": _check_most_stable,
     "short-steps": _check_short_steps,
+    "ends": _check_ends,
     "circle": _check_circle,
     "f1max": lambda findings: compare_levels(F1MAX, findings.own_f1max, own=findings.own_f1max),
     "f": _check_f_of_table_3,
@@ -222,4 +254,6 @@ CHECKS: dict[str, Callable[[Walk12Findings], Check]] = {
     "f1max-over-time": _check_table_4_f1max,
     "f-over-time": _check_f_over_time,
     "variables-over-time": _check_variables_over_time,
+    "same-fate": _check_same_fate,
+    "accuracy": _check_accuracy,
 }

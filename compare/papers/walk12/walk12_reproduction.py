@@ -193,6 +193,8 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         for name, record in (("bound", findings.optimum(PAPER, 1.0)), ("simpson_bound", simpson[-1]))
     }
     return {
+        "walked": _count_walks(findings, 1.0),
+        "walked_slowly": _count_walks(findings, runs.ROBOT_STEP_S),
         "unbent": list_objectives(unbent),
         "bent": [findings.optimum(PAPER, weight).verdict.objective for weight in weights],
         "straightest": min(compute_straightest_knee(get_point(best)) for best in _list_optima(findings, PAPER)),
@@ -205,6 +207,13 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "ga_no_elite": float(np.median(list_f(ga["ga-no-elite"]))),
         "ga_tournament_3": float(np.median(list_f(ga["ga-tournament-3"]))),
     }
+
+
+def _count_walks(findings: Walk12Findings, step_time_s: float) -> dict[str, str]:
+    """Count the paper's gaits that do not fall, as words, by whether the drives are as printed."""
+    own = [walk for walk in findings.walks if walk.by == "paper" and walk.step_time_s == step_time_s]
+    counts = {drive: [walk.fell_at_s is None for walk in own if walk.as_printed == drive] for drive in (True, False)}
+    return {str(drive): f"{sum(upright)} of {len(upright)}" for drive, upright in counts.items()}
 
 
 def _find_bound(record: RunRecord) -> float | None:
@@ -242,11 +251,13 @@ def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
         "gaits": _list_gaits(findings),
         "table4": _list_table_4(findings),
         "quadrature": _list_quadratures(findings),
-        "walks": [
-            [walk.weight, walk.by, walk.step_time_s, walk.steps, walk.fell_at_s, walk.walked_share]
-            for walk in findings.walks
-        ],
+        "walks": [_make_walk_row(walk) for walk in findings.walks],
     }
+
+
+def _make_walk_row(walk: WalkedGait) -> Sequence[Value]:
+    drives = "printed" if walk.as_printed else "ours"
+    return [walk.weight, walk.by, walk.step_time_s, drives, walk.steps, walk.fell_at_s, walk.walked_share]
 
 
 def _list_quadratures(findings: Walk12Findings) -> Rows:

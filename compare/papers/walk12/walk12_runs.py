@@ -21,7 +21,7 @@ from compare.papers.paper_runs import (
     make_search_tasks,
     make_start_tasks,
 )
-from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
+from compare.papers.walk12.walk12_paper import F1MAX, MOTOR_TORQUE_NM, SET_POINTS, TABLE_3, TABLE_4, PaperRow
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
@@ -32,7 +32,7 @@ from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.walk12.walk12_problem import Horizon
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure_walk
-from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import simulate_plan
 
 PAPER, MODEL = "paper", "model"  # whose f1max
@@ -89,6 +89,7 @@ class WalkedGait:
     weight: float
     by: str
     step_time_s: float
+    as_printed: bool  # torques of the motors and number of set-points
     steps: int
     fell_at_s: float | None
     walked_share: float | None
@@ -201,18 +202,29 @@ def solve_with_printed_step(starts: Mapping[str, Sequence[float]]) -> dict[str, 
 
 
 def simulate_walks(gaits: Sequence[tuple[float, str, Sequence[float]]]) -> list[dict[str, Any]]:
-    """Return the fields of ``WalkedGait`` for each gait at the planned and at the robot's step time; none without MuJoCo."""
+    """Return the fields of ``WalkedGait`` for each gait, step time and drive; none without MuJoCo."""
     if find_spec("mujoco") is None:
         return []
     found = []
-    for (weight, by, x), step_time_s in product(gaits, (1.0, ROBOT_STEP_S)):
+    for (weight, by, x), step_time_s, as_printed in product(gaits, (1.0, ROBOT_STEP_S), (False, True)):
         problem = load_walk12().with_values(step_time_s=step_time_s)
         plan, drive = make_plan(Result(problem=problem, x=problem.check_x(x)), WALKED_STEPS), Drive()
+        if as_printed:
+            plan = _drive_as_printed(plan)
         walk = measure_walk(plan, simulate_plan(plan, None, drive), drive, WALKED_STEPS)
-        known = {"weight": weight, "by": by, "step_time_s": step_time_s, "steps": walk.steps_done}
+        known = {"weight": weight, "by": by, "step_time_s": step_time_s, "as_printed": as_printed}
         share = None if walk.walked_m is None else walk.walked_m / walk.planned_m
-        found.append(known | {"fell_at_s": walk.measurements.fell_at_s, "walked_share": share})
+        known |= {"steps": walk.steps_done, "fell_at_s": walk.measurements.fell_at_s, "walked_share": share}
+        found.append(known)
     return found
+
+
+def _drive_as_printed(plan: Plan) -> Plan:
+    """Return a plan with the motors' holding torque and ten set-points for each step."""
+    joints = {name: replace(joint, torque_limit_Nm=MOTOR_TORQUE_NM) for name, joint in plan.robot.joints.items()}
+    every = (len(plan.signals.arrays["t"]) - 1) // (WALKED_STEPS * SET_POINTS)
+    arrays = {name: array[::every] for name, array in plan.signals.arrays.items()}
+    return replace(plan, robot=replace(plan.robot, joints=joints), signals=replace(plan.signals, arrays=arrays))
 
 
 def solve_weighted_sum(weights: Sequence[float], starts: int) -> list[dict[str, Any]]:

@@ -37,8 +37,9 @@ from nlp_gait.symbolic.dynamics import newton_euler
 
 SPHERE_RADIUS = 0.02  # of a mass [m]: half the width of NAO's limbs
 SOLE_SHARE = 0.1  # of the foot's mass that belongs to the sole; the ankle has the same share
-# The paper says nothing about its drives. The largest torque of each is the robot's weight times the length of what the joint
-# moves: leg, shank, front of the foot. NAO's motors have 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
+# Of its drives the paper prints a holding torque of 1.02 Nm, but no stiffness. Here the largest torque of each is the robot's
+# weight times the length of what the joint moves: leg, shank, front of the foot. NAO's motors have 0.8 to 1.6 times that at stall
+# (hip pitch; knee and ankle).
 RANGE = (-np.pi, np.pi)  # of every joint [rad]: the paper has no limits
 RATE_LIMIT = 100.0  # [rad/s], likewise; not used
 FINE_INTERVALS = 1000  # of a step

@@ -110,7 +110,7 @@ def test_every_difference_has_an_effect_as_a_number_or_cannot_run_as_printed(pap
         assert row.cannot_run or re.search(r"\d|\{", row.effect), row.where
 
 
-@pytest.mark.parametrize("paper", mark_unfinished(PAPERS, "walk12"))
+@pytest.mark.parametrize("paper", PAPERS)
 def test_the_report_has_both_tables(paper: str) -> None:
     reproduction = load_reproduction(paper)
     text = (resources.files("compare.papers") / paper / f"{paper}_report.md").read_text(encoding="utf-8")

@@ -13,6 +13,7 @@ from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
 from nlp_gait.gaits.walk12 import walk12_problem
+from nlp_gait.simulation import simulate
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
 
@@ -22,6 +23,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(vars(REPRODUCTION), "quick", replace(REPRODUCTION.quick, starts=1, runs=1))
         patch.setattr(walk12_runs, "WALKED_STEPS", 1)
+        patch.setattr(simulate, "SETTLE_TIME", 0.0)
         patch.setattr(walk12_problem, "PRINTED_STEPS", 100)
         yield reproduce("walk12", tmp_path_factory.mktemp("walk12"), coarse=True)
 
