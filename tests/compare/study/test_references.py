@@ -56,9 +56,9 @@ def test_other_settings_have_no_reference() -> None:
 def test_a_problem_with_another_hash_must_have_the_shipped_value_at_the_shipped_point(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    described = {**identify_problem(nlp_gait.load("walk12")), HASH: "of another version of CasADi"}
-    known = find_reference(described)
-    assert known.objective == pytest.approx(0.97083854787)
+    walk = identify_problem(nlp_gait.load("walk12"))
+    described = {**walk, HASH: "of another version of CasADi"}
+    assert find_reference(described) == find_reference(walk) != Reference()
     changed = tuple(replace(entry, objective=entry.objective * (1 + 1e-8)) for entry in load_shipped())
     monkeypatch.setattr(references, "load_shipped", lambda: changed)
     references._find_by_settings.cache_clear()
