@@ -113,13 +113,23 @@ def hash_source(text: str, kind: Kind) -> str:
 
 def hash_file(path: Path) -> str:
     """Return the hash of a source file and of the files in its folder that it imports, directly or not."""
+    contents = _read_with_imports(path).values()
+    return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in contents)).hexdigest()
+
+
+def list_source_files(text: str, kind: Kind) -> list[Path]:
+    """Return the source file of an object and the files in its folder that it imports; nothing is run."""
+    return list(_read_with_imports(Path(_read_source(parse_reference(text, kind), text)[0])))
+
+
+def _read_with_imports(path: Path) -> dict[Path, bytes]:
     files, waiting = {path: _read(path)}, [path]
     while waiting:
         for file in _find_imports(files[waiting.pop()], path.parent):
             if file not in files:
                 files[file] = _read(file)
                 waiting.append(file)
-    return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in files.values())).hexdigest()
+    return files
 
 
 def _find_imports(content: bytes, folder: Path) -> Iterator[Path]:

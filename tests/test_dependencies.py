@@ -43,6 +43,7 @@ LAYERS = (
     "compare.logs",
     "compare.drawing",
     "compare.report",
+    "compare.archive",
     "compare.bench",
     "compare.questions",
     "compare.papers",

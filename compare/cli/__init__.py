@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 import nlp_gait
+from compare.cli.archive import archive, verify
 from compare.cli.bench import bench
 from compare.cli.command import run_app
 from compare.cli.compare import compare
@@ -29,7 +30,7 @@ from compare.cli.solve import solve
 
 PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, search),
-    "Comparison": (compare, import_results, report, reproduce, bench),
+    "Comparison": (compare, import_results, report, reproduce, bench, verify, archive),
     "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
     "Show and share": (simulate, animate, export, logs, export_objective, export_solver),
 }

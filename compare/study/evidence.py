@@ -98,7 +98,9 @@ def check_records(
     return Evidence(kept, excluded)
 
 
-def read_evidence(folder: Path, between_samples: Scope = "best") -> Evidence:
+def read_evidence(
+    folder: Path, between_samples: Scope = "best", find_problem: Callable[[RunRecord], GaitProblem] | None = None
+) -> Evidence:
     """Read and check all records of a folder, those of other definitions last.
 
     Raises:
@@ -110,7 +112,8 @@ def read_evidence(folder: Path, between_samples: Scope = "best") -> Evidence:
         for path, record in found
         if isinstance(record, InputError)
     ]
-    evidence = check_records([r for _, r in found if isinstance(r, RunRecord)], between_samples=between_samples)
+    readable = [record for _, record in found if isinstance(record, RunRecord)]
+    evidence = check_records(readable, find_problem=find_problem, between_samples=between_samples)
     excluded = damaged + evidence.excluded
     if not evidence.records:
         raise InputError(f"none of the {len(found)} records in {str(folder)!r} can be used; {excluded[0].sentence}")

@@ -1,0 +1,7 @@
+"""Archives of studies, and their verification on any machine."""
+
+from compare.archive.pack import pack_study
+from compare.archive.unpack import unpack_archive
+from compare.archive.verify import Finding, verify_folder
+
+__all__ = ["Finding", "pack_study", "unpack_archive", "verify_folder"]

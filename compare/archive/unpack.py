@@ -1,0 +1,98 @@
+"""Reading an archive from anywhere: nothing in it is trusted, and nothing outside the target folder is written."""
+
+from __future__ import annotations
+
+import hashlib
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Literal
+
+from compare.archive.pack import MANIFEST
+from nlp_gait.decoding import decode
+from nlp_gait.disk import make_folder
+from nlp_gait.errors import InputError
+from nlp_gait.files import convert_errors, read_json
+
+MOST_FILES, LARGEST_FILE, LARGEST_TOTAL = 200_000, 64 * 2**20, 2 * 2**30  # [bytes]
+HIGHEST_RATIO = 200  # of the sizes of a file and of its compressed form, beyond the first megabyte
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArchiveManifest:
+    """Content of ``manifest.json``."""
+
+    schema: Literal[1]
+    created: str
+    version: str  #: of nlp-gait
+    code_sha256: str  #: hash of its code that runs solvers
+    robots: Mapping[str, str]  #: archived file of each option of a problem that names a file
+    files: Mapping[str, str]  #: SHA-256 of each file
+
+
+def unpack_archive(path: Path, folder: Path) -> tuple[ArchiveManifest, list[str]]:
+    """Unpack an archive into an empty folder; return its manifest, and what differs from it in sentences.
+
+    Raises:
+        InputError: it is not an archive of a study, is damaged, or contains names or sizes that no such archive has.
+    """
+    owner = f"archive {str(path)!r}"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+            _check_entries(owner, entries)
+            for entry in entries:
+                target = folder / entry.filename
+                make_folder(target.parent)
+                target.write_bytes(_read(archive, entry, owner))
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
+        raise InputError(f"{owner} is damaged: {error}") from error
+    raw = read_json(folder / MANIFEST, "manifest")
+    with convert_errors(f"manifest of {owner} is damaged", InputError):
+        manifest = decode(ArchiveManifest, raw)
+    return manifest, list(_compare(manifest, folder))
+
+
+def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
+    """Refuse names that leave the folder or occur twice, links, encrypted files, and sizes of a bomb."""
+    if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > LARGEST_TOTAL:
+        raise InputError(f"{owner} is larger than {MOST_FILES:,} files or {LARGEST_TOTAL:,} bytes when unpacked")
+    seen: set[str] = set()
+    for entry in entries:
+        name, mode = entry.filename, entry.external_attr >> 16
+        place = PurePosixPath(name)
+        if not name.isprintable() or "\\" in name or ":" in name or place.is_absolute() or str(place) != name:
+            raise InputError(f"{owner} contains a file of the name {name!r}, which is not allowed")
+        if ".." in place.parts or name.casefold() in seen:
+            raise InputError(f"{owner} contains the file {name!r} twice, or outside of its folder")
+        if entry.is_dir() or (stat.S_IFMT(mode) not in (0, stat.S_IFREG)) or entry.flag_bits & 1:
+            raise InputError(
+                f"{owner} contains {name!r}, which is a folder, a link or encrypted; only plain files are allowed"
+            )
+        if entry.file_size > LARGEST_FILE or entry.file_size > 2**20 + HIGHEST_RATIO * entry.compress_size:
+            raise InputError(
+                f"{owner} contains {name!r} of {entry.file_size:,} bytes from {entry.compress_size:,}: too large"
+            )
+        seen.add(name.casefold())
+
+
+def _read(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, owner: str) -> bytes:
+    with archive.open(entry) as stream:
+        data = stream.read(entry.file_size + 1)
+    if len(data) != entry.file_size:
+        raise InputError(f"{owner} contains {entry.filename!r} of another size than it says")
+    return data
+
+
+def _compare(manifest: ArchiveManifest, folder: Path) -> Iterator[str]:
+    there = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    for name, known in manifest.files.items():
+        if name not in there:
+            yield f"{name} is missing"
+        elif hashlib.sha256(there[name].read_bytes()).hexdigest() != known:
+            yield f"{name} differs from its SHA-256 in the manifest"
+    for name in sorted(there.keys() - manifest.files.keys() - {MANIFEST}):
+        yield f"{name} is not in the manifest"

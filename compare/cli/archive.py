@@ -1,0 +1,102 @@
+"""``nlp-gait archive`` and ``nlp-gait verify``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from compare.cli.command import command
+from compare.cli.common import end_if_excluded, fail, output_file, print_json, print_written, progress_bar, stdout
+from compare.cli.options import AsJson, Code, name_all
+from nlp_gait.errors import InputError
+
+if TYPE_CHECKING:
+    from compare.archive import Finding
+
+
+@command
+def archive(
+    *,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
+    out: Annotated[Path, typer.Option(help="The archive to write.")] = Path("study.zip"),
+    code: Code = None,
+) -> None:
+    """Pack a study for others: records, report, user code, robots, certificates, versions, hashes, and how to repeat it.
+
+    All records are checked and the report is rewritten first. `nlp-gait verify FILE.zip` checks the archive on any machine.
+
+    Example: `nlp-gait archive results --out study.zip`
+    """
+    from compare.analysis.comparison import label_editions
+    from compare.archive import pack_study
+    from compare.report import write_report
+    from compare.study.evidence import read_evidence
+    from compare.study.manifest import read_manifest
+
+    name_all(code)
+    target = output_file(out)
+    evidence = read_evidence(folder, "all")
+    end_if_excluded(evidence.excluded)
+    write_report(folder, label_editions(evidence.records), read_manifest(folder))
+    print_written(pack_study(folder, evidence.records, target))
+
+
+@command
+def verify(
+    *,
+    study: Annotated[Path, typer.Argument(metavar="DIR_OR_ZIP", help="Folder of a study, or its archive.")],
+    rerun: Annotated[
+        str,
+        typer.Option(metavar="SHARE", help="Also repeat a random share of the runs, such as 5%: same seed, same bits."),
+    ] = "0%",
+    code: Code = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check a study: evaluate every point again, check histories, hashes, sessions, certificates and, of an archive, the report.
+
+    Prints what holds and what does not; the exit status is 1 if anything does not. User code runs only if named with --code.
+
+    Examples: `nlp-gait verify results`, `nlp-gait verify study.zip --rerun 5%`
+    """
+    from compare.archive import unpack_archive, verify_folder
+    from nlp_gait.files import make_temporary_folder
+
+    share = _parse_share(rerun)
+    name_all(code)
+    with progress_bar("repeated runs", None) as advance:
+        if study.is_dir():
+            findings = verify_folder(study, share=share, progress=advance)
+        else:
+            with make_temporary_folder("nlp-gait-verify-") as folder:
+                manifest, differences = unpack_archive(study, folder)
+                found = verify_folder(folder, share=share, robots=manifest.robots, is_archive=True, progress=advance)
+                findings = [*_describe_hashes(len(manifest.files), differences), *found]
+    wrong = [finding for finding in findings if not finding.holds]
+    if as_json:
+        print_json({"holds": not wrong, "findings": [asdict(finding) for finding in findings]})
+    else:
+        for finding in findings:
+            stdout.print(finding.sentence, soft_wrap=True)
+    if wrong:
+        fail(f"{len(wrong)} of {len(findings)} checks do not hold")
+
+
+def _describe_hashes(count: int, differences: list[str]) -> list[Finding]:
+    from compare.archive import Finding
+
+    detail = "; ".join(differences) or f"{count} files have their SHA-256 of the manifest"
+    return [Finding(what="manifest", holds=not differences, detail=detail)]
+
+
+def _parse_share(text: str) -> float:
+    """Return a share from 0 to 1 of a text in percent."""
+    try:
+        share = float(text.removesuffix("%")) / 100.0
+    except ValueError:
+        share = -1.0
+    if not 0.0 <= share <= 1.0:
+        raise InputError(f"--rerun takes a share from 0% to 100%, got {text!r}")
+    return share

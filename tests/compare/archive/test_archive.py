@@ -1,0 +1,154 @@
+"""An archive holds on any machine, its runs can be repeated, and every damage and forgery is named."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.archive import Finding, pack_study, unpack_archive, verify_folder
+from compare.archive.verify import _check_code_files
+from compare.cli import app
+from compare.study.evidence import read_evidence
+from compare.study.manifest import Session, write_manifest
+from compare.study.record_files import read_records
+from compare.study.run_study import Study, run_study
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.task import ProblemSpec, Stop
+from nlp_gait.errors import InputError, UserCodeError
+from nlp_gait.proofs.certificate import load_certificates
+from nlp_gait.user_code import allow_code
+from tests.faults.forged_archives import Files, damage, edit, forge, sign, write_zip
+
+RECORD = "records/walk/pso-0001.json"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of a certified problem."""
+    out = tmp_path_factory.mktemp("study")
+    stored = load_certificates()["walk12-lambda-0.4"].problem
+    spec = ProblemSpec(name=stored["name"], options=stored["options"], values=stored["parameters"], label="walk")
+    solvers = (SolverSpec(name="pso", polish=True), SolverSpec(name="ipopt"))
+    settings = StudySettings(problems=(spec,), solvers=solvers, runs=2, starts=1, stop=Stop(evaluations=200))
+    write_manifest(out, settings, Session.begin("nlp-gait compare walk12", "1"))
+    run_study(Study(tasks=settings.tasks(), folder=out))
+    return out
+
+
+@pytest.fixture(scope="module")
+def files(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """The files of its archive, with a short page in place of figures."""
+    (folder / "report.md").write_text("a report")
+    archive = pack_study(folder, read_evidence(folder).records, tmp_path_factory.mktemp("archive") / "study.zip")
+    with zipfile.ZipFile(archive) as packed:
+        return {name: packed.read(name) for name in packed.namelist()}
+
+
+def verify(content: bytes, folder: Path, **options: object) -> list[Finding]:
+    folder.mkdir()
+    path = folder / "study.zip"
+    path.write_bytes(content)
+    try:
+        manifest, differences = unpack_archive(path, folder / "unpacked")
+    except InputError as error:
+        return [Finding(what="archive", holds=False, detail=str(error))]
+    found = verify_folder(folder / "unpacked", robots=manifest.robots, **options)  # type: ignore[arg-type]
+    return [Finding(what="manifest", holds=not differences, detail="; ".join(differences)), *found]
+
+
+def test_an_archive_has_everything_and_every_run_can_be_repeated(files: Files, tmp_path: Path) -> None:
+    expected = {"README.md", "requirements.txt", "ro-crate-metadata.json", "manifest.json", "study.json", RECORD}
+    assert expected | {"certificates/walk12-lambda-0.4.json"} <= files.keys()
+    findings = verify(write_zip(files), tmp_path / "a", share=1.0)
+    assert [f.sentence for f in findings if not f.holds] == []
+    assert sum(f.what.startswith("repeated: ") for f in findings) == 5
+    crate = json.loads(files["ro-crate-metadata.json"])
+    graph = {entity["@id"]: entity for entity in crate["@graph"]}
+    assert graph["ro-crate-metadata.json"]["about"] == {"@id": "./"}
+    assert {"name", "description", "datePublished", "license"} <= graph["./"].keys()
+    assert {part["@id"] for part in graph["./"]["hasPart"]} == files.keys() - {
+        "manifest.json",
+        "ro-crate-metadata.json",
+    }
+
+
+def test_every_damage_is_named(files: Files, tmp_path: Path) -> None:
+    for k, (name, content, word) in enumerate(damage(files, RECORD)):
+        wrong = [finding.detail for finding in verify(content, tmp_path / str(k)) if not finding.holds]
+        assert wrong and word in wrong[0], (name, wrong)
+    assert not list(tmp_path.rglob("outside*")) and not (tmp_path.parent / "outside.txt").exists()
+
+
+def test_every_forgery_with_a_fitting_manifest_is_named(files: Files, tmp_path: Path) -> None:
+    for k, (name, content, word) in enumerate(forge(files, RECORD)):
+        wrong = [finding.sentence for finding in verify(content, tmp_path / str(k)) if not finding.holds]
+        assert len(wrong) == 1 and word in wrong[0], (name, wrong)
+
+
+def test_a_forged_course_is_found_by_repeating_the_run(files: Files, tmp_path: Path) -> None:
+    """Nothing else can tell that a search was faster than it was."""
+
+    def hurry(record: dict) -> None:
+        objective = record["history"]["objective"]
+        objective[:] = objective[-1:] * len(objective)
+
+    content = write_zip(edit(files, RECORD, hurry))
+    assert all(f.holds for f in verify(content, tmp_path / "a"))
+    wrong = [f.sentence for f in verify(content, tmp_path / "b", share=1.0) if not f.holds]
+    forged = [sentence for sentence in wrong if sentence.startswith("repeated: walk, pso, run 1:")]
+    assert len(forged) == 1 and "its history differs" in forged[0] and len(wrong) == 2  # and the run that polishes it
+
+
+@pytest.mark.slow
+def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
+    call = CliRunner().invoke
+    packed = call(app, ["archive", str(folder), "--out", str(tmp_path / "study.zip")])
+    assert packed.exit_code == 0, packed.output
+    good = call(app, ["verify", str(tmp_path / "study.zip"), "--rerun", "5%", "--json"])
+    assert good.exit_code == 0 and json.loads(good.stdout)["holds"], good.output
+    with zipfile.ZipFile(tmp_path / "study.zip") as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    content["report.md"] = content["report.md"].replace(b"Best known: on walk f 0.9", b"Best known: on walk f 1.9", 1)
+    (tmp_path / "forged.zip").write_bytes(write_zip(sign(content)))
+    bad = call(app, ["verify", str(tmp_path / "forged.zip")])
+    assert bad.exit_code == 1 and "report.md: DOES NOT HOLD: line" in bad.stdout, bad.output
+    refused = call(app, ["verify", str(tmp_path / "forged.zip"), "--rerun", "most"])
+    assert refused.exit_code == 1 and "--rerun takes a share" in refused.stderr
+
+
+@pytest.mark.slow
+def test_user_code_and_robots_travel_with_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.robots.custom import humanoid
+
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.chdir(home)
+    (home / "my.json").write_text(json.dumps(humanoid()))
+    (home / "mine.py").write_text(
+        "import helper\n\n\ndef search(f, lower, upper, evaluations, seed):\n    f(helper.middle(lower, upper)[None])\n"
+    )
+    (home / "helper.py").write_text("def middle(a, b):\n    return 0.5 * (a + b)\n")
+    spec = ProblemSpec(name="nao-ssp", options={"robot": "my.json"})
+    solver = SolverSpec(name="mine.py:search")
+    settings = StudySettings(problems=(spec,), solvers=(solver,), runs=1, stop=Stop(evaluations=20))
+    (home / "out").mkdir()
+    write_manifest(home / "out", settings, Session.begin("nlp-gait compare", "1"))
+    run_study(Study(tasks=settings.tasks(), folder=home / "out"))
+    with pytest.raises(UserCodeError, match="add --code mine.py:search"):
+        pack_study(home / "out", read_evidence(home / "out").records, tmp_path / "study.zip")
+    allow_code("mine.py:search", "algorithm")
+    archive = pack_study(home / "out", read_evidence(home / "out").records, tmp_path / "study.zip")
+    away = tmp_path / "away"
+    away.mkdir()
+    (home / "my.json").unlink()
+    monkeypatch.chdir(away)
+    manifest, differences = unpack_archive(archive, away / "unpacked")
+    assert {p.name for p in (away / "unpacked" / "code").iterdir()} == {"mine.py", "helper.py"} and not differences
+    findings = verify_folder(away / "unpacked", robots=manifest.robots)
+    assert [f.sentence for f in findings if not f.holds] == []
+    (away / "unpacked" / "code" / "helper.py").write_text("def middle(a, b):\n    return a\n")
+    assert [f.holds for f in _check_code_files(away / "unpacked", read_records(away / "unpacked"))] == [False]
