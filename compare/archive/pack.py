@@ -1,4 +1,4 @@
-"""A study as one ZIP file: everything that somebody else needs to check and to repeat it."""
+"""A study as one ZIP file: with everything needed to check and to repeat it."""
 
 from __future__ import annotations
 

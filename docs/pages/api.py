@@ -42,6 +42,7 @@ DOORS = {
     "compare.report": (),
     "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "text_table"),
     "compare.report.writing": ("markdown_page", "write_document"),
+    "compare.archive": (),
     "compare.logs": (),
 }
 CODE = re.compile(r"(``.+?``)")

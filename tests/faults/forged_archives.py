@@ -97,7 +97,7 @@ def forge(files: Files, record: str) -> Iterator[tuple[str, bytes, str]]:
     name = next(name for name in files if name.startswith("certificates/"))
     better = edit(files, name, lambda r: r["certificate"].update(bound=r["certificate"]["objective"]))
     yield "a certificate of a tighter bound", write_zip(better), name
-    yield "a certificate that is none", write_zip(sign({**files, name: b"{}"})), name
+    yield "a certificate without content", write_zip(sign({**files, name: b"{}"})), name
 
 
 def _flip(whole: bytes, record: str) -> bytes:
