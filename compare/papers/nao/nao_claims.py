@@ -67,7 +67,7 @@ def _check_statistic(phase: PhaseFindings) -> Check:
 
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
     pso, ga = (1000 * float(np.ptp(phase.final_powers(name))) for name in (swarm, "ga"))
-    return require_change(100 * (1 - pso / ga), swarm=NAMES[swarm], pso=pso, ga=ga, less=100 * (1 - pso / ga))
+    return require_change(100 * (1 - pso / ga), swarm=NAMES[swarm], pso=pso, ga=ga, change=100 * (pso / ga - 1))
 
 
 def _check_same_optimum(phase: PhaseFindings, swarm: str) -> Check:

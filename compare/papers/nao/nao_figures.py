@@ -113,7 +113,7 @@ def _draw_swing(findings: NaoFindings) -> Figure:
     axes = figure.subplots()
 
     def plot(power: Sequence[float], line: str, colour: str, label: str) -> None:
-        axes.plot(heights, np.array(power) / power[0], line, color=colour, label=label)
+        axes.plot(heights, np.array(power) / np.nanmin(power), line, color=colour, label=label)
 
     plot([held.power_W for held in findings.swing], "o-", COLOURS["ipopt"], "IPOPT")
     for name, marker in zip(ALGORITHMS, "sv", strict=True):
@@ -121,7 +121,7 @@ def _draw_swing(findings: NaoFindings) -> Figure:
     for name, marker in zip(SEARCHES, "s^v", strict=True):
         read = read_swing_powers(phase, name, phase.median_run(name))
         plot(read, f"{marker}:", COLOURS[name], f"ours, {NAMES[name]}")
-    axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / power at 0.015 m [1]")
+    axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / least power [1]")
     axes.legend()
     return figure
 
