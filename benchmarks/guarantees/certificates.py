@@ -23,7 +23,7 @@ from nlp_gait.gaitbench.definitions import get_definition, names
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, certify
-from nlp_gait.proofs.certificate import make_certificate_file
+from nlp_gait.proofs.certificate import load_certificates, make_certificate_file
 from tests.proofs.soundness import narrow_around
 
 REPORT_S = 30.0
@@ -89,17 +89,30 @@ def prove(out: Path, name: str, tolerance: float, hours: float, part: float | No
     )
 
 
+def format_table() -> str:
+    """Return the shipped certificates as a table in Markdown."""
+    lines = ["| certificate | best known | proven bound | gap | boxes | s of one core |", "|---|--:|--:|--:|--:|--:|"]
+    for name, file in load_certificates().items():
+        proof = file.certificate
+        values = f"{proof.objective:.7g} | {proof.bound:.7g} | {proof.gap:.1g} | {proof.boxes:,} | {proof.cpu_s:.0f}"
+        lines.append(f"| `{name}` | {values} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Prove one after the other."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.guarantees.certificates", description=__doc__.splitlines()[0]
     )
-    parser.add_argument("out", type=Path)
+    parser.add_argument("out", type=Path, nargs="?", help="none: print the shipped certificates as a table")
     parser.add_argument("name", nargs="*", help="only these")
     parser.add_argument("--tolerance", type=float, default=TOLERANCE)
     parser.add_argument("--hours", type=float, default=24.0, help="for each")
     parser.add_argument("--part", type=float, help="of every range, around the best known gait")
     arguments = parser.parse_args()
+    if arguments.out is None:
+        print(format_table())
+        return
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in arguments.name or list_covered():
         prove(arguments.out, name, arguments.tolerance, arguments.hours, arguments.part)

@@ -16,7 +16,6 @@ from unittest import mock
 
 import numpy as np
 
-import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_text
@@ -26,7 +25,7 @@ from nlp_gait.proofs import check
 from nlp_gait.proofs.branch_and_bound import Certificate
 from nlp_gait.proofs.certificate import CertificateFile, make_certificate_file
 from nlp_gait.proofs.check import STARTS, check_certificate
-from tests.proofs.soundness import best_x, feasible_gaits
+from tests.proofs.soundness import best_x, feasible_gaits, load
 
 COUNT, SEED = 10, 11
 NAMES = ("walk12", "nao-dsp", "nao-ssp")
@@ -86,12 +85,8 @@ def main() -> None:
     out, count = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else COUNT
     lines = [f"| problem | size | {' | '.join(CHECKS)} |", f"|---|---|{'---|' * len(CHECKS)}"]
     for name in sys.argv[3:] or NAMES:
-        problem, best, rng, started = (
-            nlp_gait.load(name),
-            best_x(name),
-            np.random.default_rng(SEED),
-            time.perf_counter(),
-        )
+        problem, best, rng = load(name), best_x(name), np.random.default_rng(SEED)
+        started = time.perf_counter()
         for size in SIZES:
             files = [forge(problem, best, size, rng) for _ in range(count)]
             refused = [sum(one(file, seed) for seed, file in enumerate(files)) for one in CHECKS.values()]

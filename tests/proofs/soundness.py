@@ -10,6 +10,7 @@ import numpy as np
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.gaitbench.definitions import get_definition
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.guarantee import guarantee
@@ -34,8 +35,8 @@ def best_x(name: str) -> Array:
 
 @cache
 def load(name: str) -> GaitProblem:
-    """Load a problem once for all tests."""
-    return nlp_gait.load(name)
+    """Load a problem once for all tests, with the options of its instance."""
+    return nlp_gait.load(name, **get_definition(INSTANCES[name]).options)
 
 
 def narrow_bounds(problem: GaitProblem, lower: Array, upper: Array) -> GaitProblem:

@@ -36,7 +36,7 @@ def ship_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def problem() -> GaitProblem:
-    return nlp_gait.load("walk12").with_values(**{"lambda": LAMBDA})
+    return nlp_gait.load("walk12", quadrature="simpson").with_values(**{"lambda": LAMBDA})
 
 
 @pytest.fixture(scope="module")

@@ -79,8 +79,8 @@ def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: b
     stdout.print(
         f"{file.problem['name']}: bound {proof.bound:.9g}, incumbent {proof.objective:.9g}. No better point was found; the best "
         f"one is of {found.source}, {found.best:.9g}. {found.paths} paths of up to {found.deepest} halvings end; "
-        f"{found.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest {found.boxes:,.0f} boxes in "
-        f"total, the certificate has {proof.boxes:,}"
+        f"{found.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest about {found.boxes:,.0f} "
+        f"boxes in total (within a factor of ten), the certificate has {proof.boxes:,}"
         + ("" if found.same_code else "; it was made by another version of the code"),
         soft_wrap=True,
     )
