@@ -1,4 +1,4 @@
-"""How the tracked step of the stairs paper may be read (``stairs_choices.toml``)."""
+"""How plans and the tracked step of the stairs paper may be read (``stairs_plan_choices.toml``, ``stairs_choices.toml``)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OURS, FREE, PRINTED = "ours", "free", "printed"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """A reading of the tracked step: the plan that is followed, ``plan`` or ``jerk``, and options and values of the problem."""
+    """A reading of the planner or of the tracked step: options and values of the problem; the plan that is followed."""
 
     text: str
     plan: str = "plan"
@@ -25,3 +25,4 @@ class Choice:
 
 CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_choices.toml").items()}
 INSTANTS = tuple((name, decides) for name in (OURS, FREE, PRINTED) for decides in get_args(Decides))  # of Algorithm 4
+PLAN_CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_plan_choices.toml").items()}

@@ -10,10 +10,11 @@ import numpy as np
 
 from compare.drawing.figures import add_legend_below, new_figure
 from compare.papers.paper_runs import get_point
-from compare.papers.stairs.stairs_motion import Leg, first_step, two_steps
 from compare.papers.stairs.stairs_paper import TABLE_4
-from compare.papers.stairs.stairs_runs import StairsFindings, make_plan_spec, roll_out
-from nlp_gait.formulation import Array
+from compare.papers.stairs.stairs_planning import move
+from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings, roll_out
+from nlp_gait.formulation import Array, Signals
+from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import ANGLES, measure_joints
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
@@ -23,8 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DENSITY = 5  # samples of a drawn plan, as a multiple of the problem's own
-DRAWN_CASE = 2  # where the paper draws one case only
+STICKS = 29  # poses of a drawn step
 TRACKED_LINKS = LINKS[:7]  # q1 to q7
 # From joint angles to those of the paper, of which knees are relative (27), (28); of rows.
 PRINTED_ANGLES = (measure_joints("printed") @ ca.inv(measure_joints("joint"))).full().T
@@ -34,29 +34,20 @@ def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
     """Return the figures by name."""
     plans = {case: findings.plan(case) for case in findings.cases}
     followed = {case: roll_out(case, plans[case], get_point(findings.best_track(case))) for case in findings.cases}
-    plan, arrays = plans[DRAWN_CASE], _load_planned_motion(findings, DRAWN_CASE)
-    step = TABLE_4[DRAWN_CASE].step_m
-    first = first_step(plan, *step, np.linspace(0.0, 3.5, 29))
-    following = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"] + plan["t2_s"], 37))
+    jerk, step = findings.plan(DRAWN_CASE, "jerk"), TABLE_4[DRAWN_CASE].step_m
+    signals, _ = move(findings, "jerk", DRAWN_CASE)
     return {
-        "fig03": _draw_segments(arrays, plan, step),
-        "fig06-07": _draw_sticks(first, step, "first step", from_ground=True),
-        "fig08-09": _draw_sticks(following, step, "next steps", from_ground=False),
-        "fig10-11": _draw_ankle(arrays),
-        "fig12": _draw_stairs_compared(plans),
+        "fig03": _draw_segments(signals.arrays, jerk, step),
+        "fig06-07": _draw_sticks(move(findings, "first", DRAWN_CASE), step, "first step"),
+        "fig08-09": _draw_sticks(move(findings, "landing", DRAWN_CASE), step, "next step"),
+        "fig10-11": _draw_ankle(signals.arrays),
+        "fig12": _draw_stairs_compared(findings),
         "fig13": _draw_pose_times(findings.others["network"], findings.cases[0]),
         "fig14-20": _draw_tracking(followed, "q", "angle [rad]"),
         "fig21-27": _draw_tracking(followed, "qd", "rate [rad/s]"),
         "fig28": _draw_zmp(followed, plans),
         "fig29": _draw_torques(followed),
     }
-
-
-def _load_planned_motion(findings: StairsFindings, case: int) -> Mapping[str, Array]:
-    problem = make_plan_spec(findings.effort, case).load().dense(DENSITY)
-    if problem is None:
-        raise TypeError("the planner has samples and signals")
-    return problem.signals(findings.best("plan", case).x).arrays
 
 
 def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
@@ -90,16 +81,18 @@ def _draw_segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step:
     return figure
 
 
-def _draw_sticks(legs: tuple[Leg, Leg], step: tuple[float, float], start: str, *, from_ground: bool) -> Figure:
-    figure = new_figure(height_in=3.4)
-    for axes, leg, name in zip(figure.subplots(1, 2, sharey=True), legs, ("swing", "stance"), strict=True):
-        _draw_stair(axes, step, 2 if from_ground else 3)
-        lines = leg.lines
-        for k, line in enumerate(lines):
-            axes.plot(*line.T, color=_shade(k / (len(lines) - 1)), linewidth=0.8)
-        axes.plot(*leg.hip.T, color="#D55E00", linewidth=1.0)
-        axes.plot(*leg.toe.T, color="#009E73", linewidth=1.0)
-        axes.set_title(f"{name} leg, {start}")
+def _draw_sticks(motion: tuple[Signals, dict[str, Array]], step: tuple[float, float], name: str) -> Figure:
+    figure, (signals, legs) = new_figure(height_in=3.4), motion
+    t, first = signals.arrays["t"], name.startswith("first")
+    poses = [int(np.abs(t - at).argmin()) for at in np.linspace(t[0], t[-1], STICKS)]
+    for axes, side, leg in zip(figure.subplots(1, 2, sharey=True), (RIGHT, LEFT), ("swing", "stance"), strict=True):
+        _draw_stair(axes, step, 2 if first else 3)
+        lines = legs[side] + (np.zeros(2) if first else np.array(step))
+        for k, pose in enumerate(poses):
+            axes.plot(*lines[pose].T, color=_shade(k / (STICKS - 1)), linewidth=0.8)
+        axes.plot(*lines[:, 0].T, color="#D55E00", linewidth=1.0)
+        axes.plot(*lines[:, -1].T, color="#009E73", linewidth=1.0)
+        axes.set_title(f"{leg} leg, {name}")
     figure.axes[0].set_ylabel("z [m]")
     return figure
 
@@ -131,16 +124,14 @@ def _draw_ankle(arrays: Mapping[str, Array]) -> Figure:
     return figure
 
 
-def _draw_stairs_compared(plans: Mapping[int, Mapping[str, float]]) -> Figure:
+def _draw_stairs_compared(findings: StairsFindings) -> Figure:
     figure = new_figure(height_in=2.9)
-    for axes, (case, plan) in zip(
-        figure.subplots(1, len(plans), sharey=True, squeeze=False)[0], plans.items(), strict=True
-    ):
-        step = TABLE_4[case].step_m
-        swing, _ = two_steps(plan, *step, np.linspace(0.0, plan["t3_s"], 201))
+    panels = figure.subplots(1, len(findings.cases), sharey=True, squeeze=False)[0]
+    for axes, case in zip(panels, findings.cases, strict=True):
+        step, (_, legs) = TABLE_4[case].step_m, move(findings, "jerk", case)
         _draw_stair(axes, step, 3)
-        for name in ("ankle", "sole", "toe"):
-            axes.plot(*getattr(swing, name).T, label=name)
+        for i, name in enumerate(("ankle", "sole", "toe"), start=2):
+            axes.plot(*(legs[RIGHT][:, i] + np.array(step)).T, label=name)
         axes.set_title(f"case {case}: {step[1] * 100:.1f} cm on {step[0] * 100:.1f} cm")
     figure.axes[0].set_ylabel("z [m]")
     add_legend_below(figure)

@@ -12,10 +12,12 @@ import numpy as np
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
 from compare.papers.stairs import stairs_instants, stairs_motion
+from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs import stairs_tracking as tracking
 from compare.papers.stairs.stairs_figures import draw_figures
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_printed import count_equations
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
@@ -29,9 +31,15 @@ NEAR_BOUND = 0.01  # of a gain's range
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     """Run plans and ideals, then track the best plans, then compute what follows from them."""
     findings = StairsFindings(effort=effort, runs=runner.run_tasks(runs.make_first_tasks(effort)))
+    findings.runs.update(runner.run_tasks(planning.make_choice_tasks(findings)))
+    findings.runs.update(runner.run_tasks(planning.make_first_step_tasks(findings)))
     findings.runs.update(runner.run_tasks([*runs.make_track_tasks(findings), *tracking.make_tracking_tasks(findings)]))
-    computations = [*runs.make_computations(findings), *tracking.make_tracking_computations(findings)]
-    return replace(findings, others=runner.compute(computations, (runs, stairs_motion, stairs_instants)))
+    computations = [
+        *runs.make_computations(findings),
+        *planning.make_planning_computations(findings),
+        *tracking.make_tracking_computations(findings),
+    ]
+    return replace(findings, others=runner.compute(computations, (runs, planning, stairs_motion, stairs_instants)))
 
 
 def compute_values(findings: StairsFindings) -> dict[str, Any]:
@@ -43,6 +51,8 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "cases": " | ".join(f"case {case}" for case in effort.cases),
         "papers": " | ".join(f"paper {case}" for case in effort.cases),
         "ours": " | ".join(f"ours {case}" for case in effort.cases),
+        "jerks": " | ".join(f"least jerk {case}" for case in effort.cases),
+        "energies": " | ".join(f"least energy {case}" for case in effort.cases),
         "cases_4f": " | ".join(".4f" for _ in effort.cases),
         "cases_6g": " | ".join(".6g" for _ in effort.cases),
         "table_3": TABLE_3,
@@ -55,7 +65,9 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "end_rate": end_rate,
         **_count_gains_at_bounds(findings),
         **_compute_growth(findings),
+        **planning.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
+        "failed_equations": count_equations(row.where for row in REPRODUCTION.printed.differences if row.cannot_run),
     }
 
 
@@ -86,8 +98,10 @@ def _compute_growth(findings: StairsFindings) -> dict[str, Any]:
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it
 # Rows of Table IV: words, name in the paper's table and in our result, and where in our results.
 QUANTITIES = (
-    ("largest joint acceleration [rad/s^2]", "acceleration", "differences"),
-    ("largest joint jerk [rad/s^3]", "jerk", "differences"),
+    ("largest joint acceleration, plan of least jerk [rad/s^2]", "acceleration", "jerk"),
+    ("largest joint acceleration, plan of least energy [rad/s^2]", "acceleration", "plan"),
+    ("largest joint jerk, plan of least jerk [rad/s^3]", "jerk", "jerk"),
+    ("largest joint jerk, plan of least energy [rad/s^3]", "jerk", "plan"),
     ("torso pitch [rad]", "torso_pitch_rad", "x"),
     ("K_p", "kp", "x"),
     ("K_d", "kd", "x"),
@@ -101,15 +115,15 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
     return {
         "table3": _list_table_3(findings),
-        "plans": [row for case in findings.cases for row in _list_plans(findings, case)],
+        "plans": [
+            row for case in findings.cases for what in planning.PLANS for row in _list_plans(findings, what, case)
+        ],
         "table4": _list_table_4(findings),
         "tracks": [row for case in findings.cases for row in _list_tracks(findings, case)],
         "fixed-hip": [_list_fixed_hip(findings, case) for case in findings.cases],
-        "ideal": [_list_ideal(findings, case) for case in findings.cases],
-        "jerk": [_list_jerk(findings, case) for case in findings.cases],
+        **planning.make_planning_tables(findings),
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
-        "angle-differences": [_list_differences(findings, case) for case in findings.cases],
         "printed-scheme": _list_results(findings, "printed"),
         "replay": _list_results(findings, "replay"),
         "learned": _list_results(findings, "learned"),
@@ -122,24 +136,27 @@ def _list_results(findings: StairsFindings, name: str) -> Rows:
 
 
 def _list_table_3(findings: StairsFindings) -> Rows:
-    plans = [findings.plan(case) for case in findings.cases]
+    plans = [findings.plan(case, what) for what in planning.PLANS for case in findings.cases]
     printed = {name: f"{value:g}" for name, value in TABLE_3.items()}
     names = [variable.name for variable in GOVERNING_VARIABLES]
     return [[name, printed.get(name), *(plan[name] for plan in plans)] for name in names]
 
 
-def _list_plans(findings: StairsFindings, case: int) -> Rows:
+def _list_plans(findings: StairsFindings, what: str, case: int) -> Rows:
     """Best plan of each solver, with the ends of all its runs."""
     rows: list[Sequence[Value]] = []
     for solver in (IPOPT, *ALGORITHMS):
-        found, verdict = findings.runs[f"plan-{case}", solver], findings.best("plan", case, solver).verdict
+        found, verdict = findings.runs[f"{what}-{case}", solver], findings.best(what, case, solver).verdict
         every = ", ".join(f"{value:.2f}" for value in list_objectives(found))
         if solver == IPOPT:
             ends = list_objectives(run for run in found if run.claimed)
             hits = sum(value <= verdict.objective * (1 + MATCH) for value in ends)
             every = f"{hits} of {len(found)} starts, {len(ends)} converged"
-        between = "feasible" if verdict.dense_feasible else verdict.violated[0]
-        rows.append([case, solver, verdict.objective, every, verdict.feasible, between, _compute_time_s(found)])
+        between = "feasible" if verdict.dense_feasible else ", ".join(verdict.violated[:1])
+        quantity = f"{'jerk' if what == 'jerk' else 'energy'} [{planning.PLANS[what]}]"
+        rows.append(
+            [case, quantity, solver, verdict.objective, every, verdict.feasible, between, _compute_time_s(found)]
+        )
     return rows
 
 
@@ -155,7 +172,8 @@ def _list_table_4(findings: StairsFindings) -> Rows:
         for case in findings.cases:
             track = findings.best_track(case)
             places = {
-                "differences": findings.others[f"differences-plan-{case}"],
+                "jerk": findings.others[f"differences-jerk-{case}"],
+                "plan": findings.others[f"differences-plan-{case}"],
                 "x": track.x,
                 "verdict": {"cost": track.verdict.objective, **track.verdict.indexes},
             }
@@ -166,41 +184,19 @@ def _list_table_4(findings: StairsFindings) -> Rows:
 
 
 def _list_tracks(findings: StairsFindings, case: int) -> Rows:
-    ideal = findings.best("ideal", case).verdict.indexes["energy_J"]
     rows: list[Sequence[Value]] = []
     for solver in (*ALGORITHMS, IPOPT):
         run = findings.best("track", case, solver)
         verdict, own = run.verdict, run.verdict.indexes
-        energies = [own["energy_J"], ideal, own["energy_J"] - ideal]
-        others = [own["zmp_margin_min_m"], own["largest_error_rad"], *get_point(run)]
-        rows.append([case, solver, verdict.objective, verdict.feasible, *energies, *others])
+        others = [own["energy_J"], own["zmp_margin_min_m"], own["largest_error_rad"], *get_point(run)]
+        rows.append([case, solver, verdict.objective, verdict.feasible, *others])
     return rows
-
-
-def _list_ideal(findings: StairsFindings, case: int) -> Sequence[Value]:
-    found, verdict = findings.runs[f"ideal-{case}", IPOPT], findings.best("ideal", case).verdict
-    every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in found)
-    energies = [verdict.indexes["energy_J"], findings.best("plan", case).verdict.objective]
-    others = [verdict.indexes["peak_torque_Nm"], verdict.indexes["torso_pitch_rad"]]
-    return [case, verdict.objective, every, *energies, *others, _compute_time_s(found)]
-
-
-def _list_jerk(findings: StairsFindings, case: int) -> Sequence[Value]:
-    verdict = findings.best("jerk", case).verdict
-    return [case, TABLE_4[case].jerk, verdict.objective, verdict.indexes["energy_J"]]
 
 
 def _list_fixed_hip(findings: StairsFindings, case: int) -> Sequence[Value]:
     found, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
     feasible = sum(run.verdict.feasible for run in found)
     return [case, f"{feasible} of {len(found)}", "; ".join(verdict.violated[:3]) or "nothing"]
-
-
-def _list_differences(findings: StairsFindings, case: int) -> Sequence[Value]:
-    """Largest acceleration and jerk by differences over 0.01 s: the paper's, and those of both plans."""
-    plans = [findings.others[f"differences-{least}-{case}"] for least in ("plan", "jerk")]
-    of_kind = [(getattr(TABLE_4[case], kind), *(plan[kind] for plan in plans)) for kind in ("acceleration", "jerk")]
-    return [case, *of_kind[0], *of_kind[1]]
 
 
 def _list_other_stairs(findings: StairsFindings) -> Rows:
@@ -237,5 +233,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    checks=tracking.TRACKING_CHECKS,
+    checks={**planning.PLANNING_CHECKS, **tracking.TRACKING_CHECKS},
 )

@@ -19,8 +19,8 @@ from compare.papers.paper_runs import (
     make_search_tasks,
     make_start_tasks,
 )
-from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS
-from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay, swing_leg
+from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, PLAN_CHOICES
+from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
 from compare.study.store import Computation
@@ -28,7 +28,7 @@ from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
 from metaheuristics.interface import Algorithm
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, network_angles
+from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, leg_vector, network_angles
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import PAPER_TIMES
@@ -40,6 +40,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
     "pso": ParticleSwarm(),
     "ga": GeneticAlgorithm(),
 }
+DRAWN_CASE = 2  # where the paper draws one case only
 TRACK_START = {"kp": 60.0, "kd": 60.0, "torso_pitch_rad": 1.4}
 IMPOSSIBLE_RISE_M = 0.5
 LOST_RAD = 0.1  # a replayed pose this far from the planned one is lost
@@ -58,13 +59,16 @@ class StairsEffort(Effort):
 
     cases: tuple[int, ...] = tuple(TABLE_4)
     plan_starts: int = 20  # of IPOPT on the plan of least energy
-    jerk_starts: int = 5  # on that of least peak jerk
+    jerk_starts: int = 20  # on that of least peak jerk
+    first_starts: int = 5  # on the first step
     hip_starts: int = 6  # on the plan of least energy with the paper's hip height
     ideal_starts: int = 3
     runs: int = 3  # of each search
     plan_evaluations: int = 10_000
     track_evaluations: int = ANTS * ITERATIONS  # as in the paper
     instant_evaluations: int = ANTS * ITERATIONS  # of each search of Algorithm 4
+    plan_choices: tuple[str, ...] = tuple(PLAN_CHOICES)  # of the planner
+    choices: tuple[str, ...] = tuple(CHOICES)  # readings of the tracked step
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
     track_settings: Mapping[str, Any] = field(default_factory=lambda: {"time_limit_s": 1200.0})
     # Tread and rise of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
@@ -76,7 +80,7 @@ class StairsEffort(Effort):
         (0.254, 0.50),
     )
     other_starts: int = 8  # of IPOPT on the plan there
-    poses: int = 351  # of the swing leg for which the network is trained
+    poses: int = 350  # of the swing leg for which the network is trained
     plan_intervals: int = 40
     ideal_intervals: int = 70
 
@@ -85,19 +89,28 @@ class StairsEffort(Effort):
         return min(3, self.other_starts) if rise >= IMPOSSIBLE_RISE_M else self.other_starts
 
     @property
+    def plan_steps(self) -> int:
+        """Plans under every choice, with a reverse double support, first steps, floors of the effort, and simulations."""
+        chosen = sum(1 if "minimise" in PLAN_CHOICES[name].options else 2 for name in self.plan_choices)
+        return chosen + len(self.cases) * (1 + self.first_starts + 1 + 3)
+
+    @property
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
         gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + 1
-        case = gradient + (2 * len(ALGORITHMS) + len(CHOICES)) * self.runs + PER_CASE + len(INSTANTS)
+        case = gradient + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs + PER_CASE + len(INSTANTS)
         others = sum(1 + self.count_other_starts(rise) for _, rise in self.other_stairs)
-        return len(self.cases) * case + others + 2
+        return len(self.cases) * case + others + 2 + self.plan_steps
 
 
-def make_plan_spec(effort: StairsEffort, case: int, minimise: str = "energy") -> ProblemSpec:
-    """Return the planner of a case."""
-    label = f"{'plan' if minimise == 'energy' else minimise}-{case}"
-    options: dict[str, str | int] = {"minimise": minimise, "intervals": effort.plan_intervals}
-    return ProblemSpec(name="stairs-plan", options=options, values=get_stair(case), label=label)
+def make_plan_spec(effort: StairsEffort, case: int, what: str = "plan") -> ProblemSpec:
+    """Return the planner of a case: ``plan`` of least energy or ``jerk``; of least jerk too, ``first`` step and ``landing``."""
+    options: dict[str, str | int] = {"intervals": effort.plan_intervals}
+    if what != "plan":
+        options["minimise"] = "jerk"
+    if what in ("first", "landing"):
+        options |= {"step": what, "balance": "polygon"}
+    return ProblemSpec(name="stairs-plan", options=options, values=get_stair(case), label=f"{what}-{case}")
 
 
 def make_ideal_spec(effort: StairsEffort, case: int) -> ProblemSpec:
@@ -164,8 +177,9 @@ def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
         yield from make_start_tasks(plan, effort.plan_starts)
         yield from make_start_tasks(make_plan_spec(effort, case, "jerk"), effort.jerk_starts)
         yield from make_start_tasks(replace(plan, values=fixed, label=f"hip-{case}"), effort.hip_starts)
-        for name, algorithm in ALGORITHMS.items():
-            yield from make_search_tasks(plan, name, algorithm, effort.runs, effort.plan_evaluations)
+        for spec in (plan, make_plan_spec(effort, case, "jerk")):
+            for name, algorithm in ALGORITHMS.items():
+                yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
         settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else {}
         for name, count in (("stairs-plan", effort.count_other_starts(rise)), ("stairs-ideal", 1)):
@@ -202,10 +216,13 @@ def make_computations(findings: StairsFindings) -> Iterator[Computation]:
 
 def train_network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:
     """Train the network on poses of a plan's swing leg: convergence, time and error against the closed form."""
-    times = np.linspace(0.0, plan["t3_s"], poses)
-    q, hip_to_ankle = swing_leg(plan, *TABLE_4[case].step_m, times)
+    desired = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
+    q = np.cumsum(
+        desired[np.linspace(0, len(desired) - 1, poses).round().astype(int), :2], axis=1
+    )  # the knee is measured from the thigh
     robot = toe_foot_biped()
     lengths = robot.link("HK").length_m, robot.link("KA").length_m
+    hip_to_ankle = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in q]).T
     found = {}
     for name, settings in RULES.items():
         path = network_angles(hip_to_ankle, *lengths, settings)

@@ -52,7 +52,7 @@ def make_tracking_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield the paper's search for gains and torso pitch under every choice."""
     effort = findings.effort
     for case in effort.cases:
-        for name in CHOICES:
+        for name in effort.choices:
             spec = make_choice_spec(findings, case, name)
             yield from make_search_tasks(spec, ACO, ALGORITHMS[ACO], effort.runs, effort.track_evaluations)
 
@@ -90,7 +90,7 @@ def get_best(findings: StairsFindings, case: int, name: str) -> RunRecord:
 def make_tracking_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name."""
     return {
-        "choices": [_list_choice(findings, case, name) for case in findings.cases for name in CHOICES],
+        "choices": [_list_choice(findings, case, name) for case in findings.cases for name in findings.effort.choices],
         "instants": [_list_instants(findings, case, *how) for case in findings.cases for how in INSTANTS],
     }
 
@@ -116,6 +116,8 @@ def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
 
 
 def _describe_effect(findings: StairsFindings, name: str) -> str:
+    if name not in findings.effort.choices:
+        return "not computed"
     parts = []
     for index, text in EFFECTS.items():
         values = [[_read(get_best(findings, case, which), index) for case in findings.cases] for which in (name, OURS)]

@@ -50,8 +50,12 @@ from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
-Minimise = Literal["energy", "jerk"]
-OBJECTIVES = {"energy": Objective(name="energy", unit="J"), "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3")}
+Minimise = Literal["energy", "jerk", "knot-jerk"]
+OBJECTIVES = {
+    "energy": Objective(name="energy", unit="J"),
+    "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3"),
+    "knot-jerk": Objective(name="peak_joint_jerk_at_knots", unit="rad/s^3"),
+}
 
 REAR_SHARE = "share of the ground force below the rear toe at the start"
 VARIABLES = (
@@ -97,8 +101,8 @@ def stairs_plan(
     """Return the planner of one step.
 
     Args:
-        minimise: energy, the integral of sum |torque x rate| over all joints, or the peak of the joints' jerk (the paper's
-            knot shifting).
+        minimise: energy, the integral of sum |torque x rate| over all joints; jerk, the peak of the joints' jerk (the paper's
+            knot shifting); knot-jerk, the same at t1, t2 and t_bc only.
         step: next, over a flat stance foot; landing, the same with the stance foot's reverse double support until t2; first,
             one step up from standing at rest, with the hip from above the planned ZMP to where the next step starts.
         balance: feet, the centre of pressure below the stance foot; polygon, as printed, the ZMP of (49) in the convex hull of
@@ -225,8 +229,11 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     durations, least = ends[1:] - ends[:-1], point["least_phase_s"]
     leaning = samples.qd[MOVING.index("K'A'"), 0]
     rest = (stair.rows("rest", leaning, ("K'A'",), "rad/s", 0.1, lower=0.0, upper=0.0),) if step.kind == "first" else ()
+    at_knots = step.jerk(samples, point["quantum_s"], knots=True)
     return Assembly(
-        objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
+        objective=step.energy(samples, ops)
+        if minimise == "energy"
+        else ops.largest(jerk if minimise == "jerk" else at_knots),
         constraints=(
             *_rows_at(point, samples, step.balance),
             _clearance(step.clearances(point, ops), least_clearance),
@@ -236,6 +243,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
         indexes={
             "energy_J": step.energy(samples, exact),
             "peak_jerk_rad_s3": exact.largest(jerk),
+            "knot_jerk_rad_s3": exact.largest(at_knots),
             "peak_acceleration_rad_s2": exact.largest(ca.vec(DM(JOINT_RATES) @ samples.qdd)),
             "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
             "zmp_margin_min_m": ca.mmin(exact.min(pressure - rear, front - pressure)),

@@ -89,13 +89,17 @@ class PlannedStep:
             total += durations / self.per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
         return total
 
-    def jerk(self, samples: PlanSamples, quantum: MX) -> MX:
-        """Return joint jerk between consecutive samples as a column [rad/s^3]; a jump between phases takes one quantum [s]."""
+    def jerk(self, samples: PlanSamples, quantum: MX, *, knots: bool = False) -> MX:
+        """Return joint jerk between consecutive samples as a column [rad/s^3], everywhere or between phases only.
+
+        A jump between phases takes one quantum [s].
+        """
         change = DM(JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
         columns = []
         for k in range(change.shape[1]):
             jump = k + 1 in self._phase_starts
-            columns.append(change[:, k] / (quantum if jump else samples.time[k + 1] - samples.time[k]))
+            if jump or not knots:
+                columns.append(change[:, k] / (quantum if jump else samples.time[k + 1] - samples.time[k]))
         return ca.vertcat(*columns)
 
     @property

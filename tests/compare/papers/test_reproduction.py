@@ -104,7 +104,7 @@ def test_every_claim_has_a_check_with_a_criterion_or_a_reason_why_it_cannot_be_t
         assert [name for name in reproduction.checks if not describe_criterion(claims[name])] == []
 
 
-@pytest.mark.parametrize("paper", mark_unfinished(REPRODUCTIONS, "stairs"))
+@pytest.mark.parametrize("paper", REPRODUCTIONS)
 def test_every_difference_has_an_effect_as_a_number_or_cannot_run_as_printed(paper: str) -> None:
     for row in load_reproduction(paper).printed.differences:
         assert row.cannot_run or re.search(r"\d|\{", row.effect), row.where

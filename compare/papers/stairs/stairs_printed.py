@@ -1,0 +1,73 @@
+"""Equations of the stairs paper as printed, at the values of Tables III and IV: by how much they miss."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from compare.papers.stairs.stairs_paper import TABLE_3, Case
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK
+
+
+def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
+    """Return the misses of the printed equations in one case.
+
+    Args:
+        case: of Table IV.
+        ankle: (m, 2) path of our swing ankle through the air from the stance ankle [m], for the printed pose of the foot.
+    """
+    robot, (tread, rise) = toe_foot_biped(), case.step_m
+    t1, t2, t_bc, sole, toe, catch = (
+        TABLE_3[name] for name in ("t1_s", "t2_s", "t_bc_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")
+    )
+    lift = np.array([robot.toe_m * (1 - math.cos(toe)), robot.toe_m * math.sin(toe)])  # (eqs. 1, 2) at t2
+    radius, distance = rise, 2 * tread - lift[0]
+    angles = np.linspace(0.0, math.pi, 100_001)
+    first = float(np.interp(math.pi * radius - distance, radius * (angles - np.sin(angles)), angles))  # (eq. 7)
+
+    def cycloid(angle: float) -> Array:  # (eqs. 5, 6), ends at 2 tread
+        x = 2 * tread + radius * (angle - math.sin(angle) - math.pi)
+        return np.array([x, lift[1] + radius * (1 - math.cos(angle))])
+
+    points = np.stack(
+        [lift, lift + [0.0, radius * (1 - math.cos(first))], cycloid(first + catch), cycloid(first + 2 * catch)]
+    )
+    s = np.linspace(0.0, 1.0, 1001)[:, None]
+    weights = np.hstack([(1 - s) ** 3, (1 - s) ** 2 * s, (1 - s) * s**2, s**3])
+    printed, proper = weights @ points, (weights * [1, 3, 3, 1]) @ points
+    end_rate = math.sqrt(GRAVITY / radius)
+    place = ankle + [robot.sole_m + robot.toe_m * math.cos(toe), -robot.toe_m * math.sin(toe)]  # tip of the toe
+    ground = rise * ((place[:, 0] >= -SETBACK) + (place[:, 0] >= tread - SETBACK) - 1.0)
+    sixth, seventh = (
+        [angle * (offset + 12 * u - 9 * u**2 + 2 * u**3) for u in (t1 / (t2 - t1), t2 / (t2 - t1))]
+        for angle, offset in ((sole, -4), (toe, -5))
+    )
+    return {
+        "sole_jump_deg": math.degrees(sixth[0] - sole),  # (eq. 3) at t1
+        "sole_end_deg": math.degrees(sixth[1]),  # at t2, where the sole should be level
+        "toe_jump_deg": math.degrees(seventh[0]),  # (eq. 4) at t1
+        "toe_end_deg": math.degrees(seventh[1]),  # at t2, where it should be theta_b
+        "landing_mm": 1e3 * lift[0],  # (eq. 7)
+        "bridge_mm": 1e3 * float(np.linalg.norm(printed - proper, axis=1).max()),  # (eqs. 10, 11)
+        "lift_off_m_s": 3 * float(np.linalg.norm(points[1] - points[0])) / (t_bc - t2),
+        "end_rate_rad_s": end_rate,
+        "landing_m_s": 2 * radius * end_rate,
+        "toe_depth_mm": 1e3 * float((ground - place[:, 1]).max()),  # (eqs. 15-20)
+        "arc_m": tread / math.sin(2 * math.atan2(rise, tread)),  # (eq. 25)
+    }
+
+
+def count_equations(places: Iterable[str]) -> int:
+    """Return how many equations places such as "(3), (4)" and "(15)-(20)" name."""
+    numbers: set[int] = set()
+    for place in places:
+        parts = place.replace("-(", "-").replace("(", " ").replace(")", " ").replace(",", " ").split()
+        for part in parts:
+            first, _, last = part.partition("-")
+            if first.isdigit():
+                numbers.update(range(int(first), int(last or first) + 1))
+    return len(numbers)
