@@ -13,6 +13,7 @@ import typer
 import nlp_gait
 from compare.cli.archive import archive, verify
 from compare.cli.bench import bench
+from compare.cli.cite import cite
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
@@ -32,7 +33,7 @@ PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, search),
     "Comparison": (compare, import_results, report, reproduce, bench, verify, archive),
     "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
-    "Show and share": (simulate, animate, export, logs, export_objective, export_solver),
+    "Show and share": (simulate, animate, export, logs, export_objective, export_solver, cite),
 }
 
 app = typer.Typer(

@@ -32,7 +32,13 @@ from compare.papers.claims import (
 )
 from compare.papers.paper_runs import Effort, Runner
 from compare.report.document import Rows, Section, Table, text_table
-from compare.report.provenance import TERMS, format_settings, make_session_section, make_solver_table
+from compare.report.provenance import (
+    TERMS,
+    format_settings,
+    make_citation_section,
+    make_session_section,
+    make_solver_table,
+)
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 from compare.study.manifest import Session
@@ -139,7 +145,7 @@ class Reproduction(Generic[E, F]):
             document,
             title=f"{document.title} (quick)" if quick else document.title,
             verdict=[*([QUICK] if quick else []), *count_verdicts(claims.values())],
-            parts=(*document.parts, provenance),
+            parts=(*document.parts, provenance, make_citation_section(runner.records)),
         )
         write_document(folder, document)
         write_parts(folder, self.csv_tables(findings))

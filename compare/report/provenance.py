@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from compare.report.document import Prose, Section, Table, text_table
+from compare.study.citations import cite_problems
 from compare.study.manifest import Session
 from compare.study.record import RunRecord
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
@@ -24,6 +25,13 @@ TERMS = Prose(
     "counts n + 1, a Hessian (n + 1)(n + 2)/2, like finite differences. **Constraint**: one value between a lower and an "
     "upper bound; the bounds of the variables are not counted."
 )
+
+
+def make_citation_section(records: Iterable[RunRecord]) -> Section:
+    """Return how to cite the software and the sources of the problems of all records."""
+    entries = cite_problems(record.definition["problem"] for record in records)
+    words = "The software and the papers whose problems are used here; `nlp-gait cite` prints these entries:"
+    return Section(title="How to cite", parts=(Prose(f"{words}\n\n```bibtex\n{entries}\n```"),))
 
 
 def make_session_section(number: int, session: Session) -> Section:

@@ -13,7 +13,14 @@ from compare.analysis.verdict import write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.document import Document, Figure, Section, text_table
 from compare.report.problem_section import HOW, problem_section
-from compare.report.provenance import SETTINGS, TERMS, compare_with_defaults, format_settings, make_session_section
+from compare.report.provenance import (
+    SETTINGS,
+    TERMS,
+    compare_with_defaults,
+    format_settings,
+    make_citation_section,
+    make_session_section,
+)
 from compare.report.writing import write_document
 from compare.study.description import describe_solver, list_described_names
 from compare.study.evidence import Exclusion, read_evidence
@@ -69,6 +76,7 @@ def make_study_document(
             *sections,
             *(() if simulated else (HOW,)),
             _make_method_section(comparisons, manifest, weighting),
+            make_citation_section(c.records[0] for c in comparisons),
         ),
     )
 

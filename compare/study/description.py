@@ -48,9 +48,7 @@ def describe_solver(name: str) -> Description:
     bound = factory.keywords if isinstance(factory, partial) else {}
     kind: Any = factory.func if isinstance(factory, partial) else factory
     # A class may inherit the documentation of its settings and its source.
-    sections = {
-        k: text for base in reversed(kind.__mro__[:-1]) for k, text in _sections(inspect.cleandoc(base.__doc__ or ""))
-    }
+    sections = {k: text for base in reversed(kind.__mro__[:-1]) for k, text in split_sections(base.__doc__ or "")}
     meanings = dict(_entries(sections.get("Attributes", "") or sections.get("Args", "")))
     parameters = inspect.signature(kind).parameters.values()
     settings = tuple(
@@ -66,10 +64,10 @@ def describe_solver(name: str) -> Description:
     )
 
 
-def _sections(text: str) -> Iterator[tuple[str, str]]:
+def split_sections(text: str) -> Iterator[tuple[str, str]]:
     """Yield the sections of a Google docstring with their headings; the first has none."""
     heading, lines = "", list[str]()
-    for line in text.splitlines():
+    for line in inspect.cleandoc(text).splitlines():
         found = SECTION.match(line)
         if found:
             yield heading, "\n".join(lines).strip("\n")

@@ -13,6 +13,7 @@ from typing import Any
 from compare.papers.claims import Claim, Difference, make_claims_table, make_differences_table
 from compare.papers.reproduction import count_verdicts
 from compare.report.document import Table
+from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
 RECORDS = Path(__file__).parents[1] / "papers"
@@ -20,8 +21,10 @@ PAPERS = ("nao", "walk12", "stairs")
 
 
 def write(folder: Path) -> None:
-    """Write the tables of each paper, which ``docs/papers.md`` includes."""
-    write_all(folder / "papers", {f"{name}.md": paper_page(name) for name in PAPERS})
+    """Write the tables of each paper, and what to cite, which ``docs/papers.md`` includes."""
+    entries = "\n\n".join(citation.bibtex for citation in find_citations())
+    pages = {f"{name}.md": paper_page(name) for name in PAPERS}
+    write_all(folder / "papers", {**pages, "citations.md": page(f"```text\n{entries}\n```")})
 
 
 def paper_page(name: str) -> str:

@@ -30,7 +30,11 @@ BAND = 1e-2
 
 @maker
 def gaitbench(*, instance: str = "ssp-v5") -> GaitProblem:
-    """Make a problem of the suite by the id of its instance; raises UnknownNameError."""
+    """Make a problem of the suite by the id of its instance; raises UnknownNameError.
+
+    Source:
+        GaitBench 1, whose instances name their papers.
+    """
     return _make(instance)
 
 
