@@ -75,6 +75,10 @@ class Nonsmooth:
         first = -reachable / ca.sqrt(sine_squared)
         return Angle(ca.acos(clamped), first, first * clamped / sine_squared)
 
+    def call(self, function: ca.Function, argument: MX) -> MX:
+        """Return a function of a few sums over many samples; ``Lifted`` derives it by itself, not for each pair of samples."""
+        return function.call([argument], True, False)[0]  # inlined
+
     def abs(self, v: MX) -> MX:
         """Return |v| elementwise."""
         return ca.fabs(v)
@@ -163,6 +167,9 @@ class Lifted(Nonsmooth):
         sine_squared = 1 - clamped * clamped
         first = -1 / ca.sqrt(sine_squared)
         return Angle(ca.acos(clamped) + first * (argument - clamped), first, inside * first * clamped / sine_squared)
+
+    def call(self, function: ca.Function, argument: MX) -> MX:
+        return function(argument)
 
     def abs(self, v: MX) -> MX:
         """Return a variable s with s >= v and s >= -v."""

@@ -1,4 +1,4 @@
-"""An NLP split into functions of one sample that are mapped, and the cheap expressions between them (the glue).
+"""An NLP split into the functions that it calls, mapped over samples or once, and the cheap expressions between them (the glue).
 
 y = (w, v_1, ..., v_K),  u_k = glue_k(w, p, v_1, ..., v_{k-1}),  v_k = function_k(u_k) sample by sample,  (f, g) = glue(w, p, v).
 """
@@ -16,6 +16,8 @@ from casadi import MX, SX
 
 from nlp_gait.errors import CompilerError
 
+CALLED = ("Map", "SXFunction")  # CasADi's classes of functions that become stages
+
 
 class NotMapped(CompilerError):
     """The graph of an NLP contains something that cannot be split; the message says what."""
@@ -23,7 +25,7 @@ class NotMapped(CompilerError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
-    """A function of one sample that is called at all samples."""
+    """A function of one sample that is called at all samples; one that is not mapped has one sample."""
 
     function: ca.Function  #: of one sample, from all inputs (m,) to all outputs (nv,)
     count: int
@@ -42,11 +44,11 @@ class Structure:
 
 
 def split_nlp(nlp: Mapping[str, MX]) -> Structure:
-    """Split an NLP, CasADi's dictionary of x, p, f, g; raises NotMapped for calls neither mapped nor of scalar operations."""
+    """Split an NLP, CasADi's dictionary of x, p, f, g; raises NotMapped for other calls than of ``CALLED``."""
     x, p = nlp["x"], nlp["p"]
     whole = ca.Function("nlp", [x, p], [nlp["f"], nlp["g"]])
     numbers = [k for k in range(whole.n_instructions()) if whole.instruction_id(k) == ca.OP_CALL]
-    calls = [call for call in map(whole.instruction_MX, numbers) if call.which_function().class_name() == "Map"]
+    calls = [call for call in map(whole.instruction_MX, numbers) if call.which_function().class_name() in CALLED]
     found = [[call.get_output(i) for i in range(call.n_out())] for call in calls]
     symbols = [[MX.sym("v", output.sparsity()) for output in outputs] for outputs in found]
     given = [[call.dep(i) for i in range(call.n_dep())] for call in calls]
@@ -58,7 +60,7 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
     stages = []
     for call, inputs, outputs in zip(calls, given, found, strict=True):
         function = call.which_function()
-        inner = _concatenate(_expand(function.find_functions(0)[0]))
+        inner = _concatenate(_expand(function.find_functions(0)[0] if function.class_name() == "Map" else function))
         count = function.nnz_in() // inner.nnz_in()
         stages.append(
             Stage(

@@ -88,7 +88,7 @@ def walk12(
     robot = load_point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return _assemble(point, _make_zmp_function(robot, ops, zmp), robot, intervals, horizon, quadrature)
+        return _assemble(point, ops, _make_zmp_function(robot, ops, zmp), robot, intervals, horizon, quadrature)
 
     def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         zmp_at = _sample_zmp(_make_zmp_function(robot, ops, zmp), point, phases)
@@ -141,6 +141,7 @@ def make_rule(quadrature: Quadrature, intervals: int) -> tuple[DM, DM]:
 
 def _assemble(
     point: Point,
+    ops: Nonsmooth,
     zmp_at: ca.Function,
     robot: PointMassBiped,
     intervals: int,
@@ -157,7 +158,8 @@ def _assemble(
         Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
     if quadrature != "simpson":
         zmp = _sample_zmp(zmp_at, point, DM(np.linspace(0.0, 1.0, intervals + 1)).T)
-    f1 = 1 / Q  # (eq. 10)
+    q = SX.sym("q")
+    f1 = ops.call(ca.Function("f1", [q], [1 / q]), Q)  # (eq. 10)
     f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
     indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_measure_stability(zmp, robot)}
     return Assembly(
