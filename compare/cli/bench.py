@@ -9,7 +9,16 @@ import typer
 
 from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, print_result, print_table, progress_bar, say, stdout, until_interrupted
+from compare.cli.common import (
+    describe_command,
+    end_interrupted,
+    print_result,
+    print_table,
+    progress_bar,
+    say,
+    stdout,
+    until_interrupted,
+)
 from compare.cli.options import AsJson, Jobs, parse_names
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
@@ -45,6 +54,7 @@ def bench(
     from compare.bench.baseline import list_instances
     from compare.bench.leaderboard import rank_solvers
     from compare.bench.page import make_leaderboard_page, make_verdict
+    from compare.report.provenance import add_session
     from compare.report.writing import write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
@@ -88,7 +98,10 @@ def bench(
     suite_name = (
         f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
     )
-    written = write_document(out, make_leaderboard_page(board, name, suite_name), "leaderboard")
+    page = add_session(
+        make_leaderboard_page(board, name, suite_name), describe_command(), str(jobs or available_cores())
+    )
+    written = write_document(out, page, "leaderboard")
 
     def tables() -> None:
         print_table(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 import time
 import unicodedata
@@ -90,6 +91,11 @@ def say_error(message: str) -> None:
 def say(sentence: str) -> None:
     """Print a sentence on stderr."""
     stderr.print(sentence, soft_wrap=True)
+
+
+def describe_command() -> str:
+    """Return the command line of this process."""
+    return shlex.join(["nlp-gait", *sys.argv[1:]])
 
 
 def print_json(data: Any) -> None:

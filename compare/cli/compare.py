@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +11,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import (
+    describe_command,
     end_if_excluded,
     end_interrupted,
     fail,
@@ -121,8 +120,7 @@ def compare(
     check_study(study)  # before the manifest names it
     if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):
         raise InputError(f"no gait of {', '.join(p.title for p in settings.problems)} can be simulated; omit --engine")
-    command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
-    write_manifest(out, settings, Session.begin(command_line, scheduler or str(study.jobs)))
+    write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
     with progress_bar("runs", len(study.tasks)) as advance:
         try:
             records = run_study(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,6 +12,7 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.common import (
+    describe_command,
     end_if_excluded,
     end_interrupted,
     interruptible,
@@ -110,9 +109,8 @@ def reproduce(
     """
     reproduction = load_reproduction(paper)
     effort = reproduction.quick if quick else reproduction.full
-    command_line = shlex.join(["nlp-gait", *sys.argv[1:]])
     with interruptible(out), progress_bar(paper, effort.steps) as advance:
-        reproduction.reproduce(out, effort, advance, command=command_line)
+        reproduction.reproduce(out, effort, advance, command=describe_command())
     print_written(out / "report.md")
 
 

@@ -36,6 +36,7 @@ from compare.report.provenance import (
     TERMS,
     format_settings,
     make_citation_section,
+    make_reference_table,
     make_session_section,
     make_solver_table,
 )
@@ -137,6 +138,7 @@ class Reproduction(Generic[E, F]):
                     ("effort", "value"), [(k, format_settings(v)) for k, v in asdict(effort).items()], prose=True
                 ),
                 TERMS,
+                make_reference_table(runner.records),
                 make_solver_table(runner.records),
                 *(make_session_section(k, session) for k, session in enumerate(sessions, start=1)),
             ),

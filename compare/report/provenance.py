@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
-from compare.report.document import Prose, Section, Table, text_table
+from compare.analysis.comparison import read_objective
+from compare.analysis.solver_table import percent
+from compare.analysis.statistics.run_length import find_best_known, relative_gap
+from compare.analysis.units import with_unit
+from compare.report.document import Document, Prose, Section, Table, text_table
 from compare.study.citations import cite_problems
 from compare.study.manifest import Session
 from compare.study.record import RunRecord
+from compare.study.references import find_reference
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
 from metaheuristics.errors import SearchError
 from metaheuristics.registry import ALGORITHMS, algorithm
+from nlp_gait.backends.identity import HASH
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import GaitError
+
+D = TypeVar("D", bound=Document)
 
 # The one explanation of each term, on every page that uses it.
 TERMS = Prose(
@@ -47,6 +56,11 @@ def make_session_section(number: int, session: Session) -> Section:
     return Section(title=f"Session {number}", parts=(text_table(("what", "value"), rows, prose=True),))
 
 
+def add_session(document: D, command: str, jobs: str = "1") -> D:
+    """Return a document with the session that makes it: this command, machine and versions."""
+    return replace(document, parts=(*document.parts, make_session_section(1, Session.begin(command, jobs))))
+
+
 def make_solver_table(records: Iterable[RunRecord]) -> Table:
     """Return settings, budget and seeds of the solvers of all records, a row for each difference."""
     rows: dict[tuple[str, str, str], list[RunRecord]] = {}
@@ -63,6 +77,25 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
         for (solver, _, _), group in rows.items()
     ]
     return text_table(("solver", *SETTINGS, "seeds", "runs", "problems"), cells, prose=True)
+
+
+def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
+    """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
+    groups: dict[str, list[RunRecord]] = {}
+    for record in records:
+        groups.setdefault(str(record.definition["problem"].get(HASH)), []).append(record)
+    rows = []
+    for group in groups.values():
+        known, objective = find_reference(group[0].definition["problem"]), read_objective(group[0])
+        best = find_best_known(group, objective)
+        if known.objective is not None:
+            gap = percent(relative_gap(best, known.objective, objective))
+            values = (with_unit(value, objective.unit) for value in (best, known.objective))
+            rows.append((group[0].problem, *values, gap, known.source))
+    if not rows:
+        return "No best known value is shipped for the settings of these runs; gaps are relative to the best of them."
+    header = ("problem", "best of these runs", "best known", "gap", "source of the best known value")
+    return text_table(header, rows, "Best known values", prose=True)
 
 
 # Recorded as the solver chose it.

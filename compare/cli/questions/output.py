@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.common import (
+    describe_command,
     describe_stored,
     end_interrupted,
     fail,
@@ -85,10 +86,12 @@ class Output:
         Raises:
             OutputError: a file cannot be written; the answer is printed nevertheless.
         """
+        from compare.report.provenance import add_session
+
         written: list[Path] = []
         with defer_interrupts() as pressed:
             try:
-                written = answer.write(self.out)
+                written = add_session(answer, describe_command()).write(self.out)
             finally:
                 print_result(self.as_json, answer.data, written, lambda: _print(answer))
         if stopped or pressed():
