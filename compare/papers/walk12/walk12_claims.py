@@ -83,7 +83,8 @@ def _list_steps(findings: Walk12Findings) -> list[float]:
 
 def _check_slower(findings: Walk12Findings) -> Check:
     printed, ours = [1e3 * row.x[0] for row in TABLE_3], _list_steps(findings)
-    return compare_changes(printed[-1] - printed[0], ours[-1] - ours[0], change=printed[-1] - printed[0])
+    changes = printed[-1] - printed[0], ours[-1] - ours[0]
+    return compare_changes(*changes, change=changes[0], found=changes[1])
 
 
 def _check_steps(findings: Walk12Findings) -> Check:
@@ -136,7 +137,9 @@ def _get_f1max(findings: Walk12Findings, row: PaperRow, horizon: str) -> float:
 def _check_trend(findings: Walk12Findings, horizon: str) -> Check:
     slow, fast = TABLE_4[0], TABLE_4[-1]
     ours = 100 * (_get_f1max(findings, slow, horizon) / _get_f1max(findings, fast, horizon) - 1)
-    return compare_changes(100 * (slow.f1max / fast.f1max - 1), ours, slow=slow.step_time_s, fast=fast.step_time_s)
+    return compare_changes(
+        100 * (slow.f1max / fast.f1max - 1), ours, slow=slow.step_time_s, fast=fast.step_time_s, found=ours
+    )
 
 
 def _list_table_4(findings: Walk12Findings, horizon: str) -> list[tuple[float, list[float]]]:
