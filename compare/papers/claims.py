@@ -27,7 +27,6 @@ class Verdict(StrEnum):
     """What the numbers say about a claim."""
 
     HOLDS = "holds"
-    HOLDS_IN_PART = "holds in part"
     SIZE_DIFFERS = "direction holds, size does not"
     FAILS = "does not hold"
     NOT_SHOWN = "not shown"

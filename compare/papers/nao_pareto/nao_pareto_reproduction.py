@@ -78,7 +78,6 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
         "criterion": ssp.criterion.name,
         "claims": len(verdicts),
         "held": verdicts.count(Verdict.HOLDS),
-        "refuted": verdicts.count(Verdict.FAILS),
         "robot": ssp.problem.options["robot"],
         "variables": [len(phase.problem.names) for phase in findings.phases],
     }

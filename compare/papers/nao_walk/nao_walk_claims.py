@@ -9,7 +9,7 @@ from typing import Any
 
 from scipy.stats import fisher_exact
 
-from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
+from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide, require_change
 from compare.papers.nao_walk.nao_walk_runs import (
     ACTIVE_MIN,
     BATTERY_WH,
@@ -25,6 +25,7 @@ from compare.papers.nao_walk.nao_walk_runs import (
 Point = Mapping[str, Any]
 KNEE = "KneePitch"
 SAGITTAL = (KNEE, "HipPitch", "AnklePitch")  # kinds of joints that turn in the plane of the walk
+LEAST_SAVING = 0.01  # of energy, which counts
 HEATS = {"sheet": "data sheet", "paper": "paper"}
 
 
@@ -72,12 +73,6 @@ class NaoWalkFindings:
         return [[point[key] for point in self.drives[name]] for name in FEED_FORWARD]
 
 
-def _judge(holds: Iterable[bool], in_part: Iterable[bool]) -> Verdict:
-    if all(holds):
-        return Verdict.HOLDS
-    return Verdict.HOLDS_IN_PART if any(in_part) else Verdict.FAILS
-
-
 def _check_knees(findings: NaoWalkFindings) -> Check:
     places = [(where, heat) for heat in HEATS for where in ("model", "engine")]
     shares = {place: findings.share("own", *place) for place in places}
@@ -89,9 +84,7 @@ def _check_knees(findings: NaoWalkFindings) -> Check:
         for heat, name in HEATS.items()
     ]
     optimum = [findings.share("optimum-sheet", where, "sheet") for where in ("model", "engine")]
-    main = [kind == KNEE for kind in most.values()]
-    verdict = _judge(main, [*main, *(kind == KNEE for kind in forward.values())])
-    return decide(verdict, found="; ".join(found), optimum=optimum)
+    return decide(all(kind == KNEE for kind in most.values()), found="; ".join(found), optimum=optimum)
 
 
 def _check_straight(findings: NaoWalkFindings) -> Check:
@@ -107,8 +100,11 @@ def _check_straight(findings: NaoWalkFindings) -> Check:
             f"at {tallest_mm:.0f} mm {at_tallest:+z.1f} %"
         )
     optimum = findings.straighter["sheet"]["free"]
+    verdict = Verdict.HOLDS if all(point is tallest for point in best.values()) else Verdict.SIZE_DIFFERS
+    if not all(best[heat][f"{heat}_J_per_m"] <= (1 - LEAST_SAVING) * own[f"{heat}_J_per_m"] for heat in HEATS):
+        verdict = Verdict.FAILS
     return decide(
-        _judge([point is tallest for point in best.values()], [point["torso_m"] > TORSO_M for point in best.values()]),
+        verdict,
         torso_mm=1000 * TORSO_M,
         tallest_mm=tallest_mm,
         tallest=tallest,
@@ -124,8 +120,8 @@ def _check_heat(findings: NaoWalkFindings) -> Check:
     free, bounded = ({heat: at[bound] for heat, at in findings.straighter.items()} for bound in ("free", "paper"))
     least, sheet = free[heats[0]], free["sheet"]
     straighter = least["knee_deg"] - sheet["knee_deg"]
-    return decide(
-        straighter > 0,
+    return require_change(
+        straighter,
         speed=SPEED_M_S,
         heats=", ".join(heats),
         angles=", ".join(f"{free[heat]['knee_deg']:.1f}" for heat in heats),
@@ -141,8 +137,8 @@ def _check_efficient(findings: NaoWalkFindings) -> Check:
     plain, fed = findings.over_stiffness("sheet_J_per_m")
     gain, stiffness = _find_saving(findings, plain)
     others, _ = _find_saving(findings, fed)
-    return decide(
-        gain > 0.0,
+    return require_change(
+        100 * gain,
         plain=_list_energies(findings, plain),
         fed=_list_energies(findings, fed),
         change=-100 * gain,
@@ -176,8 +172,8 @@ def _check_robust(findings: NaoWalkFindings) -> Check:
 def _check_fast(findings: NaoWalkFindings) -> Check:
     plain, fed = ([100.0 * speed for speed in speeds] for speeds in findings.over_stiffness("fastest_m_s"))
     full, best = plain[0], max(plain[1:])
-    return decide(
-        best > full,
+    return require_change(
+        100 * (best / full - 1) if full else math.inf,
         stiffnesses=_list_stiffnesses(findings),
         plain=", ".join(f"{speed:.1f}" for speed in plain),
         fed=", ".join(f"{speed:.1f}" for speed in fed),

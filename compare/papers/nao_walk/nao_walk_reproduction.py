@@ -66,6 +66,10 @@ def compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
         "masses": runs.MASS_FACTORS,
     }
     return {
+        "knees": {
+            name: findings.straighter[key]["free"]["knee_deg"]
+            for name, key in (("paper", next(iter(findings.straighter))), ("sheet", "sheet"))
+        },
         "step_mm": 1000 * runs.STEP_M,
         "period_s": runs.make_footsteps().period_s,
         "speed_cm_s": 100 * SPEED_M_S,

@@ -27,7 +27,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "running-nao-ssp fronts-nao-ssp running-nao-dsp fronts-nao-dsp",
-        " ".join(["claims", "fronts", *tables]),
+        " ".join(["claims", "differences", "fronts", *tables]),
     )
     assert all(claim.text in finished.report for claim in REPRODUCTION.check_claims(finished.findings).values())
     assert all(
