@@ -25,6 +25,7 @@ from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.proofs.bounds import has_power_form, make_bounds
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
 from nlp_gait.proofs.certificate import make_certificate_file
@@ -66,10 +67,11 @@ class Evidence:
         if not math.isfinite(c.bound):
             return f"nothing: the time limit was reached before a finite bound, after {c.boxes:,} boxes"
         unit = self.problem.objective.unit
-        bound, best = (with_unit(value, unit, ".6g") for value in (c.bound, c.objective))
+        bound, best = (with_unit(value, unit, ".9g") for value in (c.bound, c.objective))
         word = "no feasible x exceeds" if self.problem.objective.sign < 0 else "no feasible x falls below"
         return (
-            f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
+            ("globally optimal to six digits: " if c.gap <= SIX_DIGITS else "")
+            + f"{word} {bound}, {100 * c.gap:.3g} % from the best known {best}; "
             + ("the tolerance was reached" if c.closed else "the time limit was reached before the tolerance")
             + "; bounds are rounded outward, functions of libm are assumed to be within four units in the last place"
         )

@@ -17,13 +17,12 @@ from nlp_gait.errors import GaitError
 from nlp_gait.formulation import Objective, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.proofs.certificate import proven_bound
 from nlp_gait.providers import PROBLEMS
 
 # Relative difference of an objective that is computed on another machine or by other compiled code.
 SAME_VALUE = 1e-9
-# A proof with at most this relative gap is said to have six digits.
-SIX_DIGITS = 1.01e-6
 # A result is better than the best known value by more than this, relatively: less is the tolerance of feasibility.
 BETTER = 1e-6
 OWN = "the best of this study"
