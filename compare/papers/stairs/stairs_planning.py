@@ -54,26 +54,27 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
                     label=f"{what}-{DRAWN_CASE}-{name}",
                 ),
                 findings.best(what, DRAWN_CASE),
+                effort.plan_settings,
             )
     for case in findings.cases:
-        yield _make_task(make_plan_spec(effort, case, "landing"), findings.best("jerk", case))
-        yield from make_start_tasks(_make_floor_spec(findings, case), 1)
+        yield _make_task(make_plan_spec(effort, case, "landing"), findings.best("jerk", case), effort.plan_settings)
+        yield from make_start_tasks(_make_floor_spec(findings, case), 1, settings=effort.plan_settings)
 
 
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield first steps, which end where the steps with a reverse double support start."""
     for case in findings.cases:
-        spec = make_first_spec(findings, case)
-        random = make_start_tasks(spec, findings.effort.first_starts - 1)
+        spec, settings = make_first_spec(findings, case), findings.effort.plan_settings
+        random = make_start_tasks(spec, findings.effort.first_starts - 1, settings=settings)
         near = {**findings.best("landing", case).x, "zmp_start_m": ZMP_OF_STANDING, "zmp_end_m": ZMP_OF_STANDING}
-        yield from (*random, Task(problem=spec, solver=IPOPT, start=near, run=len(random)))
+        yield from (*random, Task(problem=spec, solver=IPOPT, settings=settings, start=near, run=len(random)))
 
 
-def _make_task(spec: ProblemSpec, best: RunRecord) -> Task:
+def _make_task(spec: ProblemSpec, best: RunRecord, settings: Mapping[str, Any]) -> Task:
     problem = spec.load()
     start = {name: best.x[name] for name in problem.names}
     clipped = np.clip(list(start.values()), problem.lower, problem.upper)
-    return Task(problem=spec, solver=IPOPT, start=dict(zip(start, map(float, clipped), strict=True)))
+    return Task(problem=spec, solver=IPOPT, settings=settings, start=dict(zip(start, map(float, clipped), strict=True)))
 
 
 def make_first_spec(findings: StairsFindings, case: int) -> ProblemSpec:

@@ -73,7 +73,7 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
 
 def _count_gains_at_bounds(findings: StairsFindings) -> dict[str, Any]:
     """How many of the best runs on the track end at the upper bounds of both gains."""
-    tracks = [(case, findings.best("track", case, name)) for case in findings.cases for name in (*ALGORITHMS, IPOPT)]
+    tracks = [(case, findings.best("track", case, name)) for case in findings.cases for name in findings.track_solvers]
     at_bounds = 0
     for case, run in tracks:
         problem = runs.make_track_spec(case, findings.plan(case)).load()
@@ -185,7 +185,7 @@ def _list_table_4(findings: StairsFindings) -> Rows:
 
 def _list_tracks(findings: StairsFindings, case: int) -> Rows:
     rows: list[Sequence[Value]] = []
-    for solver in (*ALGORITHMS, IPOPT):
+    for solver in findings.track_solvers:
         run = findings.best("track", case, solver)
         verdict, own = run.verdict, run.verdict.indexes
         others = [own["energy_J"], own["zmp_margin_min_m"], own["largest_error_rad"], *get_point(run)]

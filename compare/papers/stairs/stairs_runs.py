@@ -69,6 +69,8 @@ class StairsEffort(Effort):
     instant_evaluations: int = ANTS * ITERATIONS  # of each search of Algorithm 4
     plan_choices: tuple[str, ...] = tuple(PLAN_CHOICES)  # of the planner
     choices: tuple[str, ...] = tuple(CHOICES)  # readings of the tracked step
+    plan_settings: Mapping[str, Any] = field(default_factory=dict)  # of IPOPT on plans
+    track_ipopt: bool = True  # whether IPOPT runs on the track
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
     track_settings: Mapping[str, Any] = field(default_factory=lambda: {"time_limit_s": 1200.0})
     # Tread and rise of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
@@ -97,7 +99,7 @@ class StairsEffort(Effort):
     @property
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
-        gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + 1
+        gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + self.track_ipopt
         case = gradient + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs + PER_CASE + len(INSTANTS)
         others = sum(1 + self.count_other_starts(rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2 + self.plan_steps
@@ -161,9 +163,14 @@ class StairsFindings:
         names = ("t3_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")
         return {**self.best(what, case).x, **{name: problem.value(name) for name in names}}
 
+    @property
+    def track_solvers(self) -> tuple[str, ...]:
+        """Solvers on the track."""
+        return (*ALGORITHMS, *([IPOPT] if self.effort.track_ipopt else []))
+
     def best_track(self, case: int) -> RunRecord:
         """Return the best run of any solver on the track of a case, a feasible one if there is one."""
-        records = [record for name in (*ALGORITHMS, IPOPT) for record in self.runs[f"track-{case}", name]]
+        records = [record for name in self.track_solvers for record in self.runs[f"track-{case}", name]]
         return min(records, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
 
 
@@ -174,14 +181,15 @@ def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
         plan = make_plan_spec(effort, case)
         fixed = {**plan.values, "hip_height_m.lower": height, "hip_height_m.upper": height}
         yield from make_start_tasks(make_ideal_spec(effort, case), effort.ideal_starts, seed=case)
-        yield from make_start_tasks(plan, effort.plan_starts)
-        yield from make_start_tasks(make_plan_spec(effort, case, "jerk"), effort.jerk_starts)
-        yield from make_start_tasks(replace(plan, values=fixed, label=f"hip-{case}"), effort.hip_starts)
+        low, settings = replace(plan, values=fixed, label=f"hip-{case}"), effort.plan_settings
+        yield from make_start_tasks(plan, effort.plan_starts, settings=settings)
+        yield from make_start_tasks(make_plan_spec(effort, case, "jerk"), effort.jerk_starts, settings=settings)
+        yield from make_start_tasks(low, effort.hip_starts, settings=settings)
         for spec in (plan, make_plan_spec(effort, case, "jerk")):
             for name, algorithm in ALGORITHMS.items():
                 yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
-        settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else {}
+        settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else effort.plan_settings
         for name, count in (("stairs-plan", effort.count_other_starts(rise)), ("stairs-ideal", 1)):
             yield from make_start_tasks(make_other_spec(effort, name, tread, rise), count, settings=settings)
 
@@ -193,7 +201,8 @@ def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
         spec = make_track_spec(case, findings.plan(case))
         for name, algorithm in ALGORITHMS.items():
             yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.track_evaluations)
-        yield Task(problem=spec, solver=IPOPT, settings=effort.track_settings, start=TRACK_START)
+        if effort.track_ipopt:
+            yield Task(problem=spec, solver=IPOPT, settings=effort.track_settings, start=TRACK_START)
 
 
 def make_computations(findings: StairsFindings) -> Iterator[Computation]:
