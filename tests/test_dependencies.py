@@ -38,6 +38,7 @@ LAYERS = (
     "nlp_gait.gaitbench",
     "metaheuristics",
     "compare.judge",
+    "compare.rounding",
     "compare.study",
     "compare.analysis",
     "compare.logs",

@@ -29,6 +29,7 @@ from nlp_gait.files import format_csv, write_text
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
+    from nlp_gait.formulation import GaitProblem
     from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 
 SHOWN_VIOLATIONS = 10
@@ -53,13 +54,17 @@ def evaluate(
     engine: Annotated[bool, typer.Option(help="Also simulate a motion in the physics engine (extra sim).")] = True,
     *,
     problem: AnyProblem,
+    rounded: Annotated[
+        bool,
+        typer.Option("--rounded", help="Judge all points that round to the digits of --x, not that point alone."),
+    ] = False,
     signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file.")] = None,
     table: Annotated[Path | None, typer.Option("--csv", help="Write the judged points to this CSV file.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
 
-    Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`,
+    Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`, also with `--rounded`,
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
     from compare.judge import evaluate as judge
@@ -67,11 +72,18 @@ def evaluate(
 
     if (x is None) == (motion is None):
         fail("give a point with --x, or a motion with --motion")
+    if rounded and motion is not None:
+        fail("--rounded refers to the digits of --x; leave it out for a motion")
     if motion is not None:
         _evaluate_motion(_read_motion(problem, motion, touch_down), engine, signals, as_json)
         return
     assert x is not None  # one of both is given; for the type checker
     loaded = problem.spec().load()
+    if rounded:
+        if x.endswith(".csv") or signals is not None or table is not None:
+            fail("--rounded takes one candidate as printed, and no --signals or --csv; give --x as numbers")
+        _evaluate_rounded(loaded, x, as_json)
+        return
     if x.endswith(".csv"):
         if signals is not None:
             fail("--signals takes one candidate; give it as numbers")
@@ -98,6 +110,30 @@ def evaluate(
     else:
         _print(evaluation)
         print_written(*(path for path in (signals, table) if path is not None))
+
+
+def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
+    from compare.rounding import evaluate_rounded
+
+    found = evaluate_rounded(problem, x.split(","))
+    if as_json:
+        print_json(found.to_json())
+        return
+    unit = found.objective["unit"]
+    best, worst = with_unit(found.best, unit), with_unit(found.worst, unit)
+    bounds = (
+        "cannot be enclosed"
+        if found.enclosure is None
+        else "enclosed: {} to {}".format(*(with_unit(end, unit) for end in found.enclosure))
+    )
+    for sentence in (
+        f"{found.problem}, all points that round to the printed digits: {found.objective['name']} from {best} (best) to "
+        f"{worst} (worst), found by optimisation; {bounds}",
+        f"feasible {found.feasible}, {found.how}",
+        f"at the best point that was found {found.at_best}",
+        f"at the worst point that was found {found.at_worst}",
+    ):
+        stdout.print(sentence, soft_wrap=True)
 
 
 def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
