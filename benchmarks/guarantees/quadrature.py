@@ -60,7 +60,7 @@ def straighten(S: Array, reach: ca.Function) -> Array:
         middle = (low + high) / 2
         reached = map_rows(reach, np.c_[S, middle]) <= limit
         low, high = np.where(reached, low, middle), np.where(reached, middle, high)
-    return np.c_[S, np.where(free, PROBLEM.lower[3], high)]
+    return np.column_stack([S, np.where(free, PROBLEM.lower[3], high)])
 
 
 def main() -> None:
@@ -73,7 +73,7 @@ def main() -> None:
 
         def cost(S: Array, rule: ca.Function = rule) -> Array:
             X = straighten(np.atleast_2d(S.T), reach)
-            return np.negative(np.log10(np.abs(map_rows(rule, X) - map_rows(reference, X)) / F1MAX + 1e-16))
+            return -np.log10(np.abs(map_rows(rule, X) - map_rows(reference, X)) / F1MAX + 1e-16)
 
         settings = {"vectorized": True, "updating": "deferred", "popsize": 12, "maxiter": GENERATIONS, "polish": False}
         ends = [differential_evolution(cost, bounds, seed=seed, **settings) for seed in range(SEEDS)]

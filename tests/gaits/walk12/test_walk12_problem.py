@@ -120,6 +120,27 @@ def test_horizon_of_one_second() -> None:
     assert values(second.with_values(**half), x)[2]["Q_m2s"] == pytest.approx(2 * Q, rel=1e-12)
 
 
+# Gaits with nearly straight legs, near the worst for Gauss's rule (``python -m benchmarks.guarantees.quadrature``).
+STRAIGHT = ([0.098, 0.0255, 0.1299, 0.0013], [0.0517346, 0.12883558, 0.03921078, 0.0094602])
+
+
+@pytest.mark.parametrize("x", STRAIGHT)
+def test_no_rule_but_simpsons_on_few_intervals_errs_where_legs_are_straight(x: list[float]) -> None:
+    stable = {"lambda": 1.0}
+    f = {
+        quadrature: values(nlp_gait.load("walk12", quadrature=quadrature).with_values(**stable), x)[0]
+        for quadrature in ("gauss", "simpson", "runge-kutta")
+    }
+    assert f["gauss"] == pytest.approx(f["runge-kutta"], abs=2e-7)
+    assert abs(f["simpson"] - f["runge-kutta"]) > 1e-3
+
+
+def test_finer_grids_do_not_change_the_integral() -> None:
+    for x in random_gaits(5, seed=4):
+        fine = nlp_gait.load("walk12", intervals=1000)
+        assert values(fine, x)[2]["Q_m2s"] == pytest.approx(values(DEFAULT, x)[2]["Q_m2s"], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("step_time", "x", "per_step", "per_second"),
     [
@@ -169,6 +190,7 @@ def test_unreachable_gait_says_which_leg_and_when() -> None:
         ({"intervals": 0}, "even whole number >= 2"),
         ({"horizon": "2s"}, "horizon must be one of step, 1s"),
         ({"zmp": "best"}, "zmp must be one of exact, appendix"),
+        ({"quadrature": "euler"}, "quadrature must be one of gauss, simpson, runge-kutta"),
     ],
 )
 def test_options_that_are_not_allowed(options: dict[str, Any], message: str) -> None:
