@@ -23,6 +23,7 @@ from metaheuristics.preparation import (
     seed_sequence,
 )
 from metaheuristics.result import Interrupted, Result
+from metaheuristics.threads import limit_blas_threads
 
 _DEB = Deb()
 
@@ -118,16 +119,17 @@ def minimize(
         )
 
     try:
-        if isinstance(search, CallingSearch):
-            return result(_run_calling(search, generation, limits_reached))
-        while True:
-            X, f, violation, rule = generation(check_points(search.ask(), start.lower, start.upper))
-            reasons = limits_reached()
-            if not reasons:
-                search.tell(X, f, violation, rule)
-                reasons = check_reasons(search.stop())
-            if reasons:
-                return result(reasons)
+        with limit_blas_threads():
+            if isinstance(search, CallingSearch):
+                return result(_run_calling(search, generation, limits_reached))
+            while True:
+                X, f, violation, rule = generation(check_points(search.ask(), start.lower, start.upper))
+                reasons = limits_reached()
+                if not reasons:
+                    search.tell(X, f, violation, rule)
+                    reasons = check_reasons(search.stop())
+                if reasons:
+                    return result(reasons)
     except KeyboardInterrupt as interrupt:
         if not evaluate.generations:
             raise

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 
 from nlp_gait.errors import WorkerError
 from nlp_gait.interrupts import block_interrupts_in_children, never
+from nlp_gait.working_folder import show_working_folder
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -163,6 +164,7 @@ def run_in_isolation(call: Callable[[], bytes], time_limit_s: float | None, most
 
 
 def _isolate(sender: Connection, call: Callable[[], bytes]) -> None:
+    show_working_folder()
     os.setsid()
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

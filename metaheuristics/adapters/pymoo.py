@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from typing import Any, ClassVar
 
@@ -72,6 +73,8 @@ class PymooSettings:
         except TypeError as error:
             raise SearchError(f"pymoo:{self.algorithm} does not take these settings: {error}") from error
         search.setup(problem, termination=NoTermination(), seed=int(start.rng.integers(2**31)))
+        if getattr(search, "survival", None) is not None:  # SRES and ISRES call it without a source of random numbers
+            search.survival.do = partial(search.survival.do, random_state=search.random_state)
         return search
 
 

@@ -84,7 +84,7 @@ def _find(cxx: str, cc: str, path: str) -> Compiler:
             tried.append(f"{name}={text!r}: not a command line")
     commands = [command for text in (cxx, cc) if (command := _split(text))] + [(name,) for name in COMMON_NAMES]
     if find_spec("ziglang") is not None:
-        commands.append((sys.executable, "-m", "ziglang", "cc"))
+        commands.append((sys.executable, "-P", "-m", "ziglang", "cc"))
     for command in commands:
         if shutil.which(command[0], path=path) is None:
             tried.append(f"{command[0]}: not found")

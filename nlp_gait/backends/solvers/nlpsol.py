@@ -51,7 +51,7 @@ def probe(name: str) -> str | None:
     """
     try:
         done = subprocess.run(
-            [sys.executable, "-c", PROBE, name],
+            [sys.executable, "-P", "-c", PROBE, name],
             capture_output=True,
             text=True,
             errors="replace",

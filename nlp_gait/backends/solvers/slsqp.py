@@ -54,25 +54,27 @@ class Slsqp(Solver):
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         from scipy.optimize import minimize
+        from threadpoolctl import threadpool_limits
 
         started = time.perf_counter()
         functions = _Functions(problem, self, stop)
         try:
-            result = minimize(
-                lambda z: functions.evaluate(z)[0],
-                (x0 - functions.offset) / functions.scale,
-                jac=lambda z: functions.differentiate(z)[0],
-                method="SLSQP",
-                bounds=list(zip(functions.lower, functions.upper, strict=True)),
-                constraints=[
-                    {
-                        "type": "ineq",
-                        "fun": lambda z: functions.evaluate(z)[1],
-                        "jac": lambda z: functions.differentiate(z)[1],
-                    }
-                ],
-                options={"maxiter": self.evaluations, "ftol": TOLERANCE},
-            )
+            with threadpool_limits(limits=1, user_api="blas"):  # their number changes LAPACK's rounding
+                result = minimize(
+                    lambda z: functions.evaluate(z)[0],
+                    (x0 - functions.offset) / functions.scale,
+                    jac=lambda z: functions.differentiate(z)[0],
+                    method="SLSQP",
+                    bounds=list(zip(functions.lower, functions.upper, strict=True)),
+                    constraints=[
+                        {
+                            "type": "ineq",
+                            "fun": lambda z: functions.evaluate(z)[1],
+                            "jac": lambda z: functions.differentiate(z)[1],
+                        }
+                    ],
+                    options={"maxiter": self.evaluations, "ftol": TOLERANCE},
+                )
             status, converged, iterations = str(result.message), bool(result.success), int(result.get("nit", 0))
         except _Ended as ended:
             status, converged, iterations = str(ended), False, functions.gradients

@@ -1,0 +1,70 @@
+"""Python files in the working folder never run, whatever module they are called after."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from nlp_gait.working_folder import OWN_VALUE, VARIABLE, hide_working_folder, show_working_folder
+from tests.faults.processes import ROOT
+
+LOADED = """
+import sys, joblib.externals.loky, multiprocessing.resource_tracker, resource, compare.cli, casadi, scipy.optimize
+print(*{name.partition(".")[0] for name in sys.modules})
+"""
+# As the installed script: neither the script's folder nor the working folder is searched.
+PROGRAM = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from compare.__main__ import main; main()"
+CALLS = (
+    (
+        "compare",
+        "walk12",
+        "--algorithms",
+        "pso",
+        "--starts",
+        "0",
+        "--runs",
+        "2",
+        "--evaluations",
+        "60",
+        "--jobs",
+        "2",
+        "--out",
+        "../out",
+    ),
+    ("solve", "walk12", "--starts", "1", "--solver", "sqpmethod"),
+)
+
+
+@pytest.mark.slow
+def test_no_file_of_the_working_folder_runs(tmp_path: Path) -> None:
+    loaded = _run(ROOT, "-c", LOADED).split()
+    assert len(loaded) > 150
+    bait = tmp_path / "bait"
+    bait.mkdir()
+    for name in loaded:
+        (bait / f"{name}.py").write_text(f"open('{tmp_path}/ran-{name}', 'w')\n", encoding="utf-8")
+    for call in CALLS:
+        _run(bait, "-P", "-c", PROGRAM, *call)
+    assert not list(tmp_path.glob("ran-*"))
+
+
+def _run(folder: Path, *arguments: str) -> str:
+    done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_programs_of_user_code_find_their_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    hide_working_folder()
+    assert os.environ[VARIABLE] == OWN_VALUE
+    show_working_folder()
+    assert VARIABLE not in os.environ
+    monkeypatch.setenv(VARIABLE, "1")  # the user's own choice stays
+    hide_working_folder()
+    show_working_folder()
+    assert os.environ[VARIABLE] == "1"
