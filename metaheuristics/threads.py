@@ -10,7 +10,8 @@ from threadpoolctl import ThreadpoolController
 
 def limit_blas_threads() -> AbstractContextManager[object]:
     """Return a context in which NumPy's and SciPy's BLAS and LAPACK use one thread, so that equal seeds give equal bits."""
-    return _find_libraries().limit(limits=1, user_api="blas")
+    limits: AbstractContextManager[object] = _find_libraries().limit(limits=1, user_api="blas")
+    return limits
 
 
 @cache
