@@ -53,6 +53,9 @@ def unpack_archive(path: Path, folder: Path) -> tuple[ArchiveManifest, list[str]
     raw = read_json(folder / MANIFEST, "manifest")
     with convert_errors(f"manifest of {owner} is damaged", InputError):
         manifest = decode(ArchiveManifest, raw)
+    for place in manifest.robots.values():
+        if place.partition("@")[0] not in manifest.files:
+            raise InputError(f"manifest of {owner} names the robot file {place!r}, which is not in it")
     return manifest, list(_compare(manifest, folder))
 
 

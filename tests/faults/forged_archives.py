@@ -93,6 +93,8 @@ def forge(files: Files, record: str) -> Iterator[tuple[str, bytes, str]]:
         study,
     )
     yield "a later start", write_zip(edit(files, study, lambda r: r["sessions"][0].update(started="2999-01-01"))), study
+    robots = edit(files, MANIFEST, lambda r: r.update(robots={"my.json": "../../my.json"}))
+    yield "a robot file outside", write_zip(robots), "my.json"
     yield "a damaged study file", write_zip(sign({**files, study: b"[]"})), study
     name = next(name for name in files if name.startswith("certificates/"))
     better = edit(files, name, lambda r: r["certificate"].update(bound=r["certificate"]["objective"]))
