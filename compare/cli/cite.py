@@ -31,6 +31,6 @@ def cite(
 
     found = find_citations(name)
     if as_json:
-        print_json({"entries": [{"key": one.key, **one.fields, "bibtex": one.bibtex} for one in found]})
-        return
-    stdout.print("\n\n".join(one.bibtex for one in found), soft_wrap=True)
+        print_json({"entries": found})
+    else:
+        stdout.print("\n\n".join(found), soft_wrap=True)

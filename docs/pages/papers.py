@@ -22,7 +22,7 @@ PAPERS = ("nao", "walk12", "stairs")
 
 def write(folder: Path) -> None:
     """Write the tables of each paper, and what to cite, which ``docs/papers.md`` includes."""
-    entries = "\n\n".join(citation.bibtex for citation in find_citations())
+    entries = "\n\n".join(find_citations())
     pages = {f"{name}.md": paper_page(name) for name in PAPERS}
     write_all(folder / "papers", {**pages, "citations.md": page(f"```text\n{entries}\n```")})
 
