@@ -97,7 +97,7 @@ def evaluate_rounded(problem: GaitProblem, printed: Sequence[str]) -> Rounded:
     costs = [point.values.cost for point in judged.points if math.isfinite(point.values.cost)] or [math.nan]
     sign, enclosed = problem.objective.sign, judged.enclose()
     feasible, how = judged.decide(enclosed)
-    ends = None if enclosed is None else sorted(sign * end for end in _bound(enclosed, 0))
+    ends = None if enclosed is None else sorted(float(sign * end[0]) for end in _bound(enclosed))
     return Rounded(
         problem=problem.address,
         x=dict(zip(problem.names, printed, strict=True)),
@@ -105,7 +105,7 @@ def evaluate_rounded(problem: GaitProblem, printed: Sequence[str]) -> Rounded:
         objective={"name": problem.objective.name, "unit": problem.objective.unit},
         best=sign * min(costs),
         worst=sign * max(costs),
-        enclosure=(ends[0], ends[1]) if ends is not None and np.isfinite(ends).all() else None,
+        enclosure=None if ends is None else (ends[0], ends[1]),
         feasible=feasible,
         how=how,
         at_best=judged.describe(best),
@@ -143,8 +143,8 @@ class _Judge:
         self.problem, self.box, self.model = problem, box, build_exact_model(problem)
         self.centre, self.half = box.mean(axis=1), np.diff(box)[:, 0] / 2
         rows = len(self.model.row_names) - len(problem.names)
-        # A variable's bounds are satisfied in the whole box, or in none of it.
-        self.rows = np.concatenate([np.arange(rows), rows + outside])
+        # A variable's bounds are satisfied in the whole box, or in none of it; they matter then, or without other constraints.
+        self.rows = np.concatenate([np.arange(rows), rows + (outside if rows else np.arange(len(box)))])
         self.scales = self.model.row_scales[self.rows]
         self.points: list[_Point] = []
 
@@ -193,7 +193,7 @@ class _Judge:
         return _Forms(np.nan_to_num(base, posinf=1e9) - slopes @ place, slopes, np.zeros(len(base)))
 
     def enclose(self) -> _Forms | None:
-        """Return rigorous forms; None without a compiler, or if an operation cannot be enclosed."""
+        """Return rigorous forms; None without a compiler, or if an operation or a value cannot be enclosed."""
         kernel, n = build_kernel(self.problem), len(self.half)
         given = np.concatenate([self.box, np.stack([self.problem.p] * 2, axis=-1)])
         try:
@@ -205,23 +205,22 @@ class _Judge:
         rows = 1 + self.rows
         middle, slopes, error = found.middle[0], found.slopes[0], found.error[0]
         one_sided = np.concatenate([middle[rows] - upper, lower - middle[rows]])
-        rounding = WIDENING * np.abs(np.concatenate([middle[rows], middle[rows]]))
-        known, scales = np.isfinite(one_sided), np.tile(self.scales, 2)
-        return _Forms(
-            np.append(middle[0], (one_sided / scales)[known]),
-            np.vstack([slopes[0], (np.concatenate([slopes[rows], -slopes[rows]]) / scales[:, None])[known]]),
-            np.append(error[0], ((np.tile(error[rows], 2) + rounding) / scales)[known]),
+        errors = np.tile(error[rows] + WIDENING * np.abs(middle[rows]), 2)
+        bounded, scales = np.isfinite(np.concatenate([upper, lower])), np.tile(self.scales, 2)
+        forms = _Forms(
+            np.append(middle[0], (one_sided / scales)[bounded]),
+            np.vstack([slopes[0], (np.concatenate([slopes[rows], -slopes[rows]]) / scales[:, None])[bounded]]),
+            np.append(error[0], (errors / scales)[bounded]),
         )
+        return forms if all(np.isfinite(part).all() for part in forms) else None
 
     def decide(self, enclosed: _Forms | None) -> tuple[Where, How]:
         """Return whether the points are feasible, and how that is known."""
         good = [point.values.violation <= FEASIBILITY_TOLERANCE for point in self.points]
         if any(good) and not all(good):
             return "somewhere", "evaluated"
-        if enclosed is not None and np.isfinite(enclosed.error).all():
-            size = np.abs(enclosed.slopes).sum(axis=1) + enclosed.error
-            most = (enclosed.middle + size + WIDENING * (1.0 + np.abs(enclosed.middle)))[1:]
-            if np.maximum(most, 0.0).sum() <= FEASIBILITY_TOLERANCE:
+        if enclosed is not None:
+            if np.maximum(_bound(enclosed)[1][1:], 0.0).sum() <= FEASIBILITY_TOLERANCE:
                 return "everywhere", "enclosed"
             if not any(good) and _solve_linear(enclosed)[1] > FEASIBILITY_TOLERANCE:
                 return "nowhere", "enclosed"
@@ -250,10 +249,11 @@ def _largest(point: _Point) -> float:
     return float(point.excess.max(initial=-np.inf))
 
 
-def _bound(forms: _Forms, k: int) -> tuple[float, float]:
-    size = float(np.abs(forms.slopes[k]).sum() + forms.error[k])
-    size += WIDENING * (abs(float(forms.middle[k])) + size)
-    return float(forms.middle[k]) - size, float(forms.middle[k]) + size
+def _bound(forms: _Forms) -> tuple[Array, Array]:
+    """Return lower and upper bounds of all values."""
+    size = np.abs(forms.slopes).sum(axis=1) + forms.error
+    size += WIDENING * (np.abs(forms.middle) + size)
+    return forms.middle - size, forms.middle + size
 
 
 def _solve_linear(forms: _Forms) -> tuple[Array, float]:
@@ -266,19 +266,15 @@ def _solve_linear(forms: _Forms) -> tuple[Array, float]:
 
     middle, slopes, error = (part[1:] for part in forms)
     r, n = slopes.shape
-    if r == 0:
-        return np.zeros(n), -math.inf
     found = linprog(
         np.append(np.zeros(n), 1.0),
         A_ub=np.column_stack([slopes, -np.ones(r)]),
         b_ub=error - middle,
         bounds=[*[(-1.0, 1.0)] * n, (None, None)],
     )
-    if found.x is None:
+    if found.status != 0:
         return np.zeros(n), -math.inf
     weights = np.maximum(-found.ineqlin.marginals, 0.0)
-    if not weights.sum() > 0.0:
-        return found.x[:n], -math.inf
-    weights /= weights.sum() * (1.0 + WIDENING)
+    weights /= weights.sum() * (1.0 + WIDENING)  # their sum is 1, but for rounding
     bound = float(weights @ (middle - error) - np.abs(weights @ slopes).sum())
     return found.x[:n], bound - WIDENING * (1.0 + float(np.abs(weights) @ np.abs(middle)))

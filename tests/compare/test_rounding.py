@@ -74,6 +74,19 @@ def test_the_bound_of_the_largest_violation_holds_for_random_forms() -> None:
         assert bound <= least and bound >= least - 1.5
 
 
+def test_values_without_an_enclosure_prove_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    enclose = WALK.build_once(rounding._build_enclosure)
+
+    def lose(*given: object) -> object:
+        forms = enclose(*given)
+        forms.error[:, 5], forms.middle[:, 5] = np.inf, np.nan
+        return forms
+
+    monkeypatch.setattr(rounding, "_build_enclosure", lambda _: lose)
+    found = evaluate_rounded(WALK, "0.1300,0.1135,0.0010,0.0105".split(","))
+    assert (found.feasible, found.how, found.enclosure) == ("everywhere", "found by optimisation", None)
+
+
 @pytest.mark.parametrize(
     ("printed", "message"),
     [("0.1,0.1,0.1", "walk12 has 4 variables"), ("0.1,0.1,0.1,nan", "as it was printed, got 'nan'")],
