@@ -166,7 +166,6 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "lateral_jump": math.pi * find_row(0.15).x[1],
         "lift_mm": 1e3 * find_row(0.15).x[2],
         "stable": findings.stable[-1],
-        "trend": {name: _describe_trend(values) for name, values in (("implied", implied), *f1.items())},
         "step_gap": _compute_gap(f1["step"], implied),
         "horizon_gap": _compute_gap(f1["1s"], implied),
     }
@@ -219,14 +218,6 @@ def _count_walks(findings: Walk12Findings, step_time_s: float) -> dict[str, str]
 def _find_bound(record: RunRecord) -> float | None:
     """Return the shipped proven bound on f of a record's problem."""
     return find_reference(record.definition["problem"]).bound
-
-
-def _describe_trend(values: Iterable[float]) -> str:
-    """How f1 changes along the rows of Table IV, whose steps get shorter."""
-    changes = np.diff(list(values))
-    if (changes > 0).all():
-        return "rises throughout"
-    return "falls throughout" if (changes < 0).all() else "rises and falls"
 
 
 SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
