@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 
 import numpy as np
@@ -63,11 +64,5 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
 
 def count_equations(places: Iterable[str]) -> int:
     """Return how many equations places such as "(3), (4)" and "(15)-(20)" name."""
-    numbers: set[int] = set()
-    for place in places:
-        parts = place.replace("-(", "-").replace("(", " ").replace(")", " ").replace(",", " ").split()
-        for part in parts:
-            first, _, last = part.partition("-")
-            if first.isdigit():
-                numbers.update(range(int(first), int(last or first) + 1))
-    return len(numbers)
+    pairs = [pair for place in places for pair in re.findall(r"\((\d+)\)(?:-\((\d+)\))?", place)]
+    return len({number for first, last in pairs for number in range(int(first), int(last or first) + 1)})

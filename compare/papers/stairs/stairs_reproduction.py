@@ -12,6 +12,7 @@ import numpy as np
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
 from compare.papers.stairs import stairs_instants, stairs_motion
+from compare.papers.stairs import stairs_plan_claims as plan_claims
 from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs import stairs_tracking as tracking
@@ -65,7 +66,7 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "end_rate": end_rate,
         **_count_gains_at_bounds(findings),
         **_compute_growth(findings),
-        **planning.compute_planning_values(findings),
+        **plan_claims.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
         "failed_equations": count_equations(row.where for row in REPRODUCTION.printed.differences if row.cannot_run),
     }
@@ -233,5 +234,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    checks={**planning.PLANNING_CHECKS, **tracking.TRACKING_CHECKS},
+    checks={**plan_claims.PLANNING_CHECKS, **tracking.TRACKING_CHECKS},
 )

@@ -1,0 +1,32 @@
+"""The stairs paper's equations as printed: by how much they miss, computed by hand, and how many cannot run."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from compare.papers.stairs.stairs_paper import TABLE_4
+from compare.papers.stairs.stairs_printed import count_equations, measure_printed_equations
+
+
+def test_misses_of_the_printed_equations() -> None:
+    found = measure_printed_equations(TABLE_4[2], np.array([[0.0, 0.01]]))
+    u = 0.5 / 0.9
+    assert found["sole_jump_deg"] == pytest.approx(30 * (-4 + 12 * u - 9 * u**2 + 2 * u**3) - 30, abs=1e-3)
+    assert found["toe_end_deg"] == pytest.approx(
+        30 * (-5 + 12 * 14 / 9 - 9 * (14 / 9) ** 2 + 2 * (14 / 9) ** 3), abs=1e-3
+    )
+    assert found["end_rate_rad_s"] == pytest.approx(math.sqrt(9.81 / 0.1778))
+    assert found["landing_m_s"] == pytest.approx(2 * math.sqrt(9.81 * 0.1778))
+    assert found["landing_mm"] == pytest.approx(50 * (1 - math.cos(math.pi / 6)), abs=1e-3)
+    # Circle through both ends of the hip's path, level at the first: (0, R), so X^2 + (Z - R)^2 = R^2.
+    assert found["arc_m"] == pytest.approx((0.254**2 + 0.1778**2) / (2 * 0.1778))
+    # The toe is below an ankle 1 cm above the stance ankle's step by half of its length.
+    assert found["toe_depth_mm"] == pytest.approx(25.0 - 10.0, abs=1e-3)
+    assert found["bridge_mm"] > 0.0 and found["lift_off_m_s"] > 0.0
+
+
+def test_equations_are_counted_once() -> None:
+    assert count_equations(["(3), (4)", "(4)", "(15)-(20)", "section V.B, (26)", "Table III"]) == 9
