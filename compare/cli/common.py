@@ -78,7 +78,8 @@ def end_if_excluded(excluded: Sequence[Exclusion]) -> None:
         say_error(f"excluded {exclusion.sentence}")
     if excluded:
         more = f" ({len(excluded) - MOST_EXCLUDED} more are in the report)" if len(excluded) > MOST_EXCLUDED else ""
-        fail(f"{len(excluded)} records were excluded{more}; delete them, and rerun the study to compute them again")
+        count = f"{len(excluded)} record{'s were' if len(excluded) > 1 else ' was'} excluded{more}"
+        fail(f"{count}; delete what is named, and rerun the study to compute it again")
 
 
 def say_error(message: str) -> None:

@@ -116,7 +116,8 @@ def read_evidence(
     evidence = check_records(readable, find_problem=find_problem, between_samples=between_samples)
     excluded = damaged + evidence.excluded
     if not evidence.records:
-        raise InputError(f"none of the {len(found)} records in {str(folder)!r} can be used; {excluded[0].sentence}")
+        sentences = "; ".join(exclusion.sentence for exclusion in excluded)
+        raise InputError(f"none of the {len(found)} records in {str(folder)!r} can be used: {sentences}")
     return Evidence(evidence.records, excluded)
 
 
