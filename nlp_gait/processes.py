@@ -194,7 +194,7 @@ def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterat
     results: Generator[tuple[K, T], None, None] | None = None
     try:
         with block_interrupts_in_children():
-            folder = os.getcwd() if workers > 0 else None  # another machine has other folders
+            folder = _find_working_folder() if workers > 0 else None  # another machine has other folders
             results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
         for result in results:  # noqa: UP028  `yield from` would close them before the lines below
             yield result
@@ -234,6 +234,15 @@ def exit_with_parent(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
+
+
+def _find_working_folder() -> str:
+    try:
+        return os.getcwd()
+    except OSError as error:
+        raise WorkerError(
+            f"worker processes cannot begin: the working folder is gone ({error.strerror}); use another"
+        ) from error
 
 
 def _call(key: K, call: Callable[[], T], folder: str | None) -> tuple[K, T]:

@@ -1,8 +1,10 @@
-"""Python files in the working folder never run: not in worker processes, nor in Python's own helpers."""
+"""The working folder: Python files in it never run by themselves, and user code that changes it changes nothing else."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 VARIABLE = "PYTHONSAFEPATH"  # any text: Python searches no module in the working folder
 OWN_VALUE = "nlp-gait"
@@ -18,3 +20,15 @@ def show_working_folder() -> None:
     """Undo ``hide_working_folder`` for programs that user code starts, which may be Python files with modules next to them."""
     if os.environ.get(VARIABLE) == OWN_VALUE:
         del os.environ[VARIABLE]
+
+
+@contextmanager
+def keep_working_folder() -> Iterator[None]:
+    """Return to the working folder at the end, for code that may leave it."""
+    folder = os.open(".", os.O_RDONLY) if os.name == "posix" else os.getcwd()
+    try:
+        yield
+    finally:
+        os.chdir(folder)
+        if isinstance(folder, int):
+            os.close(folder)

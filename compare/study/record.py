@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -14,7 +15,7 @@ from compare.study.origin import Origin, format_now
 from compare.study.task import LABEL, ProblemSpec, Task
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import convert_errors, read_json, replace_nan
+from nlp_gait.files import LARGEST_FILE, check_plain, convert_errors, read_json, replace_nan
 from nlp_gait.formulation import GaitProblem, Objective, Result
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
@@ -237,6 +238,15 @@ def parse_record(raw: Any) -> RunRecord:
         raise ValueError("a feasible verdict without an objective")
     violation = math.inf if math.isnan(verdict.violation) else verdict.violation
     return replace(record, verdict=replace(verdict, violation=violation))
+
+
+def check_readable(record: RunRecord) -> None:
+    """Check, before a record is written, that it can be read; raises ValueError."""
+    data = record.to_json()
+    check_plain(data)
+    if len(json.dumps(data, indent=1, allow_nan=False)) > LARGEST_FILE:
+        raise ValueError(f"it has more than {LARGEST_FILE} bytes")
+    parse_record(data)
 
 
 def load_gait(record: RunRecord) -> Result:

@@ -11,13 +11,13 @@ from typing import Any
 
 from compare.study.definition import describe_differences
 from compare.study.evidence import check_records
-from compare.study.record import RunRecord, make_frame
+from compare.study.record import RunRecord, check_readable, make_frame
 from compare.study.record_files import find_record, locate_record, write_record
 from compare.study.run_task import PLANNED_RUNS, Run, run_task
 from compare.study.task import Task, check_task
 from compare.study.workers import run_jobs
 from nlp_gait.errors import GaitError, InputError, OutputError
-from nlp_gait.files import make_writable_folder, remove_leftovers
+from nlp_gait.files import convert_errors, make_writable_folder, remove_leftovers
 from nlp_gait.interrupts import Interrupted, delay_interrupts
 from nlp_gait.notebook import format_html_table
 from nlp_gait.progress import Progress
@@ -113,9 +113,14 @@ def run_study(
 
 
 def check_study(study: Study) -> None:
-    """Raise now what would fail in every run of a solver; see ``check_task``."""
-    for task in {(t.problem.title, t.title): t for t in study.tasks}.values():
+    """Raise now what would fail in every run of a solver, see ``check_task``, or make its records unreadable."""
+    by_run = sorted(study.tasks, key=lambda task: task.run)  # the last one has the largest seed
+    for task in {(t.problem.title, t.title): t for t in by_run}.values():
         check_task(task)
+        with convert_errors(
+            f"{task.title} on {task.problem.title}: its records could not be read", InputError, "change the value"
+        ):
+            check_readable(RunRecord.make_failed(task, "not run"))
 
 
 def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str, str, str]]]:

@@ -6,26 +6,28 @@ import json
 import math
 import multiprocessing
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from compare.judge import evaluate
-from compare.study.record import History, RunRecord, Times, Verdict, parse_record
+from compare.study.record import History, RunRecord, Times, Verdict, check_readable, parse_record
 from compare.study.task import IPOPT, Task, describe_settings
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import handling
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError, WorkerError
-from nlp_gait.files import LARGEST_FILE, replace_nan
+from nlp_gait.files import LARGEST_FILE, check_plain
 from nlp_gait.formulation.solution import Best
 from nlp_gait.processes import run_in_isolation
+from nlp_gait.working_folder import keep_working_folder
 
 Run = Callable[[Task, RunRecord | None], RunRecord]
 """Performs one run of a task, from the run that it polishes if it does; it is sent to worker processes."""
 
 MOST_REASON = 500  # characters of an error in a record
+MOST_HISTORY = 10_000  # entries of a history in a record, some 60 bytes each
 # A run that respects its time limit ends within it and is then judged; its process is killed this long after the limit.
 GRACE_S = 5.0
 # Number of runs of one solver for which compiling is weighed. The same number in every study: compiled and interpreted functions
@@ -51,10 +53,26 @@ def try_task(task: Task, start: RunRecord | None = None, run: Run = run_task) ->
 
 def _run_caught(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
     try:
-        return run(task, start)
-    except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split())[:MOST_REASON]
-        return RunRecord.make_failed(task, ": ".join(filter(None, (type(error).__name__, reason))))
+        record = run(task, start)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # user code may raise anything
+        return RunRecord.make_failed(task, _describe(error))
+    try:
+        check_readable(record)
+    except (TypeError, ValueError, RecursionError) as error:
+        return RunRecord.make_failed(task, f"its record could not be read again: {_describe(error)}")
+    return record
+
+
+def _describe(error: BaseException) -> str:
+    """Return the class and the text of an error in one line of valid UTF-8."""
+    try:
+        text = " ".join(str(error).split())[:MOST_REASON]
+    except Exception:
+        text = "its text cannot be read"
+    name = type(error).__name__
+    return (f"{name}: {text}" if text else name).encode("utf-8", "backslashreplace").decode()
 
 
 def _run_isolated(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
@@ -69,13 +87,13 @@ def _run_isolated(task: Task, start: RunRecord | None, run: Run) -> RunRecord:
     evaluate(problem, 0.5 * (problem.lower + problem.upper))
 
     def call() -> bytes:
-        return json.dumps(replace_nan(_run_caught(task, start, run).to_json()), allow_nan=False).encode()
+        return json.dumps(_run_caught(task, start, run).to_json(), allow_nan=False).encode()
 
     limit = task.stop.time_limit_s
     try:
-        record = parse_record(
-            json.loads(run_in_isolation(call, None if limit is None else limit + GRACE_S, LARGEST_FILE))
-        )
+        data = json.loads(run_in_isolation(call, None if limit is None else limit + GRACE_S, LARGEST_FILE))
+        check_plain(data)
+        record = parse_record(data)
     except TimeoutError:
         return RunRecord.make_failed(
             task, f"it did not return within {GRACE_S:g} s after the time limit of {limit:g} s"
@@ -96,22 +114,24 @@ def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
     objective = compile_objective(problem, threads=1)  # runs take the processors
     compiled = time.perf_counter()
     sign, stop = problem.objective.sign, task.stop
-    result = minimize(
-        objective,
-        task.make_search(),
-        evaluations=stop.evaluations,
-        seed=task.run_seed,
-        handling=handling(task.handling.name, **task.handling.settings),
-        target=None if stop.target is None else sign * stop.target,
-        stagnation=stop.stagnation,
-        time_limit_s=stop.time_limit_s,
-        callback=callback,
-    )
+    with keep_working_folder():  # as wrappers of external programs change it
+        result = minimize(
+            objective,
+            task.make_search(),
+            evaluations=stop.evaluations,
+            seed=task.run_seed,
+            handling=handling(task.handling.name, **task.handling.settings),
+            target=None if stop.target is None else sign * stop.target,
+            stagnation=stop.stagnation,
+            time_limit_s=stop.time_limit_s,
+            callback=callback,
+        )
     history = result.history
     best = [
         sign * float(f) if v == 0.0 and math.isfinite(f) else None
         for f, v in zip(history.objective, history.violation, strict=True)
     ]
+    kept = _choose_entries(best)
     return RunRecord.from_task(
         task,
         settings={**describe_settings(result.algorithm), "handling": describe_settings(result.handling)},
@@ -125,15 +145,25 @@ def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
         failed_evaluations=result.failed_evaluations,
         iterations=result.generations,
         active_constraints=(),
-        history=History(evaluations=tuple(int(e) for e in history.evaluations), objective=tuple(best)),
+        history=History(
+            evaluations=tuple(int(history.evaluations[k]) for k in kept), objective=tuple(best[k] for k in kept)
+        ),
         time_s=Times(
             build=built - started,
             compile=compiled - built,
             solve=result.time_s,
             objective=result.objective_time_s,
-            history=tuple(float(t) for t in history.elapsed_s),
+            history=tuple(float(history.elapsed_s[k]) for k in kept),
         ),
     )
+
+
+def _choose_entries(best: Sequence[float | None]) -> list[int]:
+    """Return which entries of a history to keep: all, or of a long one the changes, evenly thinned, and the last entry."""
+    if len(best) <= MOST_HISTORY:
+        return list(range(len(best)))
+    changes = [k for k in range(len(best)) if k == 0 or best[k] != best[k - 1]]
+    return sorted({*changes[:: math.ceil(len(changes) / MOST_HISTORY)], len(best) - 1})
 
 
 def _solve(task: Task, start: RunRecord | None) -> RunRecord:
@@ -164,6 +194,7 @@ def _solve(task: Task, start: RunRecord | None) -> RunRecord:
         Best(outcome.evaluations.f, outcome.objective if outcome.claimed else None, outcome.time_s),
     )
     history = [*earlier, *(Best(before + best.calls, best.objective, before_s + best.time_s) for best in own)]
+    history = [history[k] for k in _choose_entries([best.objective for best in history])]
     verdict = Verdict.from_evaluation(evaluate(problem, outcome.x))
     return RunRecord.from_task(
         task,

@@ -51,7 +51,7 @@ def run_jobs(
         while waiting:
             try:
                 calls = {position: partial(try_task, *job, run) for position, job in waiting.items()}
-                for position, record in run_in_processes(calls, -1 if scheduler else workers):
+                for position, record in run_in_processes(calls, -1 if scheduler else min(workers, len(calls))):
                     del waiting[position]
                     deaths = 0
                     yield position, record

@@ -44,6 +44,8 @@ class ExactModel:
         cost, violation, g, lower, upper, indexes = (
             np.array(value).ravel() for value in self.function(np.asarray(x), p)
         )
+        if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
+            violation = np.full(1, math.nan)
         named = dict(zip(self.index_names, indexes.tolist(), strict=True))
         return ExactValues(float(cost[0]), float(violation[0]), g, lower, upper, named)
 

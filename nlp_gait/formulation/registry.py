@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
-from casadi import Function, vertcat
+from casadi import MX, Function, vertcat
 
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
-from nlp_gait.formulation.assembly import Assembly
+from nlp_gait.files import check_path
+from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
@@ -235,7 +236,36 @@ def check_mathematics(problem: GaitProblem) -> None:
             raise InputError(
                 f"{owner}: {part} contains {free[0].name()!r}, which is neither a variable nor a parameter"
             )
+    _check_numbers(owner, problem, inputs, assembly)
+    _check_texts(owner, problem, assembly)
     if problem.hints.start is not None:
         start = np.asarray(problem.hints.start(problem.parameter_values, np.random.default_rng(0)))
         if start.shape != (len(problem.names),):
             raise InputError(f"{owner}: start must return {len(problem.names)} values, it returned shape {start.shape}")
+
+
+def _check_numbers(owner: str, problem: GaitProblem, inputs: Mapping[str, MX], assembly: Assembly) -> None:
+    """Check that no bound of a row is NaN at the current parameter values."""
+    for constraint in assembly.constraints:
+        for end in ("lower", "upper"):
+            bound = getattr(constraint, end)
+            if bound is None:
+                continue
+            values = Function("bound", list(inputs.values()), [vertcat(bound)])(problem.lower, problem.p)
+            if np.isnan(np.array(values)).any():
+                raise InputError(
+                    f"{owner}: constraint {constraint.name!r}: {end} is NaN; give a number, or leave it out for no bound"
+                )
+
+
+def _check_texts(owner: str, problem: GaitProblem, assembly: Assembly) -> None:
+    """Check that files, tables and axes can show all names and units."""
+    quantities: tuple[Variable | Parameter, ...] = (*problem.variables, *problem.own_parameters)
+    texts = [problem.objective.name, problem.objective.unit, *assembly.indexes]
+    texts += [text for quantity in quantities for text in (quantity.name, quantity.unit)]
+    texts += [text for group in assembly.constraints for text in (group.name, group.unit, *group.labels)]
+    for text in texts:
+        if not isinstance(text, str) or not text.isprintable() or "$" in text:  # a dollar begins a formula
+            raise InputError(f"{owner}: a name, label or unit must be printable text without '$', got {text!r}")
+    for text in (problem.title, *(quantity.description for quantity in quantities)):
+        check_path(text, f"{owner}: a description, {text[:60]!r}", InputError)

@@ -92,8 +92,8 @@ def test_what_it_sends_is_read_as_a_file_would_be(task: Task) -> None:
     good = RunRecord.make_failed(task, "").to_json()
     for sent, message in (
         (other, "failed: its process sent the record of another run"),
-        (Rubbish({**good, "iterations": "many"}), "failed: its process sent no record: "),
-        (Rubbish([]), "failed: its process sent no record: "),
+        (Rubbish({**good, "iterations": "many"}), "failed: its record could not be read again: "),
+        (Rubbish([]), "failed: its record could not be read again: "),
     ):
         run: Any = lambda *_, sent=sent: sent  # noqa: E731
         assert try_task(task, run=run).status.startswith(message)

@@ -1,0 +1,163 @@
+"""Whatever is written of a run can be read: anything that a run may return becomes a record, if need be that of a failed run."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from casadi import MX
+
+from compare.judge import evaluate
+from compare.study.record import History, RunRecord, Times, read_record
+from compare.study.record_files import read_records, write_record
+from compare.study.run_study import Study, check_study, run_study
+from compare.study.run_task import MOST_HISTORY, _choose_entries, try_task
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait.errors import GaitError, InputError
+from nlp_gait.formulation import GaitProblem, Objective
+from nlp_gait.formulation.registry import check_mathematics
+from tests.backends.toys import row, toy
+from tests.compare.records import judged
+
+TASK = Task(problem=ProblemSpec(name="walk12"), solver="random", stop=Stop(evaluations=50))
+TEXTS = ("caf\udce9.csv", "\x00\x1b[31m", "a\nb\u2028c", "$x$", "x" * 10**4, "=HYPERLINK(1)", "\ud83d", "", "\u202e")
+NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1.0, 2**63, 2**70, -(2**63) - 1, 10**400, True, None)
+
+
+def deep(levels: int) -> Any:
+    return [] if levels == 0 else [deep(levels - 1)]
+
+
+def hostile_results(record: RunRecord, seed: int) -> Iterator[Callable[[], RunRecord]]:
+    """Runs that return a record with a hostile part, or raise an error with one."""
+    draw = random.Random(seed)
+    values = (*TEXTS, *NUMBERS, deep(60), object(), b"x", {1: 2}, {"a": math.nan}, {"\udce9": 1.0})
+
+    def change(**parts: Any) -> Callable[[], RunRecord]:
+        return lambda: replace(record, **parts)
+
+    for value in values:
+        yield change(status=value)
+        yield change(settings={"kind": value})
+        yield change(x={**record.x, "lambda": value})
+        for name in ("claimed_objective", "failed_evaluations", "iterations", "claimed"):
+            yield change(**{name: value})
+        for name in ("objective", "violation", "feasible", "indexes", "violated"):
+            yield change(verdict=replace(record.verdict, **{name: value}))
+        yield change(evaluations={"f": value})
+        yield change(history=History(evaluations=(1,) * 2, objective=(1.0, value)), time_s=times(2))
+        yield change(history=History(evaluations=(1, draw.choice(values)), objective=(1.0, 1.0)), time_s=times(2))
+        yield change(time_s=Times.make_unknown(draw.choice(values), record.time_s.history))
+        yield lambda value=value: fail(RuntimeError(value))
+        yield lambda value=value: fail(type("Stop", (BaseException,), {"__str__": lambda self: value})())
+    yield lambda: fail(type("Mute", (Exception,), {"__str__": lambda self: 1 / 0})())
+    yield change(history=History(evaluations=(1,) * 20_000, objective=(1.0,) * 20_000), time_s=times(20_000))
+
+
+def times(entries: int) -> Times:
+    return Times.make_unknown(1.0, (0.5,) * entries)
+
+
+def fail(error: BaseException) -> RunRecord:
+    raise error
+
+
+@pytest.mark.slow
+def test_no_result_of_a_run_makes_a_record_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("compare.study.record.LARGEST_FILE", 2**20)
+    sound = judged("random", dict.fromkeys(TASK.problem.load().names, 0.1), problem="walk12")
+    attacks = list(hostile_results(sound, 1))
+    failed = 0
+    for make in attacks:
+        record = try_task(TASK, run=lambda task, start, make=make: make())
+        path = write_record(record, tmp_path)
+        read = read_record(path)
+        assert read.to_json() == json.loads(path.read_text(encoding="utf-8"))
+        failed += read.status.startswith("failed: ")
+    assert len(attacks) > 300 and 0.3 * len(attacks) < failed < len(attacks)
+
+
+def test_a_value_that_is_not_finite_at_a_feasible_point_is_a_failure(tmp_path: Path) -> None:
+    def make(x: MX, y: MX, limit: MX, ops: object) -> tuple[MX, tuple[Any, ...]]:
+        return (x - 9).log(), (row(x, upper=limit + 9),)
+
+    tasks = [
+        Task(problem=ProblemSpec(name=toy(make)), solver=name, run=k) for name in ("random", "slsqp") for k in (0, 1)
+    ]
+    tasks = [replace(task, stop=Stop(evaluations=60)) for task in tasks]
+    records = run_study(Study(tasks=tuple(tasks), folder=tmp_path))
+    assert ["without an objective" in record.status for record in records] == [True] * 4
+    assert not any(record.x for record in records)
+    assert len(read_records(tmp_path)) == 4
+
+
+@pytest.mark.parametrize("seed", [2**63, 2**63 - 1, 2**70, 10**30])
+def test_seeds_beyond_64_bits_are_rejected_before_the_work(seed: int) -> None:
+    tasks = tuple(replace(TASK, seed=seed, run=run) for run in (1, 0))
+    with pytest.raises(InputError, match="64 bits"):
+        check_study(Study(tasks=tasks))
+
+
+@pytest.mark.parametrize("value", [2**70, deep(60), "\udce9", {"a": "\ud83d"}])
+def test_settings_that_no_record_can_contain_are_rejected_before_the_work(tmp_path: Path, value: Any) -> None:
+    (tmp_path / "own.py").write_text("def search(f, lower, upper, evaluations, seed, setting): ...\n")
+    task = replace(TASK, solver=f"{tmp_path}/own.py:search", settings={"setting": value})
+    with pytest.raises(InputError):
+        check_study(Study(tasks=(task,)))
+
+
+@pytest.mark.parametrize("text", [text for text in TEXTS if "$" in text or not text.isprintable()])
+def test_names_and_units_that_no_file_or_axis_can_show_are_rejected_as_the_problem_is_made(text: str) -> None:
+    def check(problem: GaitProblem) -> None:
+        with pytest.raises(InputError, match="printable"):
+            check_mathematics(problem)
+
+    sound = toy(lambda x, y, limit, ops: (x * y, (row(x, upper=limit),)))
+    check_mathematics(sound)
+    check(replace(sound, objective=Objective(name="cost", unit=text)))
+    check(replace(sound, objective=Objective(name=text, unit="m")))
+    check(replace(sound, variables=(replace(sound.variables[0], unit=text), sound.variables[1])))
+    check(toy(lambda x, y, limit, ops: (x * y, (replace(row(x, upper=limit), name=text),))))
+    check(toy(lambda x, y, limit, ops: (x * y, (replace(row(x, upper=limit), labels=(text,)),))))
+
+
+@pytest.mark.parametrize("end", ["lower", "upper"])
+@pytest.mark.parametrize("bound", [lambda p: MX(math.nan), lambda p: MX(math.inf) - math.inf, lambda p: (p - 1).log()])
+def test_bounds_that_are_nan_are_rejected_or_never_satisfied(end: str, bound: Callable[[MX], MX]) -> None:
+    problem = toy(lambda x, y, limit, ops: (x * y, (row(x, **{end: bound(limit)}),)))
+    with pytest.raises(InputError, match=f"{end} is NaN"):
+        check_mathematics(problem)
+    assert not evaluate(problem, [0.1, 0.2]).feasible
+    later = toy(lambda x, y, limit, ops: (x * y, (row(x, **{end: limit.sqrt()}),))).with_values(limit=-1.0)
+    found = evaluate(later, [0.1, 0.2])
+    assert not found.feasible and math.isnan(found.violation)
+
+
+def test_long_histories_keep_their_changes_and_their_end() -> None:
+    assert _choose_entries([1.0] * MOST_HISTORY) == list(range(MOST_HISTORY))
+    flat: list[float | None] = [None] * 700_000 + [3.0] * 500_000 + [2.0] * 100_000
+    assert _choose_entries(flat) == [0, 700_000, 1_200_000, len(flat) - 1]
+    steady = _choose_entries([-float(k) for k in range(1_300_000)])
+    assert len(steady) <= MOST_HISTORY + 1 and steady[0] == 0 and steady[-1] == 1_299_999
+
+
+def test_an_algorithm_that_changes_the_working_folder_keeps_its_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own.py").write_text(
+        "import os, tempfile\ndef search(f, lower, upper, evaluations, seed):\n"
+        " with tempfile.TemporaryDirectory() as folder:\n  os.chdir(folder)\n  f(lower[None])\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    record = try_task(replace(TASK, solver="own.py:search"))
+    assert record.x and not record.status.startswith("failed"), record.status
+    with pytest.raises(GaitError):
+        check_study(Study(tasks=(replace(TASK, solver="gone.py:search"),)))
+    assert Path(os.getcwd()) == tmp_path
