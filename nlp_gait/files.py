@@ -13,6 +13,7 @@ import io
 import json
 import math
 import os
+import re
 import secrets
 import stat
 import tempfile
@@ -32,6 +33,8 @@ SHOWN = 60  # characters of a value in a message
 BYTE_ORDER_MARK = "\ufeff"
 # Writing takes far less, so an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
+TEMPORARY = re.compile(r"\.[0-9a-f]{16}\.tmp")
+FORMULA = tuple("=+-@")  # a spreadsheet computes a cell that begins with one of these
 
 
 def make_file_name(name: str) -> str:
@@ -110,10 +113,27 @@ def write_text(path: Path, text: str) -> None:
 
 
 def format_csv(rows: Iterable[Sequence[object]]) -> str:
-    """Return rows as comma-separated values, cells quoted where necessary, lines ended by a line feed."""
+    """Return rows as comma-separated values, cells quoted where necessary, lines ended by a line feed.
+
+    A text that a spreadsheet would compute as a formula gets an apostrophe in front.
+    """
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([_escape_formula(cell) for cell in row] for row in rows)
     return text.getvalue()
+
+
+def _escape_formula(cell: object) -> object:
+    if not isinstance(cell, str) or cell in FORMULA or not cell.lstrip().startswith(FORMULA) or _is_number(cell):
+        return cell
+    return f"'{cell}"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -240,6 +260,8 @@ def make_writable_folder(path: Path) -> Path:
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of ``replace_file`` that a killed process left; files that may be in use stay."""
     for path in folder.glob(".*.tmp"):
+        if not TEMPORARY.fullmatch(path.name):
+            continue  # of another program
         try:
             if abs(time.time() - path.stat().st_mtime) > LEFTOVER_AGE_S:  # also from the future: the clock was set back
                 path.unlink(missing_ok=True)

@@ -13,13 +13,17 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.statistics.run_length import (
+    ZERO,
     Curve,
     Weighting,
     expected_running_time,
     find_best_known,
+    is_zero,
     make_curve,
     relative_gap,
+    tie,
 )
+from compare.analysis.units import percent, with_unit
 from compare.study.definition import describe_edition, select_shared
 from compare.study.record import RunRecord
 from compare.study.references import BETTER, Reference, find_reference
@@ -105,8 +109,19 @@ class Comparison:
         """Return a cost as an objective in the problem's sense."""
         return self.objective.sign * cost
 
+    @property
+    def tied_costs(self) -> list[list[float]]:
+        """Costs of the runs of each solver, equal where they differ by no more than the judge's tolerance."""
+        return tie([solver.costs for solver in self.solvers], self.reference)
+
+    def format_gap(self, gap: float | None) -> str:
+        """Format a gap in percent, or in the objective's unit where the best known value is near zero."""
+        if gap is None or not math.isfinite(gap) or not is_zero(self.reference):
+            return percent(gap)
+        return f"below {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
+
     def gap(self, cost: float) -> float:
-        """Return the relative distance of a cost from the best known objective; 0 if better within the feasibility tolerance."""
+        """Return the distance of a cost from the best known objective, see ``relative_gap``; 0 if better within the tolerance."""
         gap = relative_gap(self.value(cost), self.reference, self.objective)
         return 0.0 if -BETTER <= gap < 0.0 else gap
 

@@ -13,7 +13,6 @@ from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import seconds, with_unit
 from compare.study.record import RunRecord
 
-ROUNDING = 1e-12  # a share below this is shown as zero
 HEADER = (
     "solver",
     "runs",
@@ -101,7 +100,7 @@ def format_cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, .
         f"{summary.feasible}/{summary.runs}",
         "-" if summary.guaranteed is None else f"{summary.guaranteed}/{summary.runs}",
         *(with_unit(value, comparison.objective.unit) for value in values),
-        percent(summary.gap),
+        comparison.format_gap(summary.gap),
         count(summary.evaluations),
         seconds(summary.time_s),
     )
@@ -109,15 +108,6 @@ def format_cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, .
 
 def _if_known(statistic: Callable[[list[float]], float], values: list[float]) -> float:
     return math.nan if any(math.isnan(value) for value in values) else statistic(values)
-
-
-def percent(share: float | None) -> str:
-    """Format a share in percent, with four decimals or in scientific notation."""
-    if share is None or not math.isfinite(share):
-        return "-"
-    if abs(share) < ROUNDING:
-        return "0.0000 %"
-    return f"{100 * share:z.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
 
 
 def count(number: float) -> str:

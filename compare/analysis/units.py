@@ -11,6 +11,10 @@ from typing import NamedTuple
 
 from nlp_gait.formulation import GaitProblem, Parameter
 
+ROUNDING = 1e-12  # a share below this is shown as zero
+SIX_DECIMALS = ".6f"
+SMALL, LARGE = 5e-7, 1e12  # six decimals show zero for less, and digits without a meaning for more
+
 
 def number(value: float, digits: str) -> str:
     """Format a number; a value rounded to zero has no sign."""
@@ -20,11 +24,22 @@ def number(value: float, digits: str) -> str:
     return f"{value:{sign}z{digits.removeprefix(sign)}}"
 
 
-def with_unit(value: float | None, unit: str, digits: str = ".6f") -> str:
+def with_unit(value: float | None, unit: str, digits: str = SIX_DECIMALS) -> str:
     """Format a value with its unit, for example ``0.845868 W``; a dash for None."""
     if value is None:
         return "-"
+    if digits == SIX_DECIMALS and value and math.isfinite(value) and not SMALL <= abs(value) < LARGE:
+        digits = ".3g"
     return number(value, digits) + ("" if unit == "1" else f" {unit}")
+
+
+def percent(share: float | None) -> str:
+    """Format a share in percent, with four decimals or in scientific notation."""
+    if share is None or not math.isfinite(share):
+        return "-"
+    if abs(share) < ROUNDING:
+        return "0.0000 %"
+    return f"{100 * share:z.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
 
 
 def seconds(value: float, digits: str = ".3f") -> str:

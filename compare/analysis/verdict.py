@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.solver_table import count, percent
+from compare.analysis.solver_table import count
 from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
-from compare.analysis.statistics.run_length import relative_gap
-from compare.analysis.units import join_words, with_unit
+from compare.analysis.statistics.run_length import is_zero, relative_gap
+from compare.analysis.units import join_words, percent, with_unit
 from compare.study.record import RunRecord
 from compare.study.references import OWN, Reference
 from compare.study.task import FUNCTION
@@ -36,8 +36,9 @@ class Pair:
 
 
 def compare_pairs(comparison: Comparison) -> list[Pair]:
-    """Test every pair of solvers with at least two runs each."""
-    pairs = list(combinations([s for s in comparison.solvers if len(s.records) > 1], 2))
+    """Test every pair of solvers with at least two runs each; differences within the judge's tolerance are ties."""
+    tied = [replace(s, costs=tuple(c)) for s, c in zip(comparison.solvers, comparison.tied_costs, strict=True)]
+    pairs = list(combinations([s for s in tied if len(s.records) > 1], 2))
     if not pairs:
         return []
     sums = holm([rank_sum(a.costs, b.costs) for a, b in pairs])
@@ -109,7 +110,7 @@ def _distance(comparison: Comparison) -> str:
     parts = []
     for solver in comparison.solvers:
         gap = comparison.gap(solver.median_cost)
-        parts.append(f"{solver.name} {percent(gap) if math.isfinite(gap) else 'mostly infeasible'}")
+        parts.append(f"{solver.name} {comparison.format_gap(gap) if math.isfinite(gap) else 'mostly infeasible'}")
     pairs = compare_pairs(comparison)
     different = sum(pair.rank_sum < SIGNIFICANT for pair in pairs)
     tests = f" ({different} of {len(pairs)} pairs differ at the 5 % level, Holm-corrected)" if pairs else ""
@@ -162,5 +163,7 @@ def describe_value(known: Reference, value: float, objective: Objective) -> str:
 
 def describe_bound(bound: float, best: float, unit: str) -> str:
     """Describe a proven bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``."""
+    if is_zero(best):
+        return f"no feasible point is better than {with_unit(bound, unit)} (proven)"
     gap = 100 * abs(bound - best) / abs(best)
     return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"

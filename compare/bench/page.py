@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.solver_table import count, percent
+from compare.analysis.solver_table import count
 from compare.analysis.statistics.run_length import TARGETS
 from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard
@@ -103,7 +103,7 @@ def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]
     runs = next(s for s in comparison.solvers if s.name == solver)
     rank = 1 + sum(cost < costs[solver] for cost in costs.values())
     place = str(rank) if math.isfinite(costs[solver]) else "-"
-    return (*row, percent(comparison.gap(runs.median_cost)), count(costs[solver]), place)
+    return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), count(costs[solver]), place)
 
 
 def _make_duels(board: Leaderboard, solver: str) -> Section:

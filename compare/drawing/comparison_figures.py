@@ -11,13 +11,14 @@ from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS, compute_band, ecdf, performance_profile
 from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Relative gaps below this are drawn at this value: solvers' tolerances are near it.
-SMALLEST_GAP = 1e-8
+SMALLEST_GAP = FEASIBILITY_TOLERANCE
 GRID_POINTS = 300
 Draw = Callable[["Axes", SolverRuns, Look, str], None]
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}

@@ -9,9 +9,8 @@ from functools import cache
 from typing import Any, TypeVar
 
 from compare.analysis.comparison import read_objective
-from compare.analysis.solver_table import percent
 from compare.analysis.statistics.run_length import find_best_known, relative_gap
-from compare.analysis.units import with_unit
+from compare.analysis.units import percent, with_unit
 from compare.report.document import Document, Prose, Section, Table, text_table
 from compare.study.citations import cite_problems
 from compare.study.manifest import Session

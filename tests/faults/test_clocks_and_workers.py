@@ -43,7 +43,7 @@ def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path)
     task = Task(problem=WALK, solver="pso", stop=STOP)
     run_study(Study(tasks=(task,), folder=tmp_path))
     (record,) = tmp_path.glob("records/*/*.json")
-    leftover = record.with_name(".abc.tmp")
+    leftover = record.with_name(".0123456789abcdef.tmp")
     leftover.write_text("{")
     ahead = time.time() + 86_400.0
     for path in (record, leftover):
@@ -51,7 +51,7 @@ def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path)
     kept: list[int] = []
     run_study(Study(tasks=(task,), folder=tmp_path), on_stored=kept.append)
     assert kept == [1] and record.stat().st_mtime == pytest.approx(ahead) and not leftover.exists()
-    fresh = tmp_path / ".def.tmp"
+    fresh = tmp_path / ".fedcba9876543210.tmp"
     fresh.write_text("{")
     remove_leftovers(tmp_path)
     assert fresh.exists()  # another process may be writing it

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import stat
 from pathlib import Path
@@ -13,7 +15,7 @@ from matplotlib.figure import Figure
 from compare.drawing.figures import save
 from nlp_gait.errors import OutputError
 from nlp_gait.export.formats import write_npz
-from nlp_gait.files import replace_file, write_text
+from nlp_gait.files import format_csv, replace_file, write_text
 from nlp_gait.formulation import Signals
 from nlp_gait.simulation.film.video import write_video
 
@@ -93,3 +95,13 @@ def test_nothing_is_left_when_writing_fails(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot write"):
         write_text(tmp_path / "a.txt", "half a character: \ud800")
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"] and (tmp_path / "a.txt").read_text() == "old"
+
+
+@pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\t=", " =", "\n@"])
+def test_no_cell_of_a_table_is_a_formula(sign: str) -> None:
+    """A spreadsheet computes what begins like one: statuses, labels and names come from user code."""
+    for text in (f"{sign}HYPERLINK(1)", f"{sign}cmd|'/C calc'!A0", f"{sign}1+1"):
+        ((cell, other),) = csv.reader(io.StringIO(format_csv([[text, "plain"]]), newline=""))
+        assert cell == f"'{text}" and other == "plain"
+    numbers = ["-1.5", "+2", "-1e-300", "-inf", "-", "1", -1.5, True]
+    assert format_csv([numbers]) == "-1.5,+2,-1e-300,-inf,-,1,-1.5,True\n"

@@ -10,9 +10,11 @@ import numpy as np
 
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Array, Objective
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 # Relative distances from the best known objective for which reports give the expected running time.
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
+ZERO = 1e-8  # gaps from a smaller reference are absolute
 # Targets of the distribution: from 100 % above the best known to 1e-6, evenly in logarithm.
 ECDF_TARGETS: tuple[float, ...] = tuple(float(target) for target in np.logspace(0, -6, 31))
 
@@ -83,10 +85,30 @@ def make_curve(record: RunRecord, objective: Objective, reference: float, weight
 
 
 def relative_gap(value: float, reference: float, objective: Objective) -> float:
-    """Return (value - reference) / |reference|, or the difference if it is 0; positive if worse, infinite for NaN."""
+    """Return (value - reference) / |reference|, or the difference if ``is_zero``; positive if worse, infinite for NaN."""
     if math.isnan(value) or math.isnan(reference):
         return math.inf
-    return objective.sign * (value - reference) / (abs(reference) or 1.0)
+    return objective.sign * (value - reference) / (1.0 if is_zero(reference) else abs(reference))
+
+
+def is_zero(reference: float) -> bool:
+    """Return whether a reference is so near zero that gaps from it are absolute, in the unit of the objective."""
+    return abs(reference) < ZERO
+
+
+def tie(samples: Sequence[Sequence[float]], reference: float) -> list[list[float]]:
+    """Return samples of costs in which those that differ by at most the judge's tolerance are equal.
+
+    Every cost becomes the least one of its group; a group begins at the least cost that belongs to no earlier one. Infinite costs
+    stay. The tolerance is relative to the reference, absolute if that is near zero.
+    """
+    tolerance = FEASIBILITY_TOLERANCE * (1.0 if is_zero(reference) or math.isnan(reference) else abs(reference))
+    least: dict[float, float] = {}
+    begin = -math.inf
+    for cost in sorted({cost for sample in samples for cost in sample}):
+        begin = begin if cost - begin <= tolerance else cost
+        least[cost] = begin
+    return [[least[cost] for cost in sample] for sample in samples]
 
 
 def find_best_known(records: Sequence[RunRecord], objective: Objective) -> float:

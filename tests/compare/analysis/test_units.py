@@ -28,6 +28,10 @@ def test_what_is_rounded_to_zero_has_no_sign(value: float, digits: str, shown: s
 
 
 def test_units_follow_numbers() -> None:
-    assert with_unit(-1e-9, "W") == "0.000000 W" and with_unit(-1e-9, "1", "g") == "-1e-09"
+    assert (
+        with_unit(-1e-9, "W", ".3f") == "0.000 W"
+        and with_unit(-1e-9, "W") == "-1e-09 W"
+        and with_unit(-1e-9, "1", "g") == "-1e-09"
+    )
     assert millimetres(-1e-6) == "0.0 mm" and millimetres(None) == "-"
     assert seconds(-0.0) == "0.000 s" and seconds(math.nan) == "-"

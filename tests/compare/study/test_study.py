@@ -274,13 +274,15 @@ def test_bad_study_files_are_one_sentence(change: tuple[str, str], message: str,
 def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
     from nlp_gait.files import remove_leftovers
 
-    old, new, record = (tmp_path / name for name in (".a.json.1.tmp", ".b.json.2.tmp", "c.json"))
-    for path in (old, new, record):
+    old, new, record = (tmp_path / name for name in (".0123456789abcdef.tmp", ".1123456789abcdef.tmp", "c.json"))
+    others = [".mywork.tmp", ".notes.tmp", ".0123456789abcdeF.tmp", ".0123456789abcdef0.tmp", "0123456789abcdef.tmp"]
+    for path in (old, new, record, *(tmp_path / name for name in others)):
         path.write_text("")
     long_ago = time.time() - 3600
-    os.utime(old, (long_ago, long_ago))
+    for path in (old, *(tmp_path / name for name in others)):
+        os.utime(path, (long_ago, long_ago))
     remove_leftovers(tmp_path)
-    assert sorted(tmp_path.iterdir()) == [new, record]
+    assert {path.name for path in tmp_path.iterdir()} == {new.name, record.name, *others}
 
 
 def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(

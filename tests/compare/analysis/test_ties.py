@@ -1,0 +1,89 @@
+"""Differences below the judge's tolerance are ties, and gaps from an optimum near zero are absolute."""
+
+from __future__ import annotations
+
+import math
+import random
+import re
+
+import pytest
+
+from compare.analysis.comparison import compare_problems
+from compare.analysis.statistics.run_length import ZERO, relative_gap, tie
+from compare.analysis.units import percent, with_unit
+from compare.analysis.verdict import compare_pairs, write_verdict
+from compare.study.record import RunRecord
+from nlp_gait.formulation import Objective
+from tests.compare.records import record
+
+POWER = Objective(name="power", unit="W")
+NOISE = [1e-16, 1e-13, 1e-11, 1e-9, 1e-8, 4e-7]  # below the tolerance of 1e-6
+
+
+def study(values: dict[str, list[float]], problem: str = "walk") -> list[RunRecord]:
+    return [
+        record(solver, run, [(10, value)], problem=problem)
+        for solver, costs in values.items()
+        for run, value in enumerate(costs)
+    ]
+
+
+@pytest.mark.parametrize("noise", NOISE)
+@pytest.mark.parametrize("optimum", [1.0, -250.0, 3e-4, 1e12])
+def test_noise_is_no_difference(noise: float, optimum: float) -> None:
+    draw = random.Random(f"{noise} {optimum}")
+    near = {name: [optimum + draw.random() * size * noise * abs(optimum) for _ in range(20)] for name, size in
+            (("a", 0.1), ("b", 1.0), ("c", 0.5))}  # fmt: skip
+    (comparison,) = compare_problems(study(near))
+    assert all(pair.rank_sum == 1.0 and pair.a12 == 0.5 for pair in compare_pairs(comparison))
+    assert "(0 of 3 pairs differ" in write_verdict([comparison])[1]
+
+
+@pytest.mark.parametrize("optimum", [1.0, 1e-20, 0.0])
+def test_differences_above_the_tolerance_are_differences(optimum: float) -> None:
+    far = {"a": [optimum + 1e-9 * k for k in range(20)], "b": [optimum + 3e-6 + 1e-9 * k for k in range(20)]}
+    (pair,) = compare_pairs(compare_problems(study(far))[0])
+    assert pair.rank_sum < 1e-6 and pair.a12 == 1.0
+
+
+@pytest.mark.parametrize("best", [0.0, 1e-300, 1e-26, -1e-17, 9e-9])
+def test_near_zero_the_verdict_has_absolute_gaps(best: float) -> None:
+    draw = random.Random(repr(best))
+    runs = {"a": [best, best + 1e-12], "b": [best + draw.random() * 1e-9] * 2, "c": [best + 0.025] * 2}
+    (comparison,) = compare_problems(study(runs))
+    sentences = write_verdict([comparison])
+    assert "reached to 1e-6 by a in 2 of 2 runs and b in 2 of 2 runs" in sentences[0]
+    assert re.search(r"a below 1e-08, b below 1e-08 and c 0\.025 W", sentences[1]), sentences[1]
+    assert "never by c" in sentences[2] and "a 10 evaluations" in sentences[2]
+    assert not re.search(r"\d{7}", " ".join(sentences))
+    assert relative_gap(best + 0.5, best, POWER) == pytest.approx(0.5)
+
+
+def test_relative_gaps_begin_at_the_floor() -> None:
+    assert relative_gap(3 * ZERO, 2 * ZERO, POWER) == pytest.approx(0.5)
+    assert relative_gap(1.5 * ZERO, 0.5 * ZERO, POWER) == pytest.approx(ZERO)
+
+
+def test_ties_keep_the_order_of_all_other_values() -> None:
+    draw = random.Random(5)
+    for _ in range(200):
+        scale = 10.0 ** draw.uniform(-6, 6)
+        costs = [scale * (1 + draw.choice([0, 1e-9, 1e-7, 1e-5, 1.0]) * draw.random()) for _ in range(12)] + [math.inf]
+        tied = tie([costs[:6], costs[6:]], scale)
+        flat = [*tied[0], *tied[1]]
+        for a, b, c, d in zip(costs, flat, costs[1:], flat[1:], strict=False):
+            assert (a < c) <= (b <= d) and (b == a or 0.0 < a - b <= 1e-6 * scale)
+            assert a == c or abs(a - c) <= 1e-6 * scale or b != d
+    assert flat[-1] == math.inf and tie([[math.inf], [math.inf]], math.nan) == [[math.inf], [math.inf]]
+
+
+VALUES = [(0.0, "0.000000 W"), (1e-16, "1e-16 W"), (-2e-9, "-2e-09 W"), (1e267, "1e+267 W"), (0.8458681, "0.845868 W")]
+
+
+@pytest.mark.parametrize(("value", "text"), VALUES)
+def test_values_near_zero_and_huge_ones_have_digits_that_mean_something(value: float, text: str) -> None:
+    assert with_unit(value, "W") == text
+
+
+def test_percent_of_nothing() -> None:
+    assert percent(None) == percent(math.inf) == "-"
