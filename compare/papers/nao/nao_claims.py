@@ -143,7 +143,7 @@ def _check_velocity(phase: PhaseFindings, printed: VelocityRange) -> Check:
     optimum = np.array([phase.optimum.x[name] for name in names])
     ends = np.array([[run.x[name] for name in names] for runs in phase.searches.values() for run in runs])
     near = [
-        f"{symbol} = {best:z.4f} ({low:z.4f} to {high:z.4f})"
+        f"{symbol} = {best:z.4f} ({f'{low:z.4f} to {high:z.4f}' if math.isfinite(low) else 'no point of the sweep'})"
         for symbol, best, (low, high) in zip(
             symbols, optimum, (phase.range_within(i, NEARLY_OPTIMAL) for i in printed.variables), strict=True
         )

@@ -71,7 +71,7 @@ def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
     """Figs. 10 to 14, 16 to 19: power against each variable over all feasible solutions, with IPOPT's optimum as a line."""
     figure = new_figure(7.5, 0.5 + 2.1 * len(positions))
     grid = figure.subplots(len(positions), len(SEARCHES), sharey=True, sharex="row", squeeze=False)
-    for row, position in zip(grid, positions, strict=True):
+    for k, (row, position) in enumerate(zip(grid, positions, strict=True)):
         variable = phase.problem.variables[position]
         label = rf"$x_{{{position + 1}}}$: {axis_label(variable.name, variable.unit)}"
         for axes, name in zip(row, SEARCHES, strict=True):
@@ -79,7 +79,8 @@ def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
             _plot_optima(axes, phase, position)
             axes.set_xlabel(label)
             axes.locator_params(axis="x", nbins=4)
-            axes.set_title(f"{NAMES[name]}: {len(phase.points[name].power_W)} solutions", fontsize="small")
+            if k == 0:
+                axes.set_title(f"{NAMES[name]}: {len(phase.points[name].power_W)} solutions", fontsize="small")
             _scale_power(axes)
         for axes in row[1:]:
             axes.set_ylabel("")

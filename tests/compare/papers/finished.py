@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +35,12 @@ class Finished:
         return (self.folder / "report.md").read_text()
 
 
-def reproduce(paper: str, folder: Path, *, coarse: bool = False, **changes: Any) -> Finished:
+def reproduce(
+    paper: str, folder: Path, *, coarse: bool = False, drawn: Collection[str] = (), **changes: Any
+) -> Finished:
     """Run in this process, since workers would build every problem again; coarse pictures are drawn once and small.
+
+    ``drawn`` are the only ones that are drawn, if it names any; others, of the same kinds, are not drawn.
 
     ``changes`` are those of the quick effort.
     """
@@ -42,7 +48,7 @@ def reproduce(paper: str, folder: Path, *, coarse: bool = False, **changes: Any)
     finished = Finished(paper=paper, folder=folder, effort=replace(reproduction.quick, **changes))
     with pytest.MonkeyPatch.context() as patch:
         if coarse:
-            patch.setattr(writing, "save", save_coarsely)
+            patch.setattr(writing, "save", partial(save_coarsely, drawn=drawn))
         finished.findings = reproduction.reproduce(folder, finished.effort, finished.progress.append, jobs=1)
     return finished
 

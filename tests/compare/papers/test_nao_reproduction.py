@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
+from compare.papers.nao import nao_runs
 from compare.papers.nao.nao_dh import compare_geometry
 from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import DSP, PHASES, SSP
@@ -17,21 +18,26 @@ from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a1
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.papers.nao.nao_torque_changes import compute_torque_changes
 from compare.study.record import RunRecord, read_record
+from compare.study.task import ProblemSpec
 from nlp_gait.formulation import GaitProblem
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    effort: dict[str, Any] = {
-        "intervals": 4,
-        "runs": 3,
-        "variant_runs": 1,
-        "evaluations": 600,
-        "starts": 1,
-        "choices": ("lever",),
-    }
-    return reproduce("nao", tmp_path_factory.mktemp("nao"), coarse=True, **effort, sweep_points=(0, 0))
+    """The least work; of the two printed solutions of a phase one is simulated for both."""
+    effort: dict[str, Any] = {"intervals": 3, "runs": 2, "variant_runs": 1, "evaluations": 600, "starts": 1}
+    real, known = nao_runs.simulate_solution, dict[str, Any]()
+
+    def simulate_once(spec: ProblemSpec, x: Sequence[float]) -> dict[str, Any]:
+        known[spec.title] = known.get(spec.title) or real(spec, x)
+        return dict(known[spec.title])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nao_runs, "simulate_solution", simulate_once)
+        folder = tmp_path_factory.mktemp("nao")
+        drawn = ("fig09", "fig10", "fig20a", "swing-height")
+        return reproduce("nao", folder, coarse=True, drawn=drawn, **effort, choices=("lever",), sweep_points=(0, 0))
 
 
 def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
@@ -45,12 +51,12 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
 
 def test_every_feasible_solution_is_stored(finished: Finished) -> None:
     findings = finished.findings
-    with np.load(finished.folder / "store" / "points" / "nao-dsp-ga-02.npz") as archive:
+    with np.load(finished.folder / "store" / "points" / "nao-dsp-ga-01.npz") as archive:
         x, power = archive["x"], archive["power_W"]
     f, violation = nlp_gait.compile_objective(findings.dsp.problem)(x)
     assert len(x) > 20 and np.all(violation == 0.0)
     np.testing.assert_allclose(f, power, rtol=1e-12)
-    assert power.min() == pytest.approx(findings.dsp.searches["ga"][2].verdict.objective, rel=1e-9)
+    assert power.min() == pytest.approx(findings.dsp.searches["ga"][1].verdict.objective, rel=1e-9)
 
 
 def test_paired_runs_start_alike(finished: Finished) -> None:
