@@ -141,6 +141,27 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
+_inputs: set[Path] = set()
+
+
+def protect_inputs(paths: Iterable[Path]) -> None:
+    """Let no function write to these files, the inputs of a command, any more; those of an earlier command are released."""
+    _inputs.clear()
+    for path in paths:
+        _inputs.update((_find_place(path), path.resolve()))
+
+
+def check_output(path: Path) -> None:
+    """Check that a path is no input of this command; raises OutputError."""
+    if _inputs and _find_place(path) in _inputs:
+        raise OutputError(f"cannot write {str(path)!r}: this command reads it; name another file")
+
+
+def _find_place(path: Path) -> Path:
+    """Return the absolute place of a name, which may be a link."""
+    return path.parent.resolve() / path.name
+
+
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
     """Yield a new empty file next to ``path`` with a hidden name in ``.tmp``, which replaces ``path`` at the end.
@@ -150,6 +171,7 @@ def replace_file(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: no space, no permission, no folder.
     """
+    check_output(path)
     temporary = None
     try:
         with convert_errors(f"cannot write {str(path)!r}", OutputError):

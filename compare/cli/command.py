@@ -15,8 +15,10 @@ import os
 import select
 import sys
 import unicodedata
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 import typer
@@ -24,11 +26,14 @@ import typer
 from compare.cli.common import end_interrupted, fail, say_error
 from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError
+from nlp_gait.files import protect_inputs
 from nlp_gait.interrupts import raise_interrupts
 
 R = TypeVar("R")
 
 PLAIN = "nlp-gait-plain"  # error handler for characters that an output cannot encode
+# Parameters that name what a command writes.
+OUTPUTS = ("out", "to", "table", "signals", "video")
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
@@ -42,6 +47,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     def run(**given: Any) -> R:
         try:
             with raise_interrupts():
+                protect_inputs(_find_inputs(given))
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
                 result = function(**given)
@@ -62,6 +68,18 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     return run
+
+
+def _find_inputs(given: Mapping[str, Any]) -> Iterator[Path]:
+    """Yield the existing files that arguments name: alone, as the value of an option, or as the file of user code."""
+    for name, value in given.items():
+        for text in value if isinstance(value, (list, tuple)) else [value]:
+            if name in OUTPUTS or not isinstance(text, (str, Path)):
+                continue
+            for part in (str(text), str(text).partition("=")[2], str(text).rpartition(":")[0]):
+                with suppress(OSError, ValueError):  # a name that is too long, or none
+                    if part and Path(part).is_file():
+                        yield Path(part)
 
 
 def _options(group: Any) -> Iterator[inspect.Parameter]:

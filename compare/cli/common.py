@@ -20,7 +20,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import check_name, make_writable_folder, replace_nan
+from nlp_gait.files import check_name, check_output, make_writable_folder, replace_nan
 from nlp_gait.interrupts import Interrupted
 
 if TYPE_CHECKING:
@@ -216,6 +216,7 @@ class _Log:
 def output_file(path: Path) -> Path:
     """Check before the work that a path can be written to, and return it."""
     check_name(path)
+    check_output(path)
     make_writable_folder(path.parent)
     try:
         if path.is_dir():

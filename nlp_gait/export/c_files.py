@@ -6,7 +6,11 @@ from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from nlp_gait.errors import OutputError
 from nlp_gait.files import make_writable_folder, write_text
+
+MARK = b"nlp-gait"  # in the first lines of every file that is written
+LARGEST_MARKED = 4096  # bytes
 
 
 def write_c_files(
@@ -22,7 +26,7 @@ def write_c_files(
         source: of ``{prefix}.cpp``.
 
     Raises:
-        OutputError: the folder cannot be written to.
+        OutputError: the folder cannot be written to, or has a file of another program under one of the names.
     """
     native, prefix = files(package) / "native", words["PREFIX"]
     texts = {f"{prefix}.cpp": source}
@@ -32,6 +36,9 @@ def write_c_files(
             text = text.replace(f"@{word}@", value)
         texts[name.format(prefix=prefix)] = text
     paths = {make_writable_folder(folder) / name: text for name, text in texts.items()}
+    for path in paths:
+        if path.is_file() and MARK not in path.read_bytes()[:LARGEST_MARKED]:
+            raise OutputError(f"cannot write {str(path)!r}: nlp-gait did not write this file; name another folder")
     for path, text in paths.items():
         write_text(path, text)
     return list(paths)

@@ -1,0 +1,77 @@
+"""No command writes over a file that it reads, nor over a file of another program in an exported folder."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from nlp_gait import gaitbench
+from nlp_gait.errors import OutputError
+from nlp_gait.files import protect_inputs, write_text
+from nlp_gait.gaitbench.c_export import export_objective
+from tests.robots.custom import humanoid
+
+RUN = CliRunner()
+EXAMPLE = Path(__file__).parents[2] / "examples" / "bring_your_own.py"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a robot, a source file, points and a result."""
+    monkeypatch.chdir(tmp_path)
+    Path("my.json").write_text(json.dumps(humanoid()))
+    shutil.copy(EXAMPLE, "byo.py")
+    names = RUN.invoke(app, ["list", "walk12", "--json"])
+    variables = [variable["name"] for variable in json.loads(names.stdout)["variables"]]
+    Path("p.csv").write_text(",".join(variables) + "\n" + ",".join(["0.1"] * len(variables)) + "\n")
+    Path("w.json").write_text(json.dumps({"problem": "walk12", "x": dict.fromkeys(variables, 0.1)}))
+    Path("link.json").symlink_to("my.json")
+    return tmp_path
+
+
+CALLS = [
+    ("solve nao-dsp --robot my.json --starts 1 --out my.json", "my.json"),
+    ("solve nao-dsp --robot link.json --starts 1 --out my.json", "my.json"),
+    ("solve nao-dsp --option robot=my.json --starts 1 --out ./my.json", "my.json"),
+    ("list --robot my.json --out my.json", "my.json"),
+    ("solve byo.py:two_link --starts 1 --out byo.py", "byo.py"),
+    ("evaluate walk12 --x p.csv --csv p.csv", "p.csv"),
+    ("evaluate walk12 --x p.csv --csv ../{name}/p.csv", "p.csv"),
+    ("export w.json --format json --out w.json", "w.json"),
+    ("animate w.json --out w.json", "w.json"),
+]
+
+
+@pytest.mark.parametrize(("call", "name"), CALLS)
+def test_no_command_writes_over_its_input(call: str, name: str, folder: Path) -> None:
+    before = Path(name).read_bytes()
+    done = RUN.invoke(app, call.format(name=folder.name).split())
+    assert done.exit_code == 1 and "this command reads it; name another file" in done.stderr, done.output
+    assert done.stderr.count("\n") == 1 and Path(name).read_bytes() == before
+
+
+def test_the_next_command_may_write_the_file(folder: Path) -> None:
+    protect_inputs([folder / "w.json"])
+    with pytest.raises(OutputError, match="this command reads it"):
+        write_text(folder / "w.json", "")
+    assert RUN.invoke(app, ["evaluate", "walk12", "--x", "p.csv", "--csv", "w.json"]).exit_code == 0
+    protect_inputs([])
+    write_text(folder / "w.json", "")
+
+
+def test_an_exported_folder_keeps_files_of_others(tmp_path: Path) -> None:
+    instance = gaitbench.load("walk12-w100")
+    names = [path.name for path in export_objective(instance, tmp_path / "first")]
+    export_objective(instance, tmp_path / "first")  # its own files are replaced
+    for k, name in enumerate(names):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        (folder / name).write_text("#include <stdio.h>\nint main(void) { return 0; }\n")
+        with pytest.raises(OutputError, match="did not write this file"):
+            export_objective(instance, folder)
+        assert [path.name for path in folder.iterdir()] == [name]
