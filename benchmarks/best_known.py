@@ -1,6 +1,6 @@
 """Collect the best known value of every problem and instance: ``python -m benchmarks.best_known``.
 
-Sources are the facts of GaitBench, the certificates, ``docs/difficulty.json`` and the files ``better-*.json`` given as arguments.
+Sources are the facts of GaitBench, ``docs/difficulty.json`` and the files ``better-*.json`` given as arguments.
 Every point is evaluated again; of equal problems the best point is kept. The result is ``compare/study/best_known.json``.
 """
 
@@ -23,7 +23,7 @@ from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.formulation.result import load_result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.certificate import CERTIFICATES, proven_bound, read_certificate
+from nlp_gait.proofs.certificate import proven_bound
 
 FILE = Path(str(compare.study.__file__)).with_name("best_known.json")
 # A point with a violation below the tolerance may be better than the optimum by about this, relatively.
@@ -56,15 +56,6 @@ def from_gaitbench() -> Iterator[Found]:
         )
 
 
-def from_certificates() -> Iterator[Found]:
-    """Yield the problems of the certificates."""
-    for path in sorted(CERTIFICATES.glob("*.json")):
-        file = read_certificate(path)
-        stored = file.problem
-        problem = load(stored["name"], **stored["options"]).with_values(**stored["parameters"])
-        yield Found(problem, file.certificate.x, "the starts of its certificate")
-
-
 def from_difficulty() -> Iterator[Found]:
     """Yield the problems with their defaults."""
     for name, found in difficulties().items():
@@ -83,7 +74,7 @@ def main() -> None:
     """Write the file."""
     best: dict[str, tuple[float, dict[str, Any]]] = {}
     described: dict[str, dict[str, Any]] = {}
-    for problem, x, found_by, proven_as in (*from_gaitbench(), *from_certificates(), *from_difficulty(), *from_files()):
+    for problem, x, found_by, proven_as in (*from_gaitbench(), *from_difficulty(), *from_files()):
         if len(x) != len(problem.names):
             print(f"{problem.address}: the point has {len(x)} values instead of {len(problem.names)}")
             continue

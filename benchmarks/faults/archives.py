@@ -49,7 +49,7 @@ def main() -> None:
         site = install(folder)
         for k, study in enumerate(studies):
             archive = folder / f"study-{k}.zip"
-            make(study, folder / f"study-{k}", archive)
+            make(study, site, folder / f"study-{k}", archive)
             what = hurt(archive, rng) if k in bad else "intact"
             began = time.perf_counter()
             status, last = verify(archive, site, folder / f"home-{k}", arguments.rerun)
@@ -82,12 +82,12 @@ def install(folder: Path) -> Path:
     return site
 
 
-def make(study: list[str], folder: Path, archive: Path) -> None:
+def make(study: list[str], site: Path, folder: Path, archive: Path) -> None:
     """Compute a small study and pack it."""
     nlp_gait = [sys.executable, "-m", "nlp_gait"]
     options = ["--runs", "2", "--starts", "2", "--evaluations", "300", "--jobs", "1", "--out", str(folder)]
     for command in (["compare", *study, *options], ["archive", str(folder), "--out", str(archive)]):
-        subprocess.run([*nlp_gait, *command], check=True, capture_output=True, cwd=ROOT)
+        subprocess.run([*nlp_gait, *command], check=True, capture_output=True, cwd=site, env=isolate(site, Path.home()))
 
 
 def hurt(archive: Path, rng: random.Random) -> str:
@@ -101,18 +101,18 @@ def hurt(archive: Path, rng: random.Random) -> str:
     return name
 
 
+def isolate(site: Path, home: Path) -> dict[str, str]:
+    """Return the environment of a process that sees the wheel, its own home and its own cache."""
+    cache = {"NLP_GAIT_CACHE": str(home / "cache")} if home != Path.home() else {}
+    paths = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(site), "PYTHONSAFEPATH": "1"}
+    return {**paths, **cache}
+
+
 def verify(archive: Path, site: Path, home: Path, rerun: str) -> tuple[int, str]:
     """Verify an archive far from where it was made; return the exit status and the last line."""
     home.mkdir()
-    environment = {
-        "PATH": os.environ["PATH"],
-        "HOME": str(home),
-        "NLP_GAIT_CACHE": str(home / "cache"),
-        "PYTHONPATH": str(site),
-        "PYTHONSAFEPATH": "1",
-    }
     command = [sys.executable, "-m", "nlp_gait", "verify", str(archive), "--rerun", rerun]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=home, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=home, env=isolate(site, home))
     return done.returncode, (done.stderr or done.stdout).strip().splitlines()[-1]
 
 

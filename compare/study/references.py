@@ -18,7 +18,7 @@ from nlp_gait.formulation import Objective, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
-from nlp_gait.proofs.certificate import proven_bound
+from nlp_gait.proofs.certificate import load_certificates, proven_bound
 from nlp_gait.providers import PROBLEMS
 
 # Relative difference of an objective that is computed on another machine or by other compiled code.
@@ -58,9 +58,21 @@ class Shipped:
 
 @cache
 def load_shipped() -> tuple[Shipped, ...]:
-    """Return the shipped values; equal problems of different names have equal ones."""
+    """Return the shipped values and those of all other certificates; equal problems of different names have equal values."""
     raw = json.loads(files("compare.study").joinpath("best_known.json").read_text(encoding="utf-8"))
-    return tuple(decode(Shipped, item) for item in raw)
+    shipped = [decode(Shipped, item) for item in raw]
+    known = {entry.problem.sha256 for entry in shipped}
+    proven = [
+        Shipped(
+            problem=decode(StoredProblem, file.problem),
+            objective=file.certificate.objective,
+            x=file.certificate.x,
+            found_by="the starts of its certificate",
+        )
+        for file in load_certificates().values()
+        if file.problem[HASH] not in known
+    ]
+    return (*shipped, *proven)
 
 
 @cache

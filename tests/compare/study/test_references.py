@@ -23,7 +23,6 @@ def of_instance(id: str) -> Reference:
 
 
 def test_every_certificate_belongs_to_a_shipped_value() -> None:
-    """After a new certificate run ``python -m benchmarks.best_known``."""
     known = {entry.proven_as or entry.problem.sha256 for entry in load_shipped()}
     for path in CERTIFICATES.glob("*.json"):
         assert json.loads(path.read_text())["problem"][HASH] in known, path.name
