@@ -9,6 +9,8 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 # Errors of systems on which a folder cannot be opened or flushed.
@@ -37,6 +39,23 @@ def flush(path: Path) -> None:
     except OSError as error:
         if not (is_folder and error.errno in NOT_FOR_FOLDERS):
             raise
+
+
+@contextmanager
+def lock_folder(path: Path) -> Iterator[None]:
+    """Let one process at a time into such a block for a folder; no lock where the system or the file system has none."""
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _fsync(descriptor: int) -> None:

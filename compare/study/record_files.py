@@ -13,7 +13,7 @@ from typing import Any
 from compare.study.definition import hash_definition
 from compare.study.record import RunRecord, read_record
 from compare.study.task import Task
-from nlp_gait.disk import rename
+from nlp_gait.disk import lock_folder, rename
 from nlp_gait.errors import InputError, OutputError
 from nlp_gait.files import convert_errors, make_writable_folder, write_json
 
@@ -37,13 +37,15 @@ def write_record(record: RunRecord, folder: Path) -> Path:
     path = _locate(folder / RECORDS, record)
     if not path.parent.is_dir():
         make_writable_folder(path.parent)
-    if path.exists():
-        with suppress(InputError):  # a damaged record is overwritten
-            earlier = read_record(path).definition
-            if hash_definition(earlier) != hash_definition(record.definition):
-                with convert_errors(f"cannot write to {str(path.parent)!r}", OutputError):
+    with convert_errors(f"cannot write to {str(path.parent)!r}", OutputError), lock_folder(path.parent):
+        if path.exists():
+            with suppress(InputError):  # a damaged record is overwritten
+                earlier = read_record(path).definition
+                if hash_definition(earlier) != hash_definition(record.definition):
                     rename(path, _add_key(path, earlier))
-    write_json(path, record.to_json())
+        write_json(path, record.to_json())
+        # Another study in this folder may have renamed a record of the same definition.
+        _add_key(path, record.definition).unlink(missing_ok=True)
     return path
 
 
@@ -82,15 +84,18 @@ def _locate(folder: Path, record: RunRecord) -> Path:
 def find_record(folder: Path, task: Task) -> tuple[RunRecord | None, RunRecord | None]:
     """Return a task's record, or None and the record of another definition in its place; raises InputError for damaged ones."""
     path = locate_record(folder, task)
-    if not path.exists():
+    if not path.parent.is_dir():
         return None, None
     definition, other = task.definition(), None
-    for candidate in (path, _add_key(path, definition)):
-        if candidate.exists():
-            record = _read_checked(candidate)
-            if hash_definition(record.definition) == hash_definition(definition):
-                return record, None
-            other = other or record
+    with lock_folder(path.parent):  # another study may rename them
+        if not path.exists():
+            return None, None
+        for candidate in (path, _add_key(path, definition)):
+            if candidate.exists():
+                record = _read_checked(candidate)
+                if hash_definition(record.definition) == hash_definition(definition):
+                    return record, None
+                other = other or record
     return None, other
 
 
