@@ -144,6 +144,8 @@ def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
     return {
         "effects": {name: describe_effect(phase, name) for name in phase.choices},
         "median_W": medians,
+        "best_W": phase.best,
+        "dense_W": (optimum.dense or {}).get("power_W", math.nan),
         "yaw_mW": 1000 * shares["HipYawPitch"] * phase.printed_here["pso"]["power_W"],
         "converged": phase.converged,
         "medians": "; ".join(f"{phase.median_run(name)} of {NAMES[name]}" for name in nao.SEARCHES),
