@@ -1,13 +1,24 @@
 """Entry point of the console script, which handles Ctrl-C before it imports the command line."""
 
+import os
+
 from nlp_gait.interrupts import exit_on_interrupt
 from nlp_gait.working_folder import hide_working_folder
+
+
+def fix_environment() -> None:
+    """Replace values with which libraries fail or print nothing: no width of the terminal, an unknown backend of matplotlib."""
+    width = os.environ.get("COLUMNS", "1")
+    if not (width.isascii() and width.isdigit() and int(width) > 0):
+        del os.environ["COLUMNS"]
+    os.environ["MPLBACKEND"] = "agg"  # figures are only written to files
 
 
 def main() -> None:
     """Run the command line."""
     exit_on_interrupt()
     hide_working_folder()
+    fix_environment()
     from compare.cli import main as run
 
     run()

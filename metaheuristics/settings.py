@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import MISSING, fields
 from importlib.util import find_spec
 from numbers import Integral, Real
@@ -58,6 +59,8 @@ def check_installed(algorithm: str, package: str) -> None:
             f"algorithm {algorithm!r} needs the package {package}, which is not installed: "
             f"pip install 'nlp-gait[{extra}]'"
         )
+    if package == "cma" and sys.flags.optimize > 1:
+        raise SearchError(f"algorithm {algorithm!r} needs docstrings: run Python without -OO and PYTHONOPTIMIZE=2")
 
 
 def bad_setting(settings: DataclassInstance, name: str, allowed: str) -> SearchError:

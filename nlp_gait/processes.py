@@ -195,7 +195,12 @@ def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterat
     try:
         with block_interrupts_in_children():
             folder = _find_working_folder() if workers > 0 else None  # another machine has other folders
-            results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
+            try:
+                results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
+            except OSError as error:  # no descriptors, processes or memory are left
+                raise WorkerError(
+                    f"worker processes cannot begin: {error.strerror or error}; use fewer --jobs"
+                ) from error
         for result in results:  # noqa: UP028  `yield from` would close them before the lines below
             yield result
     except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes

@@ -11,7 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks, pack_records
+from compare.bench.baseline import BASELINE, RUNS, load_baseline, make_bench_tasks, pack_records
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.task import Task
@@ -29,7 +29,9 @@ def main() -> None:
     parser.add_argument("--work", type=Path, required=True, help="folder of the records")
     parser.add_argument("--subset", choices=("small", "full"), default="full")
     parser.add_argument("--instance", action="append", help="only this one; repeatable")
-    parser.add_argument("--solvers", default=",".join(BASELINE), help="only these, separated by commas; packs nothing")
+    parser.add_argument(
+        "--solvers", default=",".join(BASELINE), help="only these, separated by commas; the others stay"
+    )
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
     solvers = arguments.solvers.split(",")
@@ -47,9 +49,11 @@ def main() -> None:
             feasible = sum(record.verdict.feasible for record in done)
             took = time.perf_counter() - started
             print(f"{id}, {solver}: {feasible} of {RUNS} feasible ({took:.1f} s)", flush=True)
-        if set(solvers) == set(BASELINE):
-            path = pack_records(id, records)
-            print(f"{id}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
+        if set(solvers) != set(BASELINE):
+            records += [record for record in load_baseline(id) if record.solver not in solvers]
+        records.sort(key=lambda record: (BASELINE.index(record.solver), record.run))
+        path = pack_records(id, records)
+        print(f"{id}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
 
 
 def limited(task: Task) -> Task:
