@@ -24,8 +24,8 @@ from nlp_gait.formulation.registry import find_maker
 # Each variant with the features of ``nao_motors``; the first is the paper's.
 VARIANTS: Mapping[str, str] = {
     "as published": "",
-    "+ speed and torque limits": "limits",
-    "+ coupled ankles": "limits,ankle",
+    "with speed and torque limits": "limits",
+    "with coupled ankles, too": "limits,ankle",
     "with these, braking is free": "limits,ankle,free-braking",
     "with these, braking gives back": "limits,ankle,regeneration",
     "with these, K of each motor": "limits,ankle,heat",

@@ -101,7 +101,13 @@ FAST_X = {
 
 
 def judged(
-    solver: str, x: Mapping[str, float], *, problem: str = "nao-dsp", run: int = 0, evaluations: int = 10
+    solver: str,
+    x: Mapping[str, float],
+    *,
+    problem: str = "nao-dsp",
+    run: int = 0,
+    evaluations: int = 10,
+    solve_s: float = 0.5,
 ) -> RunRecord:
     """A run of a search that ends at a point, as the judge finds it."""
     task = Task(problem=ProblemSpec(name=problem), solver=solver, run=run, stop=Stop(evaluations=evaluations))
@@ -121,7 +127,7 @@ def judged(
         iterations=1,
         active_constraints=(),
         history=History(evaluations=(evaluations,), objective=(best,)),
-        time_s=Times(build=0.1, compile=0.1, solve=0.5 + 0.1 * run, objective=0.3, history=(0.5 + 0.1 * run,)),
+        time_s=Times(build=0.1, compile=0.1, solve=solve_s + 0.1 * run, objective=0.3, history=(solve_s + 0.1 * run,)),
     )
 
 

@@ -55,7 +55,7 @@ WAYS: dict[str, tuple[str, str, str | None]] = {
     "raises at start": ("start", "raise ValueError('x' * 10**6)", "failed: ValueError: xxx"),
     "raises in ask": ("ask", "raise KeyError", "failed: KeyError"),
     "raises in tell": ("tell", "1 / 0", "ZeroDivisionError: division by zero"),
-    "raises what is no Exception": ("tell", "raise BaseException('b')", "ended without a result, by status 1"),
+    "raises what is no Exception": ("tell", "raise BaseException('b')", "failed: BaseException: b"),
     "another shape": ("ask", "return np.zeros(3)", r"ask must return points of shape \(P, 4\)"),
     "no points": ("ask", "return np.zeros((0, 4))", "with P >= 1"),
     "no numbers": ("ask", "return 'points'", "something other than numbers"),

@@ -31,6 +31,10 @@ OTHER: dict[str, Any] = {
     "load_degree": 3,
     "duration_s": 3.0,
     "instance": "walk12-w100",
+    "tracking_limit": False,
+    "sole_off_s": 0.6,
+    "toe_off_s": 1.5,
+    "step": "first",
 }
 
 
@@ -43,7 +47,7 @@ def others(name: str) -> dict[str, Any]:
     hints, found = get_type_hints(find_maker(name)), {}
     for option, default in defaults(name).items():
         choices = get_args(hints[option]) if get_origin(hints[option]) is Literal else ()
-        found[option] = choices[(choices.index(default) + 1) % len(choices)] if choices else OTHER[option]
+        found[option] = choices[(choices.index(default) + 1) % len(choices)] if choices and option not in OTHER else OTHER[option]
         assert found[option] != default
     return found
 

@@ -18,7 +18,7 @@ RUN = CliRunner()
 
 
 def test_it_reports_what_each_feature_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("as published", "+ speed and torque limits", "with these, K of each motor")
+    names = ("as published", "with speed and torque limits", "with these, K of each motor")
     monkeypatch.setattr(motors, "VARIANTS", {name: motors.VARIANTS[name] for name in names})
     done = RUN.invoke(app, ["motors", "nao-dsp", "--starts", "1", "--out", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output

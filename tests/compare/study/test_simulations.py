@@ -26,8 +26,8 @@ from tests.compare.records import FAST_X, judged
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("coarse_pages")]  # gaits are played
 
 
-def dsp(algorithm: str, time_s: float = 0.5) -> RunRecord:
-    return judged(algorithm, FAST_X | {"double_support_time_s": time_s})
+def dsp(algorithm: str, time_s: float = 0.5, solve_s: float = 0.5) -> RunRecord:
+    return judged(algorithm, FAST_X | {"double_support_time_s": time_s}, solve_s=solve_s)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("mujoco")
     path = tmp_path_factory.mktemp("study")
     (path / RECORDS / "nao-dsp").mkdir(parents=True)
-    for made in (dsp("pso"), dsp("ga", 0.51)):
+    for made in (dsp("pso"), dsp("ga", 0.51, solve_s=0.6)):
         write_json(path / RECORDS / "nao-dsp" / f"{made.solver}-0000.json", made.to_json())
     return path
 
