@@ -47,7 +47,9 @@ def others(name: str) -> dict[str, Any]:
     hints, found = get_type_hints(find_maker(name)), {}
     for option, default in defaults(name).items():
         choices = get_args(hints[option]) if get_origin(hints[option]) is Literal else ()
-        found[option] = choices[(choices.index(default) + 1) % len(choices)] if choices and option not in OTHER else OTHER[option]
+        found[option] = (
+            choices[(choices.index(default) + 1) % len(choices)] if choices and option not in OTHER else OTHER[option]
+        )
         assert found[option] != default
     return found
 
