@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.statistics.inference import RankSum, rank_sum_normal
-from compare.papers.nao.nao_dh import compare_geometry
 from compare.papers.nao.nao_paper import PAPER, PrintedPhase
 from compare.papers.nao.nao_runs import ALGORITHMS, SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.papers.nao.nao_torque_changes import compute_torque_changes
@@ -162,11 +161,6 @@ class NaoFindings:
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:
         """Single and double support."""
         return self.ssp, self.dsp
-
-    @cached_property
-    def geometry_mm(self) -> dict[str, float]:
-        """Distances of our robot's ends from those of the printed tables, see ``compare_geometry``."""
-        return compare_geometry(str(self.ssp.problem.options["robot"]))
 
     @cached_property
     def torque_changes_Nm(self) -> dict[str, tuple[float, float]]:

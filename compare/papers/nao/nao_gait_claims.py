@@ -15,16 +15,17 @@ from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.robots import load_robot
 
 MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
+TORQUE_LIMIT = "torque_change_limit_Nm"
 PACES = 9  # durations at which a printed gait is evaluated
 KINDS = {"HipYawPitch": "hip yaw-pitch", "Hip": "hip roll and pitch", "Knee": "knees", "Ankle": "ankles"}
 
 
-def compute_joint_shares(problem: GaitProblem, x: Sequence[float]) -> dict[str, float]:
-    """Return the share of each kind of joint in the power of a solution; the last is that of the arms."""
+def compute_joint_shares(problem: GaitProblem, x: Sequence[float], *, heat: bool = True) -> dict[str, float]:
+    """Return the share of each kind of joint in the power of a solution, or in its mechanical part; the last is the arms'."""
     signals = problem.signals(problem.check_x(x))
     drawn = (
         np.abs(signals.arrays["tau"] * signals.arrays["qd"])
-        + problem.value("heat_loss_W_per_Nm2") * signals.arrays["tau"] ** 2
+        + heat * problem.value("heat_loss_W_per_Nm2") * signals.arrays["tau"] ** 2
     )
     mean = np.trapezoid(drawn, signals.arrays["t"], axis=0)
     shares = dict.fromkeys([*KINDS, "arms"], 0.0)
@@ -73,6 +74,12 @@ def _check_lead(phase: PhaseFindings, indexes: Sequence[str], sign: float) -> Ch
     return compare_changes(np.round(printed, 1), ours, printed=printed, ours=ours)
 
 
+def _check_close(phase: PhaseFindings) -> Check:
+    """Check that the least margins of both printed solutions are as near to each other as in print [mm]."""
+    values = _check_lead(phase, ("dbm_x_min_m", "dbm_y_min_m"), -1.0).values
+    return compare_levels(values["printed"], values["ours"], **values)
+
+
 def _check_torque_lead(phase: PhaseFindings) -> Check:
     name, optima, here = "torque_change_Nm", phase.paper.optima, phase.printed_here
     printed = 100 * (optima["pso"].indexes[name] / optima["ga"].indexes[name] - 1)
@@ -118,22 +125,13 @@ def _check_arms(findings: NaoFindings) -> Check:
     return require_change([max(gain) for gain in gains], gains=gains, cost=cost)
 
 
-def _check_pace(findings: NaoFindings, slow: bool) -> Check:
-    """Check how much smaller the least margin is at the slowest or the fastest pace than at the best [mm]."""
-    falls, found = [], []
-    for phase in findings.phases:
-        time = phase.problem.names[phase.paper.duration]
-        margins = {
-            at: 1000 * min(indexes["dbm_x_min_m"], indexes["dbm_y_min_m"])
-            for at, indexes in _vary_pace(phase, time).items()
-        }
-        best = max(margins, key=margins.__getitem__)
-        end = max(margins) if slow else min(margins)
-        falls.append(margins[best] - margins[end])
-        found.append(
-            f"{phase.paper.title} {margins[end]:.1f} mm in {end:.2g} s, {margins[best]:.1f} mm in {best:.2g} s"
-        )
-    return require_change(falls, found="; ".join(found))
+def _check_pace(phase: PhaseFindings, slow: bool) -> Check:
+    """Check how much smaller the least margin is at the slowest or the fastest pace than at the best [%]."""
+    paces = _vary_pace(phase, phase.problem.names[phase.paper.duration])
+    margins = {at: 1000 * min(found["dbm_x_min_m"], found["dbm_y_min_m"]) for at, found in paces.items()}
+    best, end = max(margins, key=margins.__getitem__), max(margins) if slow else min(margins)
+    fall = 100 * (1 - margins[end] / margins[best])
+    return require_change(fall, end=end, at_end=margins[end], best=best, at_best=margins[best], fall=fall)
 
 
 def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, float]]:
@@ -164,6 +162,25 @@ def _check_oscillation(findings: NaoFindings) -> Check:
     return require_change(ours, ours=ours)
 
 
+def _check_oscillation_torque(findings: NaoFindings) -> Check:
+    """Check how much less torque the hip's vertical motion needs than a straight line [%]: root mean square over all joints."""
+    torques = []
+    for phase in findings.phases:
+        x = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x))
+        straight = x | {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}
+        torques.append([phase.problem.signals(np.array(list(at.values()))).arrays["tau"] for at in (x, straight)])
+    ours = [100 * (1 - float(np.linalg.norm(curved) / np.linalg.norm(line))) for curved, line in torques]
+    greatest = [100 * (1 - float(np.abs(curved).max() / np.abs(line).max())) for curved, line in torques]
+    return require_change(ours, ours=ours, greatest=greatest)
+
+
+def _check_torque_limit(phase: PhaseFindings) -> Check:
+    """Check whether the limit of 1.2 Nm binds at an end of a run or at IPOPT's optimum."""
+    ends = [run.verdict.indexes["torque_change_Nm"] for runs in phase.searches.values() for run in runs]
+    greatest, limit = max([*ends, phase.optimum.verdict.indexes["torque_change_Nm"]]), phase.problem.value(TORQUE_LIMIT)
+    return decide(greatest > 0.99 * limit, greatest=greatest, limit=limit, phase=phase.paper.title)
+
+
 def _straighten(phase: PhaseFindings) -> Mapping[str, float]:
     return phase.evaluate_printed(hip_vz_start_m_s=0.0, hip_vz_end_m_s=0.0)
 
@@ -178,13 +195,15 @@ def _check_contradiction(findings: NaoFindings) -> Check:
 
 
 def _check_joints(findings: NaoFindings, kind: str) -> Check:
-    """Check whether a kind of joint has the largest share in the power of the printed PSO solution."""
+    """Check whether a kind of joint has the largest share in the power of PSO's printed solution of single support."""
     found = {p.paper.title: compute_joint_shares(p.problem, p.paper.optima["pso"].x) for p in findings.phases}
     words = "; ".join(
         f"{title}: {', '.join(f'{KINDS.get(k, k)} {100 * share:.0f} %' for k, share in shares.items())}"
         for title, shares in found.items()
     )
-    return decide(all(max(shares, key=shares.__getitem__) == kind for shares in found.values()), shares=words)
+    ssp, shares = findings.ssp, found[findings.ssp.paper.title]
+    work = compute_joint_shares(ssp.problem, ssp.paper.optima["pso"].x, heat=False)[kind]
+    return decide(max(shares, key=shares.__getitem__) == kind, shares=words, work=100 * work)
 
 
 def _check_stretched(findings: NaoFindings) -> Check:
@@ -216,6 +235,9 @@ GAIT_CHECKS: dict[str, Checked] = {
     **_both("margins", partial(_check_levels, indexes=MARGINS)),
     **_both("torque-level", partial(_check_levels, indexes=("torque_change_Nm",))),
     **_both("torque-change", _check_torque_lead),
+    **_both("too-slow", partial(_check_pace, slow=True)),
+    **_both("too-fast", partial(_check_pace, slow=False)),
+    **_both("torque-limit", _check_torque_limit),
     "mean-x-lead": lambda f: _check_lead(f.ssp, ("dbm_x_mean_m",), 1.0),
     "mean-lead-dsp": lambda f: _check_lead(f.dsp, ("dbm_x_mean_m", "dbm_y_mean_m"), -1.0),
     "min-lead-dsp": lambda f: _check_lead(f.dsp, ("dbm_x_min_m", "dbm_y_min_m"), 1.0),
@@ -224,10 +246,10 @@ GAIT_CHECKS: dict[str, Checked] = {
     "lower-hip-x": partial(_check_lower_hip, axis="x"),
     "lower-hip-y": partial(_check_lower_hip, axis="y"),
     "arms": _check_arms,
-    "too-slow": partial(_check_pace, slow=True),
-    "too-fast": partial(_check_pace, slow=False),
     "straight": _check_straight,
     "oscillation": _check_oscillation,
+    "oscillation-torque": _check_oscillation_torque,
+    "least-margins-ssp": lambda f: _check_close(f.ssp),
     "contradiction": _check_contradiction,
     "knees": partial(_check_joints, kind="Knee"),
     "hips": partial(_check_joints, kind="Hip"),

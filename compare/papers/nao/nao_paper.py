@@ -26,7 +26,7 @@ class PrintedPhase:
     problem: str  # name of the problem here
     title: str  # in words
     optima: Mapping[str, PrintedOptimum]  # by search algorithm (Tables 6 and 8, 7 and 9)
-    test: RankSum  # section 5.3; p_less is NaN where the paper gives none
+    test: RankSum  # section 5.3
     tables: tuple[int, int]  # numbers of the tables of variables and of indexes
     convergence_figure: str  # name of the figure of best per generation
     scatter_figures: Mapping[str, tuple[int, ...]]  # figures of power against variables, to the positions of these in x

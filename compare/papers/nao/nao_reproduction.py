@@ -68,9 +68,11 @@ def _sweep_phase(
 ) -> PhaseFindings:
     """Sweep by IPOPT over each variable's feasible range."""
     spec, starts = nao.make_spec(paper.problem, effort), runs[paper.problem, IPOPT]
-    sweeps = []
+    sweeps, lower = [], spec.load().lower
     for i, optimum in enumerate(choose_best(starts).x.values()):
         values = choose_sweep_values(points, i, optimum, effort.sweep_points)
+        if i in (0, paper.duration):  # down to the bound, where searches may have found nothing
+            values = np.unique([*np.linspace(lower[i], values[0], effort.sweep_points[0]), *values]).tolist()
         sweeps.append(nao.make_sweep(f"{paper.problem}-sweep-x{i + 1}", spec, i, values, effort.sweep_starts))
     return PhaseFindings(
         paper=paper,
@@ -117,7 +119,6 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "nearest_Nm": changes[misses.argmin()],
         "nearest_miss": misses.min(),
         "candidates": len(changes),
-        "geometry": list(findings.geometry_mm.values()),
         "margin_gap_mm": 1000
         * max(
             abs(optimum.indexes[index] - dsp.printed_here[name][index])
@@ -169,7 +170,6 @@ def make_tables(findings: NaoFindings) -> dict[str, Rows]:
             ("printed", *(dsp.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS)),
             *((name, *values) for name, values in findings.torque_changes_Nm.items()),
         ],
-        "geometry": list(findings.geometry_mm.items()),
         "simulations": [row for phase in findings.phases for row in _list_simulations(phase)],
         "power-gap": [row for phase in findings.phases for row in _list_gaps(phase)],
     }
@@ -281,8 +281,7 @@ def _list_tests(phase: PhaseFindings) -> Rows:
         )
     rows: list[list[Value]] = []
     for name, test, share in tests:
-        p_less: Value = "not given" if math.isnan(test.p_less) else test.p_less
-        rows.append([phase.paper.title, name, test.rank_sum, test.z, test.p_two_sided, p_less, share])
+        rows.append([phase.paper.title, name, test.rank_sum, test.z, test.p_two_sided, test.p_less, share])
     return rows
 
 

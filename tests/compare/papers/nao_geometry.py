@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 
-from compare.papers.claims import read_tables
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import tree_from
@@ -19,7 +20,8 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 def compare_geometry(robot: str) -> dict[str, float]:
     """Return the largest distance of each chain's end from our robot's over random postures [mm], by the chain's words."""
-    loaded, tables, rng = load_robot(robot), read_tables("nao/nao_dh.toml"), np.random.default_rng(0)
+    loaded, rng = load_robot(robot), np.random.default_rng(0)
+    tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     limits = np.array([joint.limits_rad for joint in loaded.joints.values()])
     drawn = rng.uniform(limits[:, 0], limits[:, 1], (POSTURES, len(limits)))
     found = {}
