@@ -10,7 +10,7 @@ import numpy as np
 
 from compare.papers.claims import Check, Verdict, compare_changes, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, get_point, list_objectives
-from compare.papers.walk12.walk12_findings import Walk12Findings, compute_stable_share
+from compare.papers.walk12.walk12_findings import Walk12Findings, compute_hip_miss, compute_stable_share
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import (
     GA,
@@ -37,7 +37,8 @@ NO_ENGINE = "the simulator is not installed (extra sim)"
 
 def _check_most_stable(findings: Walk12Findings) -> Check:
     *others, last = findings.f1_of_table_3
-    return require_change(100 * (last / max(others) - 1), f1=last, next=max(others))
+    shares = ", ".join(f"{stable.share:.3f}" for stable in findings.stable)
+    return require_change(100 * (last / max(others) - 1), f1=last, next=max(others), shares=shares)
 
 
 def _check_short_steps(findings: Walk12Findings) -> Check:
@@ -98,6 +99,19 @@ def _check_margin(findings: Walk12Findings) -> Check:
     return require_change(-math.inf if falls else 100 * (f1[-1] / f1[0] - 1), found=", ".join(f"{v:.0f}" for v in f1))
 
 
+def _check_margin_of_table_3(findings: Walk12Findings) -> Check:
+    f1 = findings.f1_of_table_3
+    changes = [100 * (after / before - 1) for before, after in pairwise(f1)]
+    return require_change(changes, found=", ".join(f"{value:.0f}" for value in f1), low=min(changes))
+
+
+def _check_margin_by_duration(findings: Walk12Findings) -> Check:
+    shares = [stable.share for stable in findings.stable]
+    optima = [compute_stable_share(tuple(get_point(findings.optimum(PAPER, row.weight)))).share for row in TABLE_3]
+    texts = [", ".join(f"{1 - share:.3f}" for share in values) for values in (shares, optima)]
+    return require_change(np.diff(shares), printed=texts[0], optima=texts[1])
+
+
 def _check_static(findings: Walk12Findings) -> Check:
     best = compute_stable_share(tuple(get_point(findings.optimum(PAPER, 1.0))))
     return compare_levels(1.0, findings.stable[-1].share, stable=findings.stable[-1], optimum=best.share)
@@ -110,12 +124,18 @@ def _check_static_above(findings: Walk12Findings) -> Check:
 
 def _check_dynamic(findings: Walk12Findings) -> Check:
     shares = [stable.share for row, stable in zip(TABLE_3, findings.stable, strict=True) if row.weight < STATIC_WEIGHT]
-    return require_change([1 - share for share in shares], low=min(shares), high=max(shares))
+    every = [stable.share for stable in findings.stable]
+    return require_change(
+        [1 - share for share in shares], low=min(shares), high=max(shares), all=(min(every), max(every))
+    )
 
 
-def _check_speed(weight: float, printed_m_s: float) -> Check:
+def _check_speed(weight: float, printed_m_s: float, share: float) -> Check:
+    """Check a speed of this share of the step length in a step."""
     s = find_row(weight).x[0]
-    return compare_levels(printed_m_s, s / 2, foot=s, slow=s / 2 / ROBOT_STEP_S)
+    return compare_levels(
+        printed_m_s, share * s, s=s, ours=share * s, slow=share * s / ROBOT_STEP_S, implied=s / printed_m_s
+    )
 
 
 def _check_faster(findings: Walk12Findings) -> Check:
@@ -124,10 +144,9 @@ def _check_faster(findings: Walk12Findings) -> Check:
     return compare_changes(128.0 - 125.0, table, optima=optima[0] - optima[1], table=table)
 
 
-def _check_table_4_f1max(findings: Walk12Findings) -> Check:
-    f1max = {horizon: [_get_f1max(findings, row, horizon) for row in TABLE_4] for horizon in HORIZONS}
-    texts = {name: ", ".join(f"{value:.0f}" for value in values) for name, values in f1max.items()}
-    return compare_levels([row.f1max for row in TABLE_4], f1max["step"], step=texts["step"], second=texts["1s"])
+def _check_table_4_f1max(findings: Walk12Findings, horizon: str) -> Check:
+    f1max = [_get_f1max(findings, row, horizon) for row in TABLE_4]
+    return compare_levels([row.f1max for row in TABLE_4], f1max, found=", ".join(f"{value:.0f}" for value in f1max))
 
 
 def _get_f1max(findings: Walk12Findings, row: PaperRow, horizon: str) -> float:
@@ -148,17 +167,44 @@ def _list_table_4(findings: Walk12Findings, horizon: str) -> list[tuple[float, l
 
 
 def _check_f_over_time(findings: Walk12Findings) -> Check:
+    printed = [row.f for row in TABLE_4]
     f = {horizon: [f for f, _ in _list_table_4(findings, horizon)] for horizon in HORIZONS}
     texts = {name: ", ".join(f"{value:.4f}" for value in values) for name, values in f.items()}
-    return compare_levels([row.f for row in TABLE_4], f["step"], step=texts["step"], second=texts["1s"])
+    spreads = [100 * (max(values) / min(values) - 1) for values in (f["step"], f["1s"], printed)]
+    return compare_levels(0.0, spreads[0], step=texts["step"], second=texts["1s"], spreads=spreads)
 
 
-def _check_variables_over_time(findings: Walk12Findings) -> Check:
+def _check_variables_over_time(findings: Walk12Findings, horizon: str) -> Check:
     rows = [TABLE_3[1].x, *(row.x for row in TABLE_4)]
-    optima = [get_point(findings.optimum(PAPER, 0.15)), *(x for _, x in _list_table_4(findings, "step"))]
+    optima = [get_point(findings.optimum(PAPER, 0.15)), *(x for _, x in _list_table_4(findings, horizon))]
     printed, ours = (1e3 * np.ptp(np.array(values), axis=0) for values in (rows, optima))
     texts = [", ".join(f"{value:.0f}" for value in values) for values in (printed, ours)]
     return compare_levels(printed, ours, ranges=texts[0], found=texts[1])
+
+
+def _check_f1_over_time(horizon: str) -> Check:
+    f1 = [compute_f1(row, horizon=horizon) for row in TABLE_4]
+    return require_change([100 * (a / b - 1) for a, b in pairwise(f1)], found=", ".join(f"{v:.0f}" for v in f1))
+
+
+def _check_variables(findings: Walk12Findings) -> Check:
+    printed = 1e3 * np.array([row.x[1:] for row in TABLE_3])
+    ours = 1e3 * np.array([get_point(findings.optimum(PAPER, row.weight))[1:] for row in TABLE_3])
+    ranges = [
+        f"{name} {low:.1f} to {high:.1f}"
+        for name, low, high in zip("nHh", ours.min(axis=0), ours.max(axis=0), strict=True)
+    ]
+    return compare_levels(printed, ours, found=", ".join(ranges))
+
+
+def _check_fitness(findings: Walk12Findings) -> Check:
+    f = list_objectives(findings.records(PAPER, 0.15, "ga"))
+    return compare_levels(find_row(0.15).f, float(np.median(f)), median=float(np.median(f)), best=max(f))
+
+
+def _check_moments(findings: Walk12Findings) -> Check:
+    low, high = findings.f1_changes["moments"]
+    return compare_levels(np.zeros(2), [low, high], low=low, high=high)
 
 
 def _check_epochs(findings: Walk12Findings) -> Check:
@@ -177,14 +223,16 @@ def _check_time_steps(_: Walk12Findings) -> Check:
 
 def _check_walks(findings: Walk12Findings, step_time_s: float) -> Check:
     walks = [walk for walk in findings.walks if walk.step_time_s == step_time_s]
-    printed = [walk.fell_at_s is None for walk in walks if walk.by == "paper" and walk.as_printed]
-    texts = [
-        f"{_describe_walks([walk for walk in walks if walk.by == by and walk.as_printed == as_printed])} of {name} with "
-        f"{'the printed motor and set-points' if as_printed else 'our drives'}"
-        for by, name in (("paper", "the paper"), (IPOPT.upper(), "IPOPT"))
-        for as_printed in (True, False)
-    ]
-    return decide(all(printed) if walks else Verdict.UNTESTABLE, found="; ".join(texts) if walks else NO_ENGINE)
+    same = [row.weight for row in TABLE_3 if row.weight < 0.9]
+    gaits = np.array([get_point(findings.optimum(PAPER, weight)) for weight in same])
+    texts = []
+    for as_printed, drives in ((True, "the printed motor and set-points"), (False, "our drives")):
+        driven = [walk for walk in walks if walk.as_printed == as_printed]
+        equal = [walk.fell_at_s is None for walk in driven if walk.by == IPOPT.upper() and walk.weight in same]
+        counts = (f"{_describe_walks([w for w in driven if w.by == by])} by {by}" for by in ("paper", "IPOPT"))
+        texts.append(f"with {drives} {', '.join(counts)}; of the equal optima {sum(equal)} of {len(equal)}")
+    apart = float(np.ptp(gaits, axis=0).max())
+    return decide(Verdict.UNTESTABLE, found="; ".join(texts) if walks else NO_ENGINE, apart=apart)
 
 
 def _describe_walks(walks: Sequence[WalkedGait]) -> str:
@@ -200,13 +248,13 @@ def _check_same_fate(findings: Walk12Findings) -> Check:
             fates.setdefault(walk.weight, set()).add(walk.fell_at_s is None)
     other = [weight for weight, fate in fates.items() if len(fate) > 1]
     found = f"{len(other)} of {len(fates)} walk at one of 1 s and {ROBOT_STEP_S:g} s, and fall at the other"
-    return decide(not other if fates else Verdict.UNTESTABLE, found=found if fates else NO_ENGINE)
+    return decide(Verdict.UNTESTABLE, found=found if fates else NO_ENGINE)
 
 
 def _check_below(findings: Walk12Findings) -> Check:
     below = get_point(choose_best(findings.runs["below", IPOPT]))
     apart = 1e3 * max(abs(a - b) for a, b in zip(below, get_point(findings.optimum(PAPER, 0.1)), strict=True))
-    return require_change(apart, apart=apart)
+    return decide(Verdict.UNTESTABLE, apart=apart)
 
 
 def _check_ends(findings: Walk12Findings) -> Check:
@@ -214,10 +262,10 @@ def _check_ends(findings: Walk12Findings) -> Check:
     return decide(max(inner) <= max(1.0, last), inner=max(inner), last=last)
 
 
-def _check_accuracy(findings: Walk12Findings) -> Check:
-    free = [compute_f1(row, zmp="moment-free") for row in TABLE_3]
-    changes = [100 * (f1 / exact - 1) for f1, exact in zip(findings.f1_of_table_3, free, strict=True)]
-    return compare_levels(free, findings.f1_of_table_3, low=min(changes), high=max(changes))
+def _check_accuracy(zmp: str) -> Check:
+    free, ours = ([compute_f1(row, zmp=reading) for row in TABLE_3] for reading in ("moment-free", zmp))
+    changes = [100 * (f1 / exact - 1) for f1, exact in zip(ours, free, strict=True)]
+    return compare_levels(free, ours, low=min(changes), high=max(changes))
 
 
 def _check_circle(findings: Walk12Findings) -> Check:
@@ -239,6 +287,10 @@ CHECKS: dict[str, Callable[[Walk12Findings], Check]] = {
     "f": _check_f_of_table_3,
     "optimal": _check_optimal,
     "steps": _check_steps,
+    "variables": _check_variables,
+    "moments": _check_moments,
+    "fitness": _check_fitness,
+    "inverse-kinematics": lambda _: compare_levels(0.0, 1e3 * compute_hip_miss(), miss=1e3 * compute_hip_miss()),
     "slower": _check_slower,
     "below": _check_below,
     "walks": lambda findings: _check_walks(findings, 1.0),
@@ -247,16 +299,32 @@ CHECKS: dict[str, Callable[[Walk12Findings], Check]] = {
     "static-above": _check_static_above,
     "epochs": _check_epochs,
     "time-steps": _check_time_steps,
-    "speed-0.15": lambda _: _check_speed(0.15, 0.125),
+    "speed-0.1": lambda _: _check_speed(0.1, 0.128, 0.5),
+    "speed-0.1-foot": lambda _: _check_speed(0.1, 0.128, 1.0),
+    "speed-0.15": lambda _: _check_speed(0.15, 0.125, 0.5),
+    "speed-0.15-foot": lambda _: _check_speed(0.15, 0.125, 1.0),
     "margin": _check_margin,
+    "margin-printed": _check_margin_of_table_3,
+    "margin-duration": _check_margin_by_duration,
+    "margin-0.1": lambda findings: require_change(
+        100 * (findings.f1_of_table_3[1] / findings.f1_of_table_3[0] - 1),
+        f1=findings.f1_of_table_3[:2],
+        shares=[stable.share for stable in findings.stable[:2]],
+    ),
     "static": _check_static,
-    "speed-1": lambda _: _check_speed(1.0, 0.05),
+    "speed-1": lambda _: _check_speed(1.0, 0.05, 0.5),
+    "speed-1-foot": lambda _: _check_speed(1.0, 0.05, 1.0),
     "faster": _check_faster,
     "trend": lambda findings: _check_trend(findings, "step"),
     "trend-1s": lambda findings: _check_trend(findings, "1s"),
-    "f1max-over-time": _check_table_4_f1max,
+    "f1-over-time": lambda _: _check_f1_over_time("step"),
+    "f1-over-time-1s": lambda _: _check_f1_over_time("1s"),
+    "f1max-over-time": lambda findings: _check_table_4_f1max(findings, "step"),
+    "f1max-over-time-1s": lambda findings: _check_table_4_f1max(findings, "1s"),
     "f-over-time": _check_f_over_time,
-    "variables-over-time": _check_variables_over_time,
+    "variables-over-time": lambda findings: _check_variables_over_time(findings, "step"),
+    "variables-over-time-1s": lambda findings: _check_variables_over_time(findings, "1s"),
     "same-fate": _check_same_fate,
-    "accuracy": _check_accuracy,
+    "accuracy": lambda _: _check_accuracy("exact"),
+    "accuracy-a1": lambda _: _check_accuracy("appendix-as-printed"),
 }

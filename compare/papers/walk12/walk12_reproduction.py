@@ -125,6 +125,10 @@ def _compute_normalisation(findings: Walk12Findings) -> dict[str, Any]:
         "own_f1max": findings.own_f1max,
         "dense_f1max": get_dense(findings.optimum(PAPER, 1.0))["f1_per_m2s"],
         "ga_f1": (min(ga) * F1MAX, max(ga) * F1MAX),
+        "ga_f1_median": float(np.median(ga)) * F1MAX,
+        "last_f1": findings.f1_of_table_3[-1],
+        "model_part": 100 * (findings.f1_of_table_3[-1] / TABLE_3[-1].implied_f1 - 1),
+        "search_part": 100 * (findings.own_f1max / findings.f1_of_table_3[-1] - 1),
         "printed_above": ", ".join(f"{w:g} (by {gap:.4f})" for w, gap in gaps.items() if gap > PRINTED_DIGIT),
     }
 
@@ -164,8 +168,14 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "corner_slopes": compute_corner_slopes(),
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
+        "up_mm": 1e3 * load_point_mass_biped().foot_com_height_m,
         "lift_mm": 1e3 * find_row(0.15).x[2],
         "stable": findings.stable[-1],
+        "stable_intervals": ", ".join(
+            f"{findings.stable[k].first_s:.2f} to {findings.stable[k].last_s:.2f} s at λ = {TABLE_3[k].weight:g}"
+            for k in (0, 1, -1)
+        ),
+        "f1_read": {name: f"{low:+z.2f} % to {high:+z.2f} %" for name, (low, high) in findings.f1_changes.items()},
         "step_gap": _compute_gap(f1["step"], implied),
         "horizon_gap": _compute_gap(f1["1s"], implied),
     }
