@@ -25,6 +25,7 @@ from compare.cli.common import (
 from compare.cli.options import AsCsv, AsJson, Code, name_all
 from compare.cli.simulation_options import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
+from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,17 +101,26 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="The least work that fills every table and figure, instead of the paper's.")
     ] = False,
+    effort: Annotated[
+        Path | None,
+        typer.Option(help="JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."),
+    ] = None,
 ) -> None:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
     `claims.csv` has every claim with its verdict, `differences.csv` everything that is not as printed with its effect.
 
-    Examples: `nlp-gait reproduce nao --out reproduction`, `nlp-gait reproduce walk12 --quick --out quick`
+    Examples: `nlp-gait reproduce nao --out reproduction`, `nlp-gait reproduce walk12 --quick --out quick`,
+    `nlp-gait reproduce stairs --effort effort.json --out reduced`
     """
+    if quick and effort:
+        raise InputError("--quick and --effort exclude each other: omit one")
     reproduction = load_reproduction(paper)
-    effort = reproduction.quick if quick else reproduction.full
-    with interruptible(out), progress_bar(paper, effort.steps) as advance:
-        reproduction.reproduce(out, effort, advance, command=describe_command())
+    chosen = reproduction.quick if quick else reproduction.full
+    if effort:
+        chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
+    with interruptible(out), progress_bar(paper, chosen.steps) as advance:
+        reproduction.reproduce(out, chosen, advance, command=describe_command())
     print_written(out / "report.md")
 
 

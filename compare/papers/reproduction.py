@@ -59,6 +59,7 @@ QUICK = (
     "Quick run: the fewest runs, points and evaluations that fill every table. Statistics, medians and the verdicts that rest on "
     "them are not those of the full reproduction."
 )
+REDUCED = "Reduced run: its settings differ from those of the full reproduction, see the end. Verdicts are those of this effort."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +131,7 @@ class Reproduction(Generic[E, F]):
             figures=figures,
             whole_tables=[make_claims_table(claims.values()), make_differences_table(differences)],
         )
-        quick = effort == self.quick
+        label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
         provenance = Section(
             title="Versions, machine, seeds and settings",
             parts=(
@@ -145,13 +146,18 @@ class Reproduction(Generic[E, F]):
         )
         document = replace(
             document,
-            title=f"{document.title} (quick)" if quick else document.title,
-            verdict=[*([QUICK] if quick else []), *count_verdicts(claims.values())],
+            title=document.title if label == "full" else f"{document.title} ({label})",
+            verdict=[*{"full": [], "quick": [QUICK], "reduced": [REDUCED]}[label], *count_verdicts(claims.values())],
             parts=(*document.parts, provenance, make_citation_section(runner.records)),
         )
         write_document(folder, document)
         write_parts(folder, self.csv_tables(findings))
-        write_json(folder / SUMMARY, _summarise(quick, sessions[-1], claims, differences))
+        write_json(folder / SUMMARY, _summarise(label, self._find_settings(effort), sessions[-1], claims, differences))
+
+    def _find_settings(self, effort: E) -> dict[str, Any]:
+        """Return what differs from the full effort."""
+        full = asdict(self.full)
+        return {name: value for name, value in asdict(effort).items() if value != full[name]}
 
 
 def read_sessions(folder: Path) -> list[Session]:
@@ -171,10 +177,15 @@ def count_verdicts(claims: Iterable[Claim]) -> list[str]:
 
 
 def _summarise(
-    quick: bool, session: Session, claims: Mapping[str, Claim], differences: Sequence[Difference]
+    label: str,
+    settings: Mapping[str, Any],
+    session: Session,
+    claims: Mapping[str, Claim],
+    differences: Sequence[Difference],
 ) -> dict[str, Any]:
     return {
-        "effort": "quick" if quick else "full",
+        "effort": label,
+        "settings": settings,
         "session": asdict(session),
         "claims": {name: asdict(claim) for name, claim in claims.items()},
         "differences": [asdict(row) for row in differences],

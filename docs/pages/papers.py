@@ -1,6 +1,7 @@
 """Claims of the papers and our differences, a page for each paper, from the recorded reproductions in ``docs/papers``.
 
-A record is the ``summary.json`` of a full ``nlp-gait reproduce PAPER --out DIR``: copy it to ``docs/papers/PAPER.json``.
+A record is the ``summary.json`` of ``nlp-gait reproduce PAPER --out DIR``: copy it to ``docs/papers/PAPER.json``. It names its
+effort, ``full``, ``quick`` or ``reduced``, and the settings that differ from the full one, which ``--effort FILE`` reads.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 from compare.papers.claims import Claim, Difference, make_claims_table, make_differences_table
 from compare.papers.reproduction import count_verdicts
 from compare.report.document import Table
+from compare.report.provenance import format_settings
 from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
@@ -45,9 +47,12 @@ def paper_page(name: str) -> str:
 
 
 def _describe(record: dict[str, Any], name: str) -> str:
-    session = record["session"]
+    session, effort = record["session"], record["effort"]
+    flag = {"full": "", "quick": " --quick", "reduced": " --effort FILE"}[effort]
+    settings = ", ".join(f"{key} = {format_settings(value)}" for key, value in record.get("settings", {}).items())
+    reduced = f"with a reduced effort: {settings}, by" if effort == "reduced" else "by"
     return (
-        f"Computed by `nlp-gait reproduce {name}{' --quick' if record['effort'] == 'quick' else ''}`, version "
+        f"Computed {reduced} `nlp-gait reproduce {name}{flag}`, version "
         f"{session['versions']['nlp-gait']}, on {session['started'][:10]}, {session['machine']['processor']}."
     )
 

@@ -48,3 +48,11 @@ def test_an_unknown_paper_is_one_sentence(tmp_path: Path) -> None:
     assert done.exit_code == 1
     assert done.stderr == "nlp-gait: unknown reproduction 'walk1'; did you mean 'walk12'?\n"
     assert not (tmp_path / "out").exists()
+
+
+def test_an_effort_is_read_from_a_file_or_is_the_quick_one(tmp_path: Path) -> None:
+    file = tmp_path / "effort.json"
+    file.write_text('{"runs": "many"}')
+    command = ["reproduce", "walk12", "--effort", str(file), "--out", str(tmp_path / "out")]
+    assert "runs must be a whole number, got 'many'" in RUN.invoke(app, command).stderr
+    assert "omit one" in RUN.invoke(app, [*command, "--quick"]).stderr
