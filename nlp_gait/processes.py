@@ -38,13 +38,18 @@ PR_SET_PDEATHSIG = 1
 def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("fork")
     results, sender = context.Pipe(duplex=False)
-    process = context.Process(target=work, args=(sender,), daemon=True)
+    process = context.Process(target=_begin, args=(work, sender), daemon=True)
     with warnings.catch_warnings():
         # Python warns of forks of a process with threads. The locks that the work takes are free in the child.
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
     sender.close()
     return results, process
+
+
+def _begin(work: Callable[[Connection], None], sender: Connection) -> None:
+    multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
+    work(sender)
 
 
 def run_in_forks(
@@ -132,16 +137,19 @@ def _raise_errors(result: Any) -> Any:
     return result
 
 
-def run_in_isolation(call: Callable[[], bytes], time_limit_s: float | None, most_bytes: int) -> bytes:
+def run_in_isolation(
+    call: Callable[[], bytes], time_limit_s: float | None, most_bytes: int, memory_bytes: int | None = None
+) -> bytes:
     """Return what a call returns, at most so many bytes, in a forked process with its own session, without input and output.
 
     The call may hang, crash, exit or print. Its process and everything that it has started are killed at the end.
+    With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only).
 
     Raises:
         TimeoutError: the time limit, if there is one, has passed.
         WorkerError: the process ended without a result; the message says how.
     """
-    results, process = _fork(lambda sender: _isolate(sender, call))
+    results, process = _fork(lambda sender: _isolate(sender, call, memory_bytes))
     try:
         if not wait([results, process.sentinel], time_limit_s):
             raise TimeoutError
@@ -163,11 +171,13 @@ def run_in_isolation(call: Callable[[], bytes], time_limit_s: float | None, most
         results.close()
 
 
-def _isolate(sender: Connection, call: Callable[[], bytes]) -> None:
+def _isolate(sender: Connection, call: Callable[[], bytes], memory_bytes: int | None) -> None:
     show_working_folder()
     os.setsid()
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        if memory_bytes is not None:
+            _limit_memory(memory_bytes)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in (0, 1, 2):
@@ -177,6 +187,16 @@ def _isolate(sender: Connection, call: Callable[[], bytes]) -> None:
     sender.send_bytes(call())
     sender.close()
     os._exit(0)  # without the exit handlers of the parent
+
+
+def _limit_memory(further_bytes: int) -> None:
+    import resource
+
+    with open("/proc/self/statm", encoding="ascii") as file:
+        taken = int(file.read().split()[0]) * mmap.PAGESIZE
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = taken + further_bytes
+    resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:

@@ -17,12 +17,14 @@ import numpy as np
 from nlp_gait.errors import RobotDataError
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.inertia import Array, rotate
+from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.robot import are_plausible
 
 PACKAGE = "package://"
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 STL_HEADER, STL_TRIANGLE = 84, 50  # bytes
 DEEPEST_NODE = 32  # of a Collada scene
+MOST_POINTS = 4_000_000
 RIM = 24  # points of a cylinder's edge
 
 
@@ -75,7 +77,15 @@ def cylinder_points(radius: float, half_length: float) -> Array:
 
 
 def mesh_points(path: Path) -> Array:
-    """Read the corners (N, 3) of a mesh in the file's own unit, those of Collada in metres; raises RobotDataError."""
+    """Read the corners (N, 3) of a mesh in the file's own unit, those of Collada in metres; raises RobotDataError.
+
+    It is read in a child process with limits, see ``limits.py``.
+    """
+    data = read_in_child(f"mesh {str(path)!r}", lambda: np.asarray(_read_points(path), float).tobytes())
+    return np.frombuffer(data).reshape(-1, 3).copy()
+
+
+def _read_points(path: Path) -> Array:
     data = read_bytes(path, "mesh", error=RobotDataError)
     readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}
     reader = readers.get(path.suffix.lower())
@@ -119,8 +129,10 @@ def _read_collada(data: bytes) -> Array:
         raise ValueError(f"up_axis {up!r} is not supported")
     scene = root.find("library_visual_scenes/visual_scene")
     placed: list[Array] = []
+    total = 0
 
     def visit(node: Any, pose: Array, level: int) -> None:
+        nonlocal total
         if level > DEEPEST_NODE:
             raise ValueError("its nodes are nested too deeply")
         for part in node:
@@ -128,6 +140,9 @@ def _read_collada(data: bytes) -> Array:
                 pose = pose @ _transform(part)
             elif part.tag == "instance_geometry":
                 points = geometries[part.get("url")]
+                total += len(points)
+                if total > MOST_POINTS:
+                    raise ValueError(f"its instances have more than {MOST_POINTS} points; simplify it")
                 placed.append(points @ pose[:3, :3].T + pose[:3, 3])
             elif part.tag == "node":
                 visit(part, pose, level + 1)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import read_bytes
 from nlp_gait.robots.inertia import Array, Mass, combine_masses
+from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import box_points, cylinder_points
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 
@@ -102,17 +104,41 @@ def _compile(path: str) -> Any:
 
 @lru_cache(maxsize=4)
 def _read(place: str, path: str) -> Any:
-    mujoco = import_module("mujoco")
+    mujoco = import_module("mujoco")  # before the fork, which would import it in vain
+    told, _, data = read_in_child(f"robot file {path!r}", partial(_compile_binary, mujoco, path)).partition(b"\n")
+    for text in json.loads(told):
+        LOG.warning("robot file %r: %s", path, text)
     try:
         with log_warnings(mujoco, path):
-            model = mujoco.MjModel.from_xml_path(path)
+            model = mujoco.MjModel.from_binary_path("robot.mjb", {"robot.mjb": data})
         for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
             if not are_plausible(getattr(model, name)):
                 raise ValueError(f"{name} must hold finite numbers within {LARGEST_NUMBER:g}")
         return model
+    except Exception as error:
+        raise _convert(path, error) from error
+
+
+def _compile_binary(mujoco: Any, path: str) -> bytes:
+    """Return MuJoCo's warnings as a line of JSON, and the compiled model in its binary format; for a process of its own."""
+    warnings: list[str] = []
+    mujoco.set_mju_user_warning(warnings.append)
+    try:
+        model = mujoco.MjModel.from_xml_path(path)
+        data = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+        mujoco.mj_saveModel(model, None, data)
+    except MemoryError:
+        raise
     except Exception as error:  # ValueError, and any error of a plugin or decoder
-        reason = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}") from error
+        if "unknown exception" in str(error):  # of C++: no memory
+            raise MemoryError from error
+        raise _convert(path, error) from error
+    return json.dumps(warnings).encode() + b"\n" + data.tobytes()
+
+
+def _convert(path: str, error: Exception) -> RobotDataError:
+    reason = " ".join(str(error).split())[:300] or type(error).__name__
+    return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}")
 
 
 @contextmanager
