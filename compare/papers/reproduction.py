@@ -37,9 +37,9 @@ from compare.report.provenance import (
     format_settings,
     make_citation_section,
     make_reference_table,
-    make_session_section,
     make_solver_table,
 )
+from compare.report.session_section import make_session_section
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 from compare.study.manifest import Session

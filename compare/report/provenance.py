@@ -1,19 +1,17 @@
-"""Where numbers come from: settings and seeds of solvers, and the commands, machines and versions that computed them."""
+"""Where numbers come from: settings and seeds of solvers, shipped best known values, sources to cite."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any
 
 from compare.analysis.comparison import read_objective
 from compare.analysis.statistics.run_length import find_best_known, relative_gap
 from compare.analysis.units import percent, with_unit
-from compare.report.document import Document, Prose, Section, Table, text_table
+from compare.report.document import Prose, Section, Table, text_table
 from compare.study.citations import cite_problems
-from compare.study.manifest import Session
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
@@ -22,8 +20,6 @@ from metaheuristics.registry import ALGORITHMS, algorithm
 from nlp_gait.backends.identity import HASH
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import GaitError
-
-D = TypeVar("D", bound=Document)
 
 # The one explanation of each term, on every page that uses it.
 TERMS = Prose(
@@ -40,24 +36,6 @@ def make_citation_section(records: Iterable[RunRecord]) -> Section:
     entries = cite_problems(record.definition["problem"] for record in records)
     words = "The software and the papers whose problems are used here; `nlp-gait cite` prints these entries:"
     return Section(title="How to cite", parts=(Prose(f"{words}\n\n```bibtex\n{entries}\n```"),))
-
-
-def make_session_section(number: int, session: Session) -> Section:
-    """Return the command, machine and versions of a session."""
-    rows = [
-        ("command", session.command),
-        ("started", session.started),
-        *session.machine.items(),
-        ("workers", session.jobs),
-        ("compiled objective", session.kernel),
-        ("versions", ", ".join(f"{name} {version}" for name, version in session.versions.items())),
-    ]
-    return Section(title=f"Session {number}", parts=(text_table(("what", "value"), rows, prose=True),))
-
-
-def add_session(document: D, command: str, jobs: str = "1") -> D:
-    """Return a document with the session that makes it: this command, machine and versions."""
-    return replace(document, parts=(*document.parts, make_session_section(1, Session.begin(command, jobs))))
 
 
 def make_solver_table(records: Iterable[RunRecord]) -> Table:

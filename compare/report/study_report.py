@@ -19,8 +19,8 @@ from compare.report.provenance import (
     compare_with_defaults,
     format_settings,
     make_citation_section,
-    make_session_section,
 )
+from compare.report.session_section import make_session_section
 from compare.report.writing import write_document
 from compare.study.description import describe_solver, list_described_names
 from compare.study.evidence import Exclusion, read_evidence
