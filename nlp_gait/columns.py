@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import read_text
+from nlp_gait.files import is_number, read_text
 
 DELIMITERS = ",;\t"
 MOST = 2**63 - 1  # a whole number in 64 bits, as other programs read it
@@ -82,7 +82,7 @@ def read_table(path: Path, what: str) -> Table:
     lines = enumerate(csv.reader(text.splitlines(), delimiter=delimiter), start=1)
     found = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
     header: tuple[str, ...] = ()
-    if found and not all(_is_number(cell) for cell in found[0][1] if cell):
+    if found and not all(is_number(cell) for cell in found[0][1] if cell):
         header = tuple(found.pop(0)[1])
         if len(set(header)) < len(header):
             raise InputError(f"{owner}: two columns have the same name")
@@ -94,15 +94,7 @@ def read_table(path: Path, what: str) -> Table:
         if len(row) != width:
             raise InputError(f"{owner}, line {number}: {len(row)} cells, but {width} columns")
         for cell in row:
-            if cell and not _is_number(cell):
+            if cell and not is_number(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
         rows.append(tuple(float(cell) if cell else math.nan for cell in row))
     return Table(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

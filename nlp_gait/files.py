@@ -123,12 +123,13 @@ def format_csv(rows: Iterable[Sequence[object]]) -> str:
 
 
 def _escape_formula(cell: object) -> object:
-    if not isinstance(cell, str) or cell in FORMULA or not cell.lstrip().startswith(FORMULA) or _is_number(cell):
+    if not isinstance(cell, str) or cell in FORMULA or not cell.lstrip().startswith(FORMULA) or is_number(cell):
         return cell
     return f"'{cell}"
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Return whether Python reads a text as a number."""
     try:
         float(text)
     except ValueError:
