@@ -1,7 +1,7 @@
 """Biped gait problems, written once as symbolic CasADi models.
 
 ``load`` makes a problem; ``solve`` gives it to IPOPT, or to another NLP solver (``make_solver``); ``compile_objective`` gives its
-exact functions to search algorithms.
+exact functions to search algorithms, and ``compile_function`` compiles any CasADi function for batches.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from nlp_gait.backends.functions.compiled_function import CompiledFunction, compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -29,6 +30,8 @@ _LAZY = {
     "problem_names": "nlp_gait.formulation:problem_names",
     "CompiledObjective": "nlp_gait.backends.kernel.compiled:CompiledObjective",
     "compile_objective": "nlp_gait.backends.kernel.compiled:compile_objective",
+    "CompiledFunction": "nlp_gait.backends.functions.compiled_function:CompiledFunction",
+    "compile_function": "nlp_gait.backends.functions.compiled_function:compile_function",
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt:IpoptSettings",
     "Solution": "nlp_gait.formulation.solution:Solution",
     "solve": "nlp_gait.backends.solve:solve",
@@ -56,11 +59,13 @@ FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
 FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 
 __all__ = [
+    "CompiledFunction",
     "CompiledObjective",
     "GaitError",
     "GaitProblem",
     "IpoptSettings",
     "Solution",
+    "compile_function",
     "compile_objective",
     "load",
     "problem_names",

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
+from pathlib import Path
 from random import Random
 from typing import Any, Literal
 
@@ -16,6 +15,7 @@ import numpy as np
 from nlp_gait.backends.kernel.compiler import Compiler, find_compiler, native_lanes
 from nlp_gait.backends.kernel.evaluators import InterpretedKernel, NativeKernel
 from nlp_gait.backends.kernel.kernel_source import build_kernel
+from nlp_gait.backends.kernel.threads import RowThreads
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.numbers import to_floats
@@ -26,8 +26,6 @@ CHECK_TOLERANCE = 1e-6
 CHECK_POINTS = 5
 LANE_COUNTS = (1, 2, 4, 8)
 MOST_THREADS = 1024
-# Least work of a thread; handing over work costs about 0.05 ms.
-LEAST_THREAD_TIME_S = 3e-4
 
 
 class CompiledObjective:
@@ -61,10 +59,8 @@ class CompiledObjective:
         #: (m - n,) what each row of ``inequalities`` belongs to: its name without the place
         self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
         self._p = np.array(problem.p)
-        self._threads = threads
-        self._time_per_row_s = 0.0
+        self._threads = RowThreads(threads)
         self._rebuild = rebuild
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def __call__(self, X: Array | Mapping[str, float]) -> tuple[Array, Array]:
         """Return (P,) costs and (P,) violations of candidates X (P, n), or of one candidate by name, as in ``solution.x``.
@@ -100,32 +96,11 @@ class CompiledObjective:
         return self._rebuild, (self.problem,)
 
     def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
-        rows = len(X)
-        parts = min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S))
-        started = time.perf_counter()
-        if parts <= 1:
-            self._evaluate_part(X, f, violation, g)
-        else:
-            cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
-            pieces = [(X[cut], f[cut], violation[cut], None if g is None else g[cut]) for cut in cuts]
-            pool = self._get_pool()
-            jobs = [pool.submit(self._evaluate_part, *piece) for piece in pieces[1:]]
-            self._evaluate_part(*pieces[0])
-            wait(jobs)
-            for job in jobs:
-                job.result()
-        if rows:
-            self._time_per_row_s = (time.perf_counter() - started) * max(parts, 1) / rows
+        def evaluate(cut: slice) -> None:
+            part = None if g is None else g[cut]
+            self._evaluator(X[cut], self._p, self._lower, self._upper, f[cut], violation[cut], part)
 
-    def _evaluate_part(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
-        self._evaluator(X, self._p, self._lower, self._upper, f, violation, g)
-
-    def _get_pool(self) -> ThreadPoolExecutor:
-        process = os.getpid()  # a forked process has no threads of its parent, and starts its own
-        if self._pool is None or self._pool[0] != process:
-            # Two threads at once may start two pools; the one that is overwritten ends with its work.
-            self._pool = process, ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
-        return self._pool[1]
+        self._threads.run(len(X), evaluate)
 
     def _check(self, X: Array | Mapping[str, float]) -> Array:
         if isinstance(X, Mapping):
@@ -165,13 +140,8 @@ def compile_objective(
         raise InputError(
             f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can satisfy; use solve"
         )
-    if threads is not None:
-        threads = check_count("threads", threads, at_most=MOST_THREADS)
-    if lanes is not None and check_count("lanes", lanes) not in LANE_COUNTS:
-        raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
-    count = native_lanes() if lanes is None else lanes
+    used, count = check_parallelism(threads, lanes)
     evaluator: NativeKernel | InterpretedKernel
-    used = threads or available_cores()
     try:
         compiler = find_compiler()
         evaluator = problem.build_once(_build_native, compiler, count)
@@ -204,12 +174,26 @@ def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> Nativ
     native(X, np.array(problem.p), lower, upper, f, violation, g)
     found = np.column_stack([f, g])
     expected = np.array([np.concatenate([np.array(v).ravel() for v in kernel.function(x, problem.p)]) for x in X])
-    alike = np.isclose(found, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
-    if 2 * np.count_nonzero(alike) <= CHECK_POINTS:
-        raise CompilerError(
-            f"{native.library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
-        )
+    check_agreement(found, expected, native.library)
     return native
+
+
+def check_agreement(found: Array, expected: Array, library: Path) -> None:
+    """Raise CompilerError if a library's values (P, m) differ from the virtual machine's at half of the points or more."""
+    alike = np.isclose(found, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
+    if 2 * np.count_nonzero(alike) <= len(found):
+        raise CompilerError(
+            f"{library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
+        )
+
+
+def check_parallelism(threads: int | None, lanes: int | None) -> tuple[int, int]:
+    """Return the number of threads, all cores for None, and of lanes, the CPU's best for None; raises InputError."""
+    if threads is not None:
+        threads = check_count("threads", threads, at_most=MOST_THREADS)
+    if lanes is not None and check_count("lanes", lanes) not in LANE_COUNTS:
+        raise InputError(f"lanes must be 1, 2, 4 or 8, got {lanes}")
+    return threads or available_cores(), native_lanes() if lanes is None else lanes
 
 
 def available_cores() -> int:

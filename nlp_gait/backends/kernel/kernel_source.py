@@ -51,16 +51,21 @@ def _build(problem: GaitProblem) -> Kernel:
 
 def write_kernel_source(function: ca.Function) -> str:
     """Return the C++ source of a kernel (x, p) to (cost, g); the lane count is the macro LANES."""
-    generator = ca.CodeGenerator("kernel", {"casadi_real": "Lanes"})
-    generator.add(function)
     return "\n".join(
         [
             read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
-            "#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of lanes.hpp",
-            re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump()),
+            generate_lane_code(function),
             f"#define VARIABLES {function.size1_in(0)}",
             f"#define PARAMETERS {function.size1_in(1)}",
             f"#define ROWS {function.size1_out(1)}",
             read_native_source("nlp_gait.backends.kernel", "batch.hpp"),
         ]
     )
+
+
+def generate_lane_code(function: ca.Function) -> str:
+    """Return CasADi's C code of a function named ``kernel``, over the numbers of lanes.hpp."""
+    generator = ca.CodeGenerator("kernel", {"casadi_real": "Lanes"})
+    generator.add(function)
+    code = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
+    return f"#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of lanes.hpp\n{code}"

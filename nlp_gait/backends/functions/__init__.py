@@ -1,0 +1,1 @@
+"""Any CasADi function as native code that evaluates batches of rows."""
