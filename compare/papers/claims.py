@@ -7,6 +7,7 @@ check that decides by other means names them in the claim's ``criterion``.
 from __future__ import annotations
 
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
@@ -125,17 +126,52 @@ def compare_changes(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Ch
     return Check(rule, values)
 
 
+def compare_readings(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
+    """Return a check of values (n,) by ours (readings, n), where a paper can be read or measured in several ways.
+
+    The claim holds if all are within its tolerance. It does not hold if one value is too high under every reading, or too low
+    under every one. Otherwise the choice of a reading would decide, and it cannot be tested.
+    """
+
+    def rule(claim: Claim) -> tuple[Verdict, str]:
+        rows = np.atleast_2d(ours)
+        off = [np.where(_find_within(claim, printed, row), 0.0, np.sign(row - printed)) for row in rows]
+        if not np.any(off):
+            return Verdict.HOLDS, ""
+        wrong = np.abs(np.mean(off, axis=0)) == 1.0
+        if wrong.any():
+            return Verdict.FAILS, f"({wrong.sum()} of {wrong.size} under every reading)" if wrong.size > 1 else ""
+        return Verdict.UNTESTABLE, "(readings differ)"
+
+    return Check(rule, values)
+
+
 def require_change(ours: ArrayLike, /, **values: Any) -> Check:
     """Return a check of a claim that prints a direction without a size.
 
-    It holds if all of our changes, positive in the claimed direction, are at least as large as the claim's ``least``.
+    It holds if all of our changes, positive in the claimed direction, are at least as large as the claim's ``least``. Of changes
+    (readings, n) it cannot be tested if that is so under some readings only.
     """
 
     def rule(claim: Claim) -> tuple[Verdict, str]:
         least, _ = _parse_size(claim.least)
-        return (Verdict.HOLDS if (np.asarray(ours) >= least).all() else Verdict.FAILS), ""
+        return unite_readings((np.atleast_2d(ours) >= least).all(axis=1))
 
     return Check(rule, values)
+
+
+def unite_readings(held: ArrayLike) -> tuple[Verdict, str]:
+    """Return the verdict of a claim that holds under some readings of the paper, with its detail."""
+    counts = Counter(np.atleast_1d(held).tolist())
+    if len(counts) < 2:
+        return (Verdict.HOLDS if counts[True] else Verdict.FAILS), ""
+    return Verdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"
+
+
+def require_feasible(check: Check, infeasible: Iterable[str]) -> Check:
+    """Return a check whose verdict is "not shown" if a result that it needs is infeasible, for texts that say by how much."""
+    texts = "; ".join(infeasible)
+    return Check(lambda _: (Verdict.NOT_SHOWN, f"({texts})"), check.values) if texts else check
 
 
 def require_significance(check: Check, test: str, p: float) -> Check:

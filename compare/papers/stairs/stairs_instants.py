@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -110,7 +111,7 @@ def track_by_instants(instants: Instants, algorithm: Algorithm, evaluations: int
     """
     lower, upper = instants.bounds
     names = tuple(f"x{i}" for i in range(len(lower)))
-    state, moments = instants.inputs[0][0], list[Mapping[str, Array]]()
+    state, moments, started = instants.inputs[0][0], list[Mapping[str, Array]](), time.perf_counter()
     for k in range(instants.loop.quanta):
         objective = Instant(instants=instants, k=k, state=state, names=names, lower=lower, upper=upper)
         x = minimize(objective, algorithm, evaluations=evaluations, seed=k).x
@@ -122,6 +123,7 @@ def track_by_instants(instants: Instants, algorithm: Algorithm, evaluations: int
     return {
         "quanta": len(moments),
         "finite": len(moments) == instants.loop.quanta,
+        "time_s": time.perf_counter() - started,
         "cost": float(all_of["cost"].mean()),
         "energy_J": float(all_of["power_W"].sum()) * QUANTUM,
         "largest_error_rad": float(all_of["error_rad"].max()),

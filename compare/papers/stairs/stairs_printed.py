@@ -62,7 +62,7 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
     }
 
 
-def count_equations(places: Iterable[str]) -> int:
-    """Return how many equations places such as "(3), (4)" and "(15)-(20)" name."""
+def list_equations(places: Iterable[str]) -> list[int]:
+    """Return the numbers of the equations that places such as "(3), (4)" and "(15)-(20)" name."""
     pairs = [pair for place in places for pair in re.findall(r"\((\d+)\)(?:-\((\d+)\))?", place)]
-    return len({number for first, last in pairs for number in range(int(first), int(last or first) + 1)})
+    return sorted({number for first, last in pairs for number in range(int(first), int(last or first) + 1)})

@@ -18,7 +18,7 @@ from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs import stairs_tracking as tracking
 from compare.papers.stairs.stairs_figures import draw_figures
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_printed import count_equations
+from compare.papers.stairs.stairs_printed import list_equations
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
@@ -27,6 +27,7 @@ from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES, PAPER_TIMES
 
 NEAR_BOUND = 0.01  # of a gain's range
+LACKING = "the paper gives no value"  # reason in the table of differences
 
 
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
@@ -68,7 +69,21 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         **_compute_growth(findings),
         **plan_claims.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
-        "failed_equations": count_equations(row.where for row in REPRODUCTION.printed.differences if row.cannot_run),
+        **_list_failed_equations(),
+    }
+
+
+def _list_failed_equations() -> dict[str, str]:
+    """Return the numbered equations that contradict themselves or each other, and those that only lack values."""
+    rows = [row for row in REPRODUCTION.printed.differences if row.cannot_run]
+    lacking = [row.cannot_run.startswith(LACKING) and ";" not in row.cannot_run for row in rows]
+    found = {"contradictory": False, "lacking": True}
+    return {
+        name: ", ".join(
+            f"({n})"
+            for n in list_equations(row.where for row, is_so in zip(rows, lacking, strict=True) if is_so == lacks)
+        )
+        for name, lacks in found.items()
     }
 
 
@@ -125,7 +140,7 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
         **planning.make_planning_tables(findings),
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
-        "printed-scheme": _list_results(findings, "printed"),
+        "printed-scheme": [row[:8] for row in _list_results(findings, "printed")],
         "replay": _list_results(findings, "replay"),
         "learned": _list_results(findings, "learned"),
         **tracking.make_tracking_tables(findings),
@@ -137,10 +152,19 @@ def _list_results(findings: StairsFindings, name: str) -> Rows:
 
 
 def _list_table_3(findings: StairsFindings) -> Rows:
-    plans = [findings.plan(case, what) for what in planning.PLANS for case in findings.cases]
-    printed = {name: f"{value:g}" for name, value in TABLE_3.items()}
-    names = [variable.name for variable in GOVERNING_VARIABLES]
-    return [[name, printed.get(name), *(plan[name] for plan in plans)] for name in names]
+    plans = {f"{what} {case}": findings.plan(case, what) for what in planning.PLANS for case in findings.cases}
+    rows: list[Sequence[Value]] = []
+    for variable in GOVERNING_VARIABLES:
+        name, ends = variable.name, (variable.lower, variable.upper)
+        values, near = {key: plan[name] for key, plan in plans.items()}, MATCH * (ends[1] - ends[0])
+        at = [
+            key.replace("plan", "energy")
+            for key, value in values.items()
+            if np.abs(np.subtract(ends, value)).min() < near
+        ]
+        paper = f"{TABLE_3[name]:g}" if name in TABLE_3 else None
+        rows.append([name, paper, *values.values(), "{:g} to {:g}".format(*ends), ", ".join(at)])
+    return rows
 
 
 def _list_plans(findings: StairsFindings, what: str, case: int) -> Rows:
@@ -222,6 +246,7 @@ def _list_network(network: Mapping[str, Any]) -> Rows:
             1e3 * float(np.mean(found["time_s"][1:])),
             found["largest_angle_error_rad"],
             found["mean_angle_error_rad"],
+            found["bent_otherwise"],
         ]
         for rule, found in network.items()
     ]

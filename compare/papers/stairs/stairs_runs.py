@@ -19,7 +19,7 @@ from compare.papers.paper_runs import (
     make_search_tasks,
     make_start_tasks,
 )
-from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, PLAN_CHOICES
+from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, PLAN_CHOICES, PRINTED
 from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
@@ -61,7 +61,7 @@ class StairsEffort(Effort):
     plan_starts: int = 20  # of IPOPT on the plan of least energy
     jerk_starts: int = 20  # on that of least peak jerk
     first_starts: int = 5  # on the first step
-    hip_starts: int = 6  # on the plan of least energy with the paper's hip height
+    hip_starts: int = 6  # on the plan of least energy with the paper's hip height and none of our limits
     ideal_starts: int = 3
     runs: int = 3  # of each search
     plan_evaluations: int = 10_000
@@ -121,7 +121,7 @@ def make_ideal_spec(effort: StairsEffort, case: int) -> ProblemSpec:
     return ProblemSpec(name="stairs-ideal", options=options, values=get_stair(case), label=f"ideal-{case}")
 
 
-def make_track_spec(case: int, plan: Mapping[str, float], **options: str) -> ProblemSpec:
+def make_track_spec(case: int, plan: Mapping[str, float], **options: str | bool) -> ProblemSpec:
     """Return the tracking of a plan, given by the planner's variables, in a case."""
     values = {**get_stair(case), **{name: plan[name] for name in PLAN}}
     return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
@@ -176,12 +176,13 @@ class StairsFindings:
 
 def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
     """Yield ideals and plans, on the paper's stairs and on others."""
-    height = TABLE_3["hip_height_m"]
+    height, least = TABLE_3["hip_height_m"], PLAN_CHOICES["no-limits"]
     for case in effort.cases:
         plan = make_plan_spec(effort, case)
-        fixed = {**plan.values, "hip_height_m.lower": height, "hip_height_m.upper": height}
+        fixed = {**plan.values, **least.values, "hip_height_m.lower": height, "hip_height_m.upper": height}
         yield from make_start_tasks(make_ideal_spec(effort, case), effort.ideal_starts, seed=case)
-        low, settings = replace(plan, values=fixed, label=f"hip-{case}"), effort.plan_settings
+        low = replace(plan, options={**plan.options, **least.options}, values=fixed, label=f"hip-{case}")
+        settings = effort.plan_settings
         yield from make_start_tasks(plan, effort.plan_starts, settings=settings)
         yield from make_start_tasks(make_plan_spec(effort, case, "jerk"), effort.jerk_starts, settings=settings)
         yield from make_start_tasks(low, effort.hip_starts, settings=settings)
@@ -215,9 +216,9 @@ def make_computations(findings: StairsFindings) -> Iterator[Computation]:
         track, x = make_track_spec(case, plan), get_point(findings.best_track(case))
         ideal_x = get_point(findings.best("ideal", case))
         yield make_computation(f"replay-{case}", ideal, partial(replay_ideal, ideal), x=ideal_x)
-        yield make_computation(f"printed-{case}", track, run_printed_scheme, case=case, plan=plan)
-        for what in ("plan", "jerk"):
-            used = findings.plan(case, what)
+        jerk = findings.plan(case, "jerk")
+        yield make_computation(f"printed-{case}", track, run_printed_scheme, case=case, plan=plan, jerk=jerk, x=x)
+        for what, used in (("plan", plan), ("jerk", jerk)):
             spec = make_track_spec(case, used)
             yield make_computation(f"differences-{what}-{case}", spec, difference_angles, case=case, plan=used)
         yield make_computation(f"learned-{case}", track, track_with_network, case=case, plan=plan, x=x)
@@ -235,7 +236,8 @@ def train_network(case: int, plan: Mapping[str, float], poses: int) -> dict[str,
     found = {}
     for name, settings in RULES.items():
         path = network_angles(hip_to_ankle, *lengths, settings)
-        error = np.abs(path.angles - q)
+        error = np.abs((path.angles - q + np.pi) % (2 * np.pi) - np.pi)
+        bends = np.sign(np.sin(np.diff([path.angles, q], axis=2)))[..., 0]
         found[name] = {
             "converged": int((path.error_m2 <= settings.tolerance_m2).sum()),
             "poses": len(q),
@@ -243,6 +245,7 @@ def train_network(case: int, plan: Mapping[str, float], poses: int) -> dict[str,
             "time_s": path.time_s.tolist(),
             "largest_angle_error_rad": float(error.max()),
             "mean_angle_error_rad": float(error.mean()),
+            "bent_otherwise": int((bends[0] != bends[1]).sum()),
         }
     return found
 
@@ -252,17 +255,38 @@ def roll_out(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[st
     return make_track_spec(case, plan).load().signals(np.array(x)).arrays
 
 
-def run_printed_scheme(case: int, plan: Mapping[str, float]) -> dict[str, float]:
-    """Return the quanta that the paper's gains survive in the explicit scheme, and the errors in the implicit one."""
+def run_printed_scheme(
+    case: int, plan: Mapping[str, float], jerk: Mapping[str, float], x: Sequence[float]
+) -> dict[str, float]:
+    """Return what the paper's gains do on a plan, and the best ones x with an upright torso.
+
+    They are the quanta that the explicit scheme survives, also without contacts or gains; the largest errors in the implicit one,
+    also with everything as printed on the plan of least jerk; and the energy and ZMP margin of the upright torso.
+    """
     row = TABLE_4[case]
-    x = [row.kp, row.kd, row.torso_pitch_rad]
+    gains, none = [row.kp, row.kd, row.torso_pitch_rad], [0.0, 0.0, row.torso_pitch_rad]
     compensated = make_track_spec(case, plan).load()
     implicit = compensated.with_values(gravity_compensation=0.0)
     explicit = make_track_spec(case, plan, scheme="explicit").load().with_values(gravity_compensation=0.0)
+    floating = explicit.with_values(ground_stiffness_N_m=0.0, ground_damping_N_s_m=0.0)
+    as_printed = make_track_spec(case, jerk, **CHOICES[PRINTED].options).load().with_values(**CHOICES[PRINTED].values)
+    quanta = {
+        "_printed": (explicit, gains),
+        "_floating": (floating, gains),
+        "_slack": (explicit, none),
+        "_free": (floating, none),
+    }
+    errors = {"implicit": implicit, "compensated": compensated, "hip": as_printed}
+    upright = evaluate(compensated, [*x[:2], np.pi / 2]).indexes
     return {
-        "explicit_quanta": evaluate(explicit, x).indexes["quanta_before_divergence"],
-        "implicit_largest_error_rad": evaluate(implicit, x).indexes["largest_error_rad"],
-        "compensated_largest_error_rad": evaluate(compensated, x).indexes["largest_error_rad"],
+        **{
+            f"explicit{name}_quanta": evaluate(*how).indexes["quanta_before_divergence"] for name, how in quanta.items()
+        },
+        **{
+            f"{name}_largest_error_rad": evaluate(how, gains).indexes["largest_error_rad"]
+            for name, how in errors.items()
+        },
+        **{f"upright_{name}": upright[name] for name in ("energy_J", "zmp_margin_min_m")},
     }
 
 

@@ -18,12 +18,14 @@ from compare.papers.claims import (
     Verdict,
     compare_changes,
     compare_levels,
+    compare_readings,
     decide,
     describe_criterion,
     fill_differences,
     make_claims_table,
     make_differences_table,
     require_change,
+    require_feasible,
     require_significance,
 )
 from nlp_gait.errors import OutputError
@@ -67,6 +69,13 @@ PAPERS = ("nao", "walk12", "stairs")  # whose claims and differences the documen
         (compare_changes(-13.0, 0.0), "does not hold", "(printed -13, here 0)"),
         (require_change(0.5), "holds", ""),
         (require_change([0.5, 0.2]), "does not hold", ""),
+        (require_change([[0.5, 0.2], [0.2, 0.5]]), "does not hold", ""),
+        (require_change([[0.5, 0.4], [0.2, 0.5]]), "cannot be tested here", "(holds under 1 of 2 readings)"),
+        (compare_readings([2.0, 4.0], [[2.0, 3.9], [2.05, 4.0]]), "holds", ""),
+        (compare_readings([2.0, 4.0], [[2.0, 4.3], [1.0, 4.9]]), "does not hold", "(1 of 2 under every reading)"),
+        (compare_readings(2.0, [[2.2], [1.8]]), "cannot be tested here", "(readings differ)"),
+        (require_feasible(decide(True), []), "holds", ""),
+        (require_feasible(decide(False), ["knee by 1 rad", "hip by 2 N"]), "not shown", "(knee by 1 rad; hip by 2 N)"),
         (require_significance(compare_changes(-13.0, -13.0), "rank sum", 0.2), "not shown", "(rank sum, p = 0.2)"),
         (
             require_significance(compare_changes(-13.0, 13.0), "rank sum", 0.01),
