@@ -12,15 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from compare.analysis.best_known import ZERO, is_zero, relative_gap
 from compare.analysis.statistics.run_length import (
-    ZERO,
     Curve,
     Weighting,
     expected_running_time,
     find_best_known,
-    is_zero,
     make_curve,
-    relative_gap,
     tie,
 )
 from compare.analysis.units import percent, with_unit

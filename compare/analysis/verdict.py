@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
+from compare.analysis.best_known import describe_bound, relative_gap
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.solver_table import count
 from compare.analysis.statistics.inference import a12, holm, rank_sum, signed_rank
-from compare.analysis.statistics.run_length import is_zero, relative_gap
-from compare.analysis.units import join_words, percent, with_unit
+from compare.analysis.units import join_words, with_unit
 from compare.study.record import RunRecord
-from compare.study.references import OWN, Reference
 from compare.study.task import FUNCTION
-from nlp_gait.formulation import Objective
 
 # A run with at most this gap has found the best known value.
 FOUND = 1e-6
@@ -146,24 +144,3 @@ def describe_better(comparison: Comparison) -> str:
     value, gap = run.verdict.objective, relative_gap(run.verdict.objective, comparison.reference, comparison.objective)
     found = f"{with_unit(value, comparison.objective.unit)} by {run.solver}, run {run.run}"
     return f"a new best known value was found: {found}, {-100 * gap:.2g} % better than the shipped one"
-
-
-def describe_value(known: Reference, value: float, objective: Objective) -> str:
-    """Compare a feasible objective with the shipped best known value in one sentence; without one, say so."""
-    if known.objective is None:
-        return f"Best known value: {known.source.removeprefix(OWN)[2:]}"
-    best = f"{with_unit(known.objective, objective.unit)} ({known.source})"
-    if known.is_beaten_by(value, objective):
-        gap = -relative_gap(value, known.objective, objective)
-        return (
-            f"A new best known value: {100 * gap:.2g} % better than the best known {best}; please contribute the point"
-        )
-    return f"Best known value: {best}; this point is {percent(max(relative_gap(value, known.objective, objective), 0.0))} from it"
-
-
-def describe_bound(bound: float, best: float, unit: str) -> str:
-    """Describe a proven bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``."""
-    if is_zero(best):
-        return f"no feasible point is better than {with_unit(bound, unit)} (proven)"
-    gap = 100 * abs(bound - best) / abs(best)
-    return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"

@@ -99,7 +99,10 @@ def bench(
         f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
     )
     page = add_session(
-        make_leaderboard_page(board, name, suite_name), describe_command(), str(jobs or available_cores())
+        make_leaderboard_page(board, name, suite_name),
+        describe_command(),
+        [{"name": "gaitbench", "options": {"instance": id}} for id in chosen],
+        str(jobs or available_cores()),
     )
     written = write_document(out, page, "leaderboard")
 

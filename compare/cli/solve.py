@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
-from compare.analysis.verdict import describe_value
 from compare.cli.command import command
 from compare.cli.common import (
     end_interrupted,
@@ -81,9 +81,7 @@ def solve(
     data = {
         **solution.to_json(),
         "guaranteed": None if proven is None else asdict(proven),
-        "proven_bound": known.bound,
-        "best_known": known.objective,
-        "best_known_source": known.source,
+        **known.to_json(),
     }
     try:  # write before printing: a broken pipe must not lose the file
         if target is not None:

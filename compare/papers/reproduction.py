@@ -35,11 +35,10 @@ from compare.report.document import Rows, Section, Table, text_table
 from compare.report.provenance import (
     TERMS,
     format_settings,
-    make_citation_section,
     make_reference_table,
     make_solver_table,
 )
-from compare.report.session_section import make_session_section
+from compare.report.session_section import make_citation_section, make_session_section
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 from compare.study.manifest import Session
@@ -148,7 +147,7 @@ class Reproduction(Generic[E, F]):
             document,
             title=document.title if label == "full" else f"{document.title} ({label})",
             verdict=[*{"full": [], "quick": [QUICK], "reduced": [REDUCED]}[label], *count_verdicts(claims.values())],
-            parts=(*document.parts, provenance, make_citation_section(runner.records)),
+            parts=(*document.parts, provenance, make_citation_section(r.definition["problem"] for r in runner.records)),
         )
         write_document(folder, document)
         write_parts(folder, self.csv_tables(findings))

@@ -12,15 +12,17 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
+from compare.analysis.best_known import relative_gap
 from compare.analysis.units import axis_label, with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_starts
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import Figure, text_table
+from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import algorithm
-from nlp_gait.backends.identity import fingerprint, hash_json
+from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -43,7 +45,7 @@ class LongSearch:
 
     objective: float | None  #: best feasible one, in the problem's sense; None if there was none
     evaluations: int  #: used
-    gap: float | None  #: relative distance to the best optimum; negative if it is better
+    gap: float | None  #: relative distance to the best known value; negative if it is better
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,7 +65,7 @@ class Evidence:
         """What is proven, in one sentence."""
         c = self.certificate
         if c is None:
-            return f"nothing: branch and bound is for at most {MOST_VARIABLES} variables, and for NAO's phases"
+            return f"nothing here: none was requested, or there are over {MOST_VARIABLES} variables, and it is no phase of NAO"
         if not math.isfinite(c.bound):
             return f"nothing: the time limit was reached before a finite bound, after {c.boxes:,} boxes"
         unit = self.problem.objective.unit
@@ -86,7 +88,7 @@ class Evidence:
             f"{100 * self.unseen.largest_missed:.2g} % of starts"
         )
         if self.search is not None and self.search.gap is not None:
-            text += f"; CMA-ES is {100 * self.search.gap:+.2g} % from it after {self.search.evaluations:,} evaluations"
+            text += f"; after {self.search.evaluations:,} evaluations CMA-ES is {100 * self.search.gap:+.2g} % off the best known"
         return text
 
     def to_json(self) -> dict[str, Any]:
@@ -146,19 +148,22 @@ class Certainty(Question[Evidence]):
             raise InputError(
                 f"none of {self.starts} starts of {problem.name} converged to a feasible point; try more starts"
             )
-        best = optima[0]
-        identity = {**fingerprint(problem), "best": list(best.x)}
+        best, x = optima[0].objective, optima[0].x
+        known = find_reference(identify_problem(problem))
+        if known.objective is not None and problem.objective.sign * (best - known.objective) > 0.0:
+            best, x = known.objective, known.x
+        identity = {**fingerprint(problem), "best": list(x)}
         limits = {"tolerance": self.tolerance, "time_limit_s": self.time_limit_s}
 
         def prove() -> Certificate:
             name = f"proof-{hash_json({**identity, 'tolerance': self.tolerance})[:12]}.npz"
             checkpoint = None if store.folder is None else store.folder / name
-            return certify(problem, np.array(best.x), **limits, progress=progress, checkpoint=checkpoint)
+            return certify(problem, np.array(x), **limits, progress=progress, checkpoint=checkpoint)
 
         search = certificate = None
         if self.evaluations:
             inputs = {**identity, "evaluations": self.evaluations, "seed": self.seed}
-            function = partial(_search, problem, best.objective, self.evaluations, self.seed)
+            function = partial(_search, problem, best, self.evaluations, self.seed)
             search = work.compute(LongSearch, "cma-{key}", inputs, function)
             work.progress("long search")
         if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
@@ -173,6 +178,9 @@ class Certainty(Question[Evidence]):
             search=search,
             certificate=certificate,
         )
+
+    def get_optimum(self, findings: Evidence) -> float:
+        return findings.optima[0].objective
 
     def report(self, findings: Evidence) -> Answer:
         problem, unit = findings.problem, findings.problem.objective.unit
@@ -216,12 +224,11 @@ def search_point(problem: GaitProblem, seed: int = 0) -> Array:
 
 
 def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:
-    objective, sign = compile_objective(problem), problem.objective.sign
-    result = minimize(objective, algorithm("cma"), evaluations=evaluations, seed=seed)
+    result = minimize(compile_objective(problem), algorithm("cma"), evaluations=evaluations, seed=seed)
     if result.violation > FEASIBILITY_TOLERANCE:
         return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
-    value = sign * result.objective
-    return LongSearch(objective=value, evaluations=result.evaluations, gap=sign * (value - best) / abs(best))
+    value = problem.objective.sign * result.objective
+    return LongSearch(objective=value, evaluations=result.evaluations, gap=relative_gap(value, best, problem.objective))
 
 
 def plot_evidence(evidence: Evidence) -> Drawing:

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, Generic, TypeVar
 
+from compare.analysis.best_known import describe_value
 from compare.report.document import Document, Table, Value, text_table
 from compare.report.writing import write_document
+from compare.study.references import find_reference
 from compare.study.store import Store
 from compare.study.stored_solver import store_runs
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decode
 from nlp_gait.files import replace_nan, write_json
@@ -84,6 +87,17 @@ class Question(ABC, Generic[F]):
     @abstractmethod
     def report(self, findings: F) -> Answer:
         """Return the answer."""
+
+    def get_optimum(self, findings: F) -> float | None:
+        """Return the objective of the best point found for the problem itself; None if only changed problems are solved."""
+        return None
+
+    def add_best_known(self, findings: F) -> Answer:
+        """Return the answer with the shipped best known value of the problem and its distance from the optimum found."""
+        answer, known = self.report(findings), find_reference(identify_problem(self.problem))
+        sentence = describe_value(known, self.get_optimum(findings), self.problem.objective, "the optimum found here")
+        data = {**answer.data, **known.to_json()}
+        return replace(answer, verdict=(*answer.verdict, f"{sentence}."), data=data)
 
     def failures(self, findings: F) -> list[str]:
         """Return what failed, which ends the command with status 1."""

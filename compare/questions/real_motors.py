@@ -117,6 +117,9 @@ class Motors(Question[tuple[Variant, ...]]):
             work.progress(name)
             yield variants
 
+    def get_optimum(self, findings: tuple[Variant, ...]) -> float | None:
+        return findings[0].power_W if findings[0].feasible else None
+
     def report(self, findings: tuple[Variant, ...]) -> Answer:
         name, stem, kinds = self.problem.name, f"{self.problem.name}-motors", tuple(findings[0].uses)
         uses = [

@@ -19,8 +19,10 @@ from compare.drawing.figures import COLOURS, new_figure, style
 from compare.questions.question import Answer, Question, Work, make_csv_table
 from compare.report.document import Figure, Table, Value, text_table
 from compare.study.record import RunRecord, parse_record
+from compare.study.references import find_reference
 from compare.study.run_task import run_task, try_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
@@ -179,12 +181,25 @@ class Sweep(Question[list[SweepPoint]]):
             )
             for point in findings
         ]
+        known = [find_reference(identify_problem(place(problem, point.at))) for point in findings]
+        header = (*axes, objective.name, "status")
+        if any(value.objective is not None for value in known):
+            header = (*header, "best known")
+            rows = [
+                (
+                    *row,
+                    "-"
+                    if value.objective is None
+                    else f"{with_unit(value.objective, objective.unit)} ({value.source})",
+                )
+                for row, value in zip(rows, known, strict=True)
+            ]
         shown = "Optimum over the first axis; crosses where no feasible point was found."
         return Answer(
             stem=stem,
             title=f"{problem.name} by {solver}",
             parts=(
-                text_table((*axes, objective.name, "status"), rows, "Optima"),
+                text_table(header, rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem, solver)),
                 _make_csv(stem, findings, problem),
             ),

@@ -1,4 +1,4 @@
-"""Where numbers come from: settings and seeds of solvers, shipped best known values, sources to cite."""
+"""Where numbers come from: settings and seeds of solvers, shipped best known values."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
+from compare.analysis.best_known import relative_gap
 from compare.analysis.comparison import read_objective
-from compare.analysis.statistics.run_length import find_best_known, relative_gap
+from compare.analysis.statistics.run_length import find_best_known
 from compare.analysis.units import percent, with_unit
-from compare.report.document import Prose, Section, Table, text_table
-from compare.study.citations import cite_problems
+from compare.report.document import Prose, Table, text_table
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
@@ -29,13 +29,6 @@ TERMS = Prose(
     "counts n + 1, a Hessian (n + 1)(n + 2)/2, like finite differences. **Constraint**: one value between a lower and an "
     "upper bound; the bounds of the variables are not counted."
 )
-
-
-def make_citation_section(records: Iterable[RunRecord]) -> Section:
-    """Return how to cite the software and the sources of the problems of all records."""
-    entries = cite_problems(record.definition["problem"] for record in records)
-    words = "The software and the papers whose problems are used here; `nlp-gait cite` prints these entries:"
-    return Section(title="How to cite", parts=(Prose(f"{words}\n\n```bibtex\n{entries}\n```"),))
 
 
 def make_solver_table(records: Iterable[RunRecord]) -> Table:

@@ -18,9 +18,8 @@ from compare.report.provenance import (
     TERMS,
     compare_with_defaults,
     format_settings,
-    make_citation_section,
 )
-from compare.report.session_section import make_session_section
+from compare.report.session_section import make_citation_section, make_session_section
 from compare.report.writing import write_document
 from compare.study.description import describe_solver, list_described_names
 from compare.study.evidence import Exclusion, read_evidence
@@ -76,7 +75,7 @@ def make_study_document(
             *sections,
             *(() if simulated else (HOW,)),
             _make_method_section(comparisons, manifest, weighting),
-            make_citation_section(c.records[0] for c in comparisons),
+            make_citation_section(c.records[0].definition["problem"] for c in comparisons),
         ),
     )
 

@@ -37,6 +37,10 @@ class Reference:
     bound: float | None = None  #: proven: no feasible point has a better objective; None without a certificate
     source: str = OWN  #: in words, for example "shipped, proven to 1 %"
 
+    def to_json(self) -> dict[str, Any]:
+        """Return value, bound and source as plain data."""
+        return {"best_known": self.objective, "proven_bound": self.bound, "best_known_source": self.source}
+
     def is_beaten_by(self, value: float, objective: Objective) -> bool:
         """Return whether a feasible objective is better than the best known one, beyond the tolerance of feasibility."""
         if self.objective is None or math.isnan(value):

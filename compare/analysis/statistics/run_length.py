@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compare.analysis.best_known import is_zero, relative_gap
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Array, Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 # Relative distances from the best known objective for which reports give the expected running time.
 TARGETS = (1e-2, 1e-3, 1e-4, 1e-6)
-ZERO = 1e-8  # gaps from a smaller reference are absolute
 # Targets of the distribution: from 100 % above the best known to 1e-6, evenly in logarithm.
 ECDF_TARGETS: tuple[float, ...] = tuple(float(target) for target in np.logspace(0, -6, 31))
 
@@ -82,18 +82,6 @@ def make_curve(record: RunRecord, objective: Objective, reference: float, weight
         values[:] = math.nan  # an infeasible result has reached no target
     gaps = np.array([relative_gap(value, reference, objective) for value in values])
     return Curve(evaluations=evaluations, seconds=np.array(record.time_s.history, dtype=float), gap=gaps)
-
-
-def relative_gap(value: float, reference: float, objective: Objective) -> float:
-    """Return (value - reference) / |reference|, or the difference if ``is_zero``; positive if worse, infinite for NaN."""
-    if math.isnan(value) or math.isnan(reference):
-        return math.inf
-    return objective.sign * (value - reference) / (1.0 if is_zero(reference) else abs(reference))
-
-
-def is_zero(reference: float) -> bool:
-    """Return whether a reference is so near zero that gaps from it are absolute, in the unit of the objective."""
-    return abs(reference) < ZERO
 
 
 def tie(samples: Sequence[Sequence[float]], reference: float) -> list[list[float]]:

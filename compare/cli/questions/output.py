@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -48,6 +49,7 @@ class Output:
         """
         from compare.questions.question import Work
         from compare.study.store import Store
+        from nlp_gait.backends.identity import identify_problem
 
         findings, stopped, notes = None, "", 0
         with progress_bar(question.counts, question.total) as advance:
@@ -71,17 +73,18 @@ class Output:
             end_interrupted(f"{stopped}; {describe_stored(self.out)}")
         if store.summary:
             say(store.summary)
-        self.write(question.report(findings), stopped)
+        self.write(question.add_best_known(findings), stopped, [identify_problem(question.problem)])
         failures = question.failures(findings)
         if failures:
             fail("; ".join(failures))
 
-    def write(self, answer: Answer, stopped: str = "") -> None:
+    def write(self, answer: Answer, stopped: str = "", problems: Sequence[Mapping[str, Any]] = ()) -> None:
         """Write an answer and print it, as a JSON object or as tables and sentences.
 
         Args:
             answer: of a question.
             stopped: where the work was interrupted; the command ends with this message.
+            problems: whose sources the report cites.
 
         Raises:
             OutputError: a file cannot be written; the answer is printed nevertheless.
@@ -91,7 +94,7 @@ class Output:
         written: list[Path] = []
         with defer_interrupts() as pressed:
             try:
-                written = add_session(answer, describe_command()).write(self.out)
+                written = add_session(answer, describe_command(), problems).write(self.out)
             finally:
                 print_result(self.as_json, answer.data, written, lambda: _print(answer))
         if stopped or pressed():

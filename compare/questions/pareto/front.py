@@ -54,6 +54,7 @@ def solve_front(
     seed: int = 0,
     solver: Solver | None = None,
     progress: Progress = ignore_progress,
+    known: Sequence[float] = (),
 ) -> list[FrontPoint]:
     """Return points of the front, by rising criterion, about evenly spaced along it.
 
@@ -61,7 +62,8 @@ def solve_front(
     others halve the longest gaps between neighbours, measured with both ranges as 1. Each is solved from both neighbours, some
     also from random starts, and the whole front is then followed forwards and backwards, so that a better local optimum
     spreads as far as it is the better one. The problem keeps its other limits; its demand on the criterion is dropped. ``starts``
-    counts the random starts at both ends and at every third point; the solver is IPOPT with its defaults if it is None.
+    counts the random starts at both ends and at every third point; the solver is IPOPT with its defaults if it is None. One
+    more start is a point (n,) that is known to be good, from which the power at its own criterion is solved for.
 
     Raises:
         InputError: too few points, or the least power or the largest criterion cannot be found.
@@ -88,6 +90,8 @@ def solve_front(
     grid = np.linspace(low.value, high.value, max(LEAST_POINTS, points // 2)).tolist()
     for point, at in ((low, grid[0]), (high, grid[-1])):
         attempt(at, np.array(point.x))
+    if known:
+        attempt(criterion.evaluate(problem, np.array(known)), np.array(known))
     for at in grid[::CHECK_EVERY]:
         for _ in range(starts):
             attempt(at, criterion.demand(problem, at).start_point(rng))

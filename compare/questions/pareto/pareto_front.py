@@ -28,10 +28,11 @@ from compare.questions.pareto.searches import (
 )
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
 from compare.report.document import Figure, Part, Table
+from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.multi_objective.minimize_many import check_budgets
 from metaheuristics.registry import front_algorithm
-from nlp_gait.backends.identity import fingerprint
+from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
@@ -89,12 +90,14 @@ class ParetoFront(Question[FoundFront]):
 
     def find(self, work: Work) -> Iterator[FoundFront]:
         criterion, problem = self.criterion, self.criterion.drop_demand(self.problem)
+        known = list(find_reference(identify_problem(self.problem)).x)
         effort = {"points": self.points, "starts": self.starts, "seed": self.seed}
-        inputs = {**fingerprint(problem), "criterion": criterion.name, **effort}
+        inputs = {**fingerprint(problem), "criterion": criterion.name, **effort, "known": known}
         solver, code = work.solver(), [front_module]
 
         def solve() -> list[dict[str, object]]:
-            return [asdict(p) for p in solve_front(problem, criterion, **effort, solver=solver, progress=work.progress)]
+            options = {"solver": solver, "progress": work.progress, "known": known}
+            return [asdict(p) for p in solve_front(problem, criterion, **effort, **options)]  # type: ignore[arg-type]
 
         stored = work.store.compute(f"front-{criterion.name}-{{key}}", inputs, solve, code=code)
         front = tuple(decode(FrontPoint, point) for point in stored)

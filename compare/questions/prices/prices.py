@@ -124,6 +124,9 @@ class Prices(Question[FoundPrices]):
             reason=optimum.reason,
         )
 
+    def get_optimum(self, findings: FoundPrices) -> float:
+        return findings.objective
+
     def report(self, findings: FoundPrices) -> Answer:
         problem, stem = self.problem, f"{self.problem.name}-prices"
         objective, ranges = problem.objective, problem.by_name(problem.scale)

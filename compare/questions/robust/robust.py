@@ -67,6 +67,9 @@ class Robust(Question[FoundRobust]):
         if self.simulate:
             yield FoundRobust(gaits, tuple(simulate_robots(self.problem, gaits[-1], work)))
 
+    def get_optimum(self, findings: FoundRobust) -> float:
+        return findings.gaits[0].nominal_W
+
     def report(self, findings: FoundRobust) -> Answer:
         gaits, simulations = findings
         name, stem, widest = self.problem.name, f"{self.problem.name}-robust", gaits[-1]

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from compare.analysis.best_known import relative_gap
 from compare.analysis.statistics.inference import a12, bootstrap_interval, holm, rank_sum, rank_sum_normal, signed_rank
 from compare.analysis.statistics.run_length import (
     ECDF_TARGETS,
@@ -22,7 +23,6 @@ from compare.analysis.statistics.run_length import (
     find_best_known,
     make_curve,
     performance_profile,
-    relative_gap,
 )
 from nlp_gait.formulation import Objective
 from tests.compare.records import record

@@ -8,8 +8,9 @@ import re
 
 import pytest
 
+from compare.analysis.best_known import ZERO, relative_gap
 from compare.analysis.comparison import compare_problems
-from compare.analysis.statistics.run_length import ZERO, relative_gap, tie
+from compare.analysis.statistics.run_length import tie
 from compare.analysis.units import percent, with_unit
 from compare.analysis.verdict import compare_pairs, write_verdict
 from compare.study.record import RunRecord

@@ -74,6 +74,11 @@ def test_certainty_prints_one_object_and_writes_its_files(tmp_path: Path) -> Non
     assert data["optima"][0]["objective"] == pytest.approx(0.970839, rel=1e-5)
     assert sum(data["statuses"].values()) == 4 and data["certificate"] is None
     assert (tmp_path / "walk12-certainty.json").as_posix() in data["files"]
+    assert data["best_known"] == pytest.approx(0.970835, rel=1e-5)
+    assert data["best_known_source"] == "shipped, proven to six digits"
+    page = (tmp_path / "walk12-certainty.md").read_text()
+    assert "Best known value: 0.970835 (shipped, proven to six digits)" in page
+    assert "{Goswami2008," in page.split("How to cite")[1]
     assert all(Path(file).stat().st_size > 0 for file in data["files"])
 
 

@@ -12,7 +12,9 @@ import nlp_gait
 from compare.questions.certainty import Certainty
 from compare.questions.local_optima import Ends, LocalOptimum, cluster_ends, estimate_unseen, run_starts
 from compare.questions.question import Work, find
+from compare.study.references import find_reference
 from compare.study.store import Store
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint
 from nlp_gait.proofs.branch_and_bound import certify
@@ -101,6 +103,28 @@ def test_interrupted_starts_continue_to_the_same_end(tmp_path: Path, monkeypatch
     resumed = run_starts(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
     assert "starts-0: stored by an earlier run" in notes
     np.testing.assert_array_equal(whole.x, resumed.x)
+
+
+def test_gaps_are_measured_from_the_shipped_value_and_not_from_the_best_start() -> None:
+    problem = nlp_gait.load("walk12").with_values(**{"lambda": 1.0})
+    known = find_reference(identify_problem(problem))
+    question = Certainty(problem=problem, starts=1, evaluations=300, time_limit_s=0.0)
+    evidence = find(question)
+    answer, search = question.add_best_known(evidence), evidence.search
+    assert known.objective is not None and search is not None and search.objective is not None
+    assert evidence.optima[0].objective < 0.999 * known.objective  # the start ends at another local optimum
+    assert search.gap == pytest.approx(1.0 - search.objective / known.objective)
+    assert "(shipped, proven to six digits); the optimum found here is 0.1551 % from it" in answer.verdict[-1]
+    assert answer.data["best_known"] == known.objective and answer.data["best_known_source"] == known.source
+
+
+def test_a_proof_begins_at_the_shipped_point_if_it_is_better() -> None:
+    problem = nlp_gait.load("walk12").with_values(**{"lambda": 1.0})
+    evidence = find(Certainty(problem=problem, starts=1, evaluations=0, time_limit_s=1e-9))
+    assert evidence.certificate is not None
+    assert evidence.certificate.objective == pytest.approx(
+        find_reference(identify_problem(problem)).objective, abs=1e-12
+    )
 
 
 def test_evidence_is_proven_or_supported(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from compare.analysis.units import axis_label, quantity
 from compare.questions.question import Work, find
 from compare.questions.sweep import Axis, Sweep, SweepPoint, parse_axis, plot_sweep
+from compare.report.document import Table
 from nlp_gait import load
 from nlp_gait.errors import InputError, UnknownNameError
 
@@ -57,6 +58,13 @@ def test_true_price_of_time() -> None:
     axis = Axis(name="single_support_time_s", values=tuple(DURATIONS_W))
     points = find(Sweep(problem=load("nao-ssp"), axes=[axis], starts=1))
     assert {p.at["single_support_time_s"]: p.objective for p in points} == pytest.approx(DURATIONS_W, abs=AGREEMENT_W)
+
+
+def test_optima_stand_next_to_the_shipped_values_of_their_settings() -> None:
+    axis = Axis(name="lambda", values=(0.33, 0.4))
+    question = Sweep(problem=load("walk12"), axes=[axis], algorithm="pso", evaluations=100)
+    table = next(part for part in question.report(find(question)).parts if isinstance(part, Table))
+    assert [row[-1] for row in table.rows] == ["-", "0.922228 (shipped, proven to six digits)"]
 
 
 def test_another_nlp_solver_walks_the_grid_too() -> None:

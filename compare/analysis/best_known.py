@@ -1,0 +1,46 @@
+"""Gaps from the best known objective, as numbers and in words."""
+
+from __future__ import annotations
+
+import math
+
+from compare.analysis.units import percent, with_unit
+from compare.study.references import OWN, Reference
+from nlp_gait.formulation import Objective
+
+ZERO = 1e-8  # gaps from a smaller reference are absolute
+
+
+def relative_gap(value: float, reference: float, objective: Objective) -> float:
+    """Return (value - reference) / |reference|, or the difference if ``is_zero``; positive if worse, infinite for NaN."""
+    if math.isnan(value) or math.isnan(reference):
+        return math.inf
+    return objective.sign * (value - reference) / (1.0 if is_zero(reference) else abs(reference))
+
+
+def is_zero(reference: float) -> bool:
+    """Return whether a reference is so near zero that gaps from it are absolute, in the unit of the objective."""
+    return abs(reference) < ZERO
+
+
+def describe_value(known: Reference, value: float | None, objective: Objective, what: str = "this point") -> str:
+    """Return the shipped best known value, or that there is none, and how far a feasible objective is from it."""
+    if known.objective is None:
+        return f"Best known value: {known.source.removeprefix(OWN)[2:]}"
+    best = f"{with_unit(known.objective, objective.unit)} ({known.source})"
+    if value is None:
+        return f"Best known value: {best}"
+    if known.is_beaten_by(value, objective):
+        gap = -relative_gap(value, known.objective, objective)
+        return (
+            f"A new best known value: {100 * gap:.2g} % better than the best known {best}; please contribute the point"
+        )
+    return f"Best known value: {best}; {what} is {percent(max(relative_gap(value, known.objective, objective), 0.0))} from it"
+
+
+def describe_bound(bound: float, best: float, unit: str) -> str:
+    """Describe a proven bound, such as ``no feasible point is better than 0.837410 W, 1 % from it``."""
+    if is_zero(best):
+        return f"no feasible point is better than {with_unit(bound, unit)} (proven)"
+    gap = 100 * abs(bound - best) / abs(best)
+    return f"no feasible point is better than {with_unit(bound, unit)}, {gap:.2g} % from it (proven)"
