@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from compare.judge import evaluate
 from compare.papers.nao.nao_paper import PAPER, PHASES, SSP, SWING_HEIGHT
 from compare.papers.paper_runs import Effort, make_computation
 from compare.study.record import RunRecord
@@ -197,4 +196,4 @@ def compute_power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> f
     legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
     mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
     mean = np.trapezoid(mechanical, signals.arrays["t"]) / signals.arrays["t"][-1]
-    return float(evaluate(problem, x).objective["value"] + mean)
+    return float(evaluate_indexes(problem, x)["power_W"] + mean)

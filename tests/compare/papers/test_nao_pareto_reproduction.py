@@ -3,21 +3,36 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from compare.papers.claims import Verdict
-from compare.papers.nao_pareto.nao_pareto_claims import Measures, ParetoFindings, spread_evenly
+from compare.papers.nao_pareto import nao_pareto_reproduction
+from compare.papers.nao_pareto.nao_pareto_claims import Measures, ParetoFindings, PhaseFindings, spread_evenly
 from compare.papers.nao_pareto.nao_pareto_reproduction import REPRODUCTION
-from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, choose_looks
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, PHASES, ParetoEffort, choose_looks
+from compare.papers.paper_runs import Runner
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return reproduce("nao-pareto", tmp_path_factory.mktemp("nao-pareto"), coarse=True)
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
+    """The least work: single support is computed, and stands for double support as well."""
+    real = nao_pareto_reproduction._run_phase
+
+    def run_first(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFindings:
+        if phase == PHASES[0]:
+            known.append(real(runner, phase, effort))
+        return replace(known[-1], problem=replace(known[-1].problem, name=phase))
+
+    known: list[PhaseFindings] = []
+    folder, drawn = tmp_path_factory.mktemp("nao-pareto"), ("running-nao-ssp", "fronts-nao-ssp")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nao_pareto_reproduction, "_run_phase", run_first)
+        yield reproduce("nao-pareto", folder, coarse=True, drawn=drawn, intervals=3)
 
 
 @pytest.mark.slow
@@ -49,10 +64,10 @@ def test_no_point_of_a_search_betters_the_true_front(finished: Finished) -> None
 
 @pytest.mark.slow
 def test_a_second_call_computes_only_what_is_missing(finished: Finished) -> None:
-    path = finished.folder / "store" / "nao-dsp-cmoead-200-00.json"
+    path = finished.folder / "store" / "nao-ssp-cmoead-200-00.json"
     stored = path.read_text()
     path.unlink()
-    assert recompute(finished) == ["nao-dsp-cmoead-200-00", "figures, tables and report"]
+    assert recompute(finished) == ["nao-ssp-cmoead-200-00", "figures, tables and report"]
     again, before = (re.sub(r'"(objective_)?time_s": [\d.e-]+', "", text) for text in (path.read_text(), stored))
     assert again.partition('"result_sha256"')[0] == before.partition('"result_sha256"')[0]
 

@@ -8,35 +8,65 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import nlp_gait
-from compare.papers.nao import nao_runs
+from compare import judge
+from compare.papers.nao import nao_figures, nao_runs
 from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
-from compare.papers.nao.nao_paper import DSP, PHASES, SSP
+from compare.papers.nao.nao_paper import DSP, PAPER, PHASES, SSP
 from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.papers.nao.nao_torque_changes import compute_torque_changes
 from compare.study.record import RunRecord, read_record
 from compare.study.task import ProblemSpec
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.proofs.guarantee import Guarantee
+from nlp_gait.simulation import mjcf
+from nlp_gait.simulation import simulate as simulating
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 from tests.compare.papers.nao_geometry import compare_geometry
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    """The least work; of the two printed solutions of a phase one is simulated for both."""
+    """The least work; simulations, sweeps, choices, plots and proofs of one kind are computed once for all."""
     effort: dict[str, Any] = {"intervals": 3, "runs": 2, "variant_runs": 1, "evaluations": 600, "starts": 1}
-    real, known = nao_runs.simulate_solution, dict[str, Any]()
+    simulate, sweep, draw, prove = (
+        nao_runs.simulate_solution,
+        nao_runs.solve_sweep,
+        nao_figures._draw_scatter,
+        judge.guarantee,
+    )
+    draw_gait = nao_figures._draw_gait
+    known, swept = dict[str, Any](), dict[str, Any]()
 
     def simulate_once(spec: ProblemSpec, x: Sequence[float]) -> dict[str, Any]:
-        known[spec.title] = known.get(spec.title) or real(spec, x)
+        known[spec.title] = known.get(spec.title) or simulate(spec, x)
         return dict(known[spec.title])
 
+    def sweep_once(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int) -> list[dict[str, Any]]:
+        if len(values) > 1 or spec.title not in swept:
+            swept[spec.title] = sweep(spec, variable, values, starts)
+            return list(swept[spec.title])
+        return [{**swept[spec.title][-1], "at": values[0]}]
+
+    def prove_ssp(problem: GaitProblem, x: Array) -> Guarantee:
+        return prove(problem, x) if problem.name == "nao-ssp" else Guarantee(satisfied=None, reason="not tried")
+
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "guarantee", prove_ssp)
+        patch.setattr(simulating, "SETTLE_TIME", 0.0)
+        for module in (mjcf, simulating):
+            patch.setattr(module, "TIME_STEP", 0.002)
+        patch.setattr(nao_figures, "_draw_gait", lambda p: draw_gait(p) if p.problem.name == "nao-ssp" else Figure())
         patch.setattr(nao_runs, "simulate_solution", simulate_once)
+        patch.setattr(nao_runs, "solve_sweep", sweep_once)
+        patch.setattr(nao_figures, "_draw_scatter", lambda phase, at: draw(phase, at) if len(at) == 1 else Figure())
+        for name in ("finite", "separate", "reach"):
+            patch.setitem(PAPER.choices, name, replace(PAPER.choices["held"], title=name))  # type: ignore[arg-type]
         folder = tmp_path_factory.mktemp("nao")
-        drawn = ("fig09", "fig10", "fig20a", "swing-height")
+        drawn = ("fig09", "fig13")
         return reproduce("nao", folder, coarse=True, drawn=drawn, **effort, choices=("lever",), sweep_points=(0, 0))
 
 
