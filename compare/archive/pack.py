@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import distributions, version
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
 from compare.study.manifest import FILE, Manifest, read_manifest
 from compare.study.origin import format_now, hash_installed_code
 from compare.study.record import RunRecord
@@ -19,10 +23,11 @@ from nlp_gait.backends.identity import FILES, HASH, SOURCE
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_file_name, read_bytes, replace_file
 from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates
+from nlp_gait.robots import load_robot
+from nlp_gait.robots.loading import list_robot_files
 from nlp_gait.user_code import Kind, hash_source, list_source_files, resolve_code
 
-MANIFEST, README, LOCK, CRATE = "manifest.json", "README.md", "requirements.txt", "ro-crate-metadata.json"
-SCHEMA = 1
+README, LOCK, CRATE = "README.md", "requirements.txt", "ro-crate-metadata.json"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
 PARTS = (FILE, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # time of all entries, so that equal studies give equal archives
@@ -43,51 +48,67 @@ def pack_study(folder: Path, records: Sequence[RunRecord], out: Path) -> Path:
         for path in sorted(folder.glob(pattern))
         if path.is_file()
     }
-    robots = _collect_robots(records, content)
+    options = (record.definition["problem"] for record in records)
+    texts = {str(problem["options"][option]) for problem in options for option in problem.get(FILES, ())}
+    robots = {text: _collect_robot(text, content) for text in sorted(texts)}
     _collect_code(records, content)
     _collect_certificates(records, content)
     manifest = read_manifest(folder)
     content[LOCK] = "".join(f"{line}\n" for line in _list_packages()).encode()
     content[README] = _make_readme(records, manifest, content).encode()
     content[CRATE] = _to_bytes(_make_crate(records, content))
-    content[MANIFEST] = _to_bytes(
-        {
-            "schema": SCHEMA,
-            "created": format_now(),
-            "version": version("nlp-gait"),
-            "code_sha256": hash_installed_code(),
-            "robots": robots,
-            "files": {name: hashlib.sha256(data).hexdigest() for name, data in sorted(content.items())},
-        }
-    )
-    with replace_file(out) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in sorted(content.items()):
-            entry = zipfile.ZipInfo(name, EPOCH)
-            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            archive.writestr(entry, data)
+    write_archive(out, content, robots)
     return out
+
+
+def write_archive(out: Path, content: dict[str, bytes], robots: Mapping[str, str]) -> None:
+    """Write files and their manifest, and check that they can be unpacked; raises as ``pack_study``."""
+    found = ArchiveManifest(
+        schema=1,
+        created=format_now(),
+        version=version("nlp-gait"),
+        code_sha256=hash_installed_code(),
+        robots=robots,
+        files={name: hashlib.sha256(data).hexdigest() for name, data in content.items()},
+    )
+    content[MANIFEST] = _to_bytes(asdict(found))
+    with replace_file(out) as temporary:
+        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in sorted(content.items()):
+                entry = zipfile.ZipInfo(name, EPOCH)
+                entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+                archive.writestr(entry, data)
+        _check_archive(Path(temporary), robots)
 
 
 def _to_bytes(data: Any) -> bytes:
     return (json.dumps(data, indent=1, sort_keys=True) + "\n").encode()
 
 
-def _collect_robots(records: Sequence[RunRecord], content: dict[str, bytes]) -> dict[str, str]:
-    """Add the files that options of problems name, and those of the same stem; return the archived name of each."""
-    found: dict[str, str] = {}
-    for record in records:
-        problem = record.definition["problem"]
-        for text in (str(problem["options"][option]) for option in problem.get(FILES, ())):
-            if text in found:
-                continue
-            source, mark, changes = text.partition("@")  # changes of masses and lengths
-            path = Path(source)
-            place = f"robots/{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-            for file in sorted({path, *path.parent.glob(f"{path.stem}.*")}):
-                if file.suffix in (".json", ".urdf", ".xml"):
-                    content[f"{place}/{file.name}"] = read_bytes(file, "robot file")
-            found[text] = f"{place}/{path.name}{mark}{changes}"
-    return found
+def _collect_robot(text: str, content: dict[str, bytes]) -> str:
+    """Add all files of a robot, at the same places relative to each other, and return its archived name."""
+    source, mark, changes = text.partition("@")  # changes of masses and lengths
+    files = list_robot_files(source)
+    # The name of the folder that contains them all is kept: ``package://`` finds meshes by it.
+    top = Path(os.path.commonpath([os.path.dirname(file) for file in files])).parent
+    place = f"robots/{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    names = {file: f"{place}/{Path(file).relative_to(top).as_posix()}" for file in (*files, os.path.abspath(source))}
+    content.update({names[file]: read_bytes(Path(file), "robot file") for file in files})
+    return f"{names[os.path.abspath(source)]}{mark}{changes}"
+
+
+def _check_archive(path: Path, robots: Mapping[str, str]) -> None:
+    """Unpack an archive and require that its robots are the same and need no other files."""
+    with tempfile.TemporaryDirectory() as folder:
+        unpack_archive(path, Path(folder))
+        for text, place in robots.items():
+            packed = os.path.join(folder, place)
+            needs = [file for file in list_robot_files(packed) if not file.startswith(folder + os.sep)]
+            if needs or asdict(load_robot(packed)) != asdict(load_robot(text)):
+                raise InputError(
+                    f"robot {text!r} cannot be archived: its copy {f'needs {min(needs)!r}' if needs else 'is another robot'}; "
+                    "name extended and included files and meshes by paths relative to the robot file"
+                )
 
 
 def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from compare.archive.pack import MANIFEST
 from nlp_gait.decoding import decode
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json
 
+MANIFEST = "manifest.json"
 MOST_FILES, LARGEST_FILE, LARGEST_TOTAL = 200_000, 64 * 2**20, 2 * 2**30  # [bytes]
 HIGHEST_RATIO = 200  # of the sizes of a file and of its compressed form, beyond the first megabyte
 

@@ -17,12 +17,12 @@ from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, format_
 from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inertia import check_inertias, shift_to_com
 from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
-from nlp_gait.robots.mjcf import mjcf_points, mjcf_record
+from nlp_gait.robots.mjcf import list_dependencies, mjcf_points, mjcf_record
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_name
 from nlp_gait.robots.tree import reverse_joint
-from nlp_gait.robots.urdf import collision_points, urdf_record
+from nlp_gait.robots.urdf import collision_points, list_meshes, urdf_record
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
@@ -109,6 +109,23 @@ def hash_robot(name_or_path: object) -> str:
     if not isinstance(name_or_path, str) or not is_robot_file(name_or_path):
         return ""
     return hashlib.sha256(repr(_read_merged(_find_description(split_name(name_or_path)[0]))).encode()).hexdigest()
+
+
+def list_robot_files(name_or_path: str) -> set[str]:
+    """Return the files that describe a robot: its own, those that it extends or includes, and meshes of collision shapes.
+
+    Raises:
+        RobotDataError: a file cannot be read.
+        MissingExtraError: a package that reads it is not installed, or too old.
+    """
+    source, found = _find_description(split_name(name_or_path)[0]), set[str]()
+    while source.endswith(".json") and source not in found:
+        found.add(source)
+        source = _resolve(_read(source).extends or "", source)
+    if source.endswith(MODEL_ENDINGS):
+        with convert_errors(f"robot file {source!r}", RobotDataError):
+            found |= {source, *(list_dependencies(source) if source.endswith(".xml") else list_meshes(source))}
+    return {os.path.abspath(file) for file in found}
 
 
 @cache

@@ -92,6 +92,15 @@ def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
     return np.concatenate(found), ()
 
 
+def list_dependencies(path: str) -> list[str]:
+    """Return all files that an MJCF file includes or names; raises as ``mjcf_record``."""
+    _compile(path)  # a file that MuJoCo accepts
+    find = getattr(import_module("mujoco"), "mju_getXMLDependencies", None)
+    if find is None:
+        raise MissingExtraError("listing the files of an MJCF robot needs a newer MuJoCo: pip install -U mujoco")
+    return [str(file) for file in find(path)]
+
+
 def _compile(path: str) -> Any:
     """Return MuJoCo's model of a file, the same for its links and its points."""
     if find_spec("mujoco") is None:

@@ -90,6 +90,12 @@ def collision_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
     return np.concatenate(found), tuple(missing)
 
 
+def list_meshes(path: str) -> list[str]:
+    """Return the files of all meshes of collision shapes that exist; raises as ``urdf_record``."""
+    addresses = {mesh.get("filename", "") for shape in _read_xml(path).iter("collision") for mesh in shape.iter("mesh")}
+    return [str(file) for address in addresses if (file := find_mesh(address, Path(path))) is not None]
+
+
 def _shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None:
     """Return points (N, 3) of a shape at a pose (4, 4); None for a mesh that does not exist."""
     if kind.tag == "mesh":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.archive import Finding, pack_study, unpack_archive, verify_folder
+from compare.archive.pack import _collect_robot, write_archive
 from compare.archive.verify import _check_code_files
 from compare.cli import app
 from compare.study.evidence import read_evidence
@@ -22,6 +24,8 @@ from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.user_code import allow_code
 from tests.faults.forged_archives import Files, damage, edit, forge, sign, write_zip
+from tests.robots.crooked import crooked, crooked_urdf
+from tests.robots.test_mjcf import plain_urdf
 
 RECORD = "records/walk/pso-0001.json"
 
@@ -103,6 +107,61 @@ def test_a_forged_course_is_found_by_repeating_the_run(files: Files, tmp_path: P
     assert len(forged) == 1 and "its history differs" in forged[0] and len(wrong) == 2  # and the run that polishes it
 
 
+TETRAHEDRON = "v -0.05 -0.05 0\nv 0.15 0 0\nv -0.05 0.05 0\nv 0 0 0.05\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+
+
+def pack_robot(robot: str, folder: Path) -> set[str]:
+    """Pack a robot alone, which loads and compares the copy; return the archived files."""
+    content: dict[str, bytes] = {}
+    folder.mkdir()
+    write_archive(folder / "robot.zip", content, {robot: _collect_robot(robot, content)})
+    return {name.split("/", 2)[2] for name in content if name.startswith("robots/")}
+
+
+def test_meshes_and_extended_files_travel_with_a_urdf(tmp_path: Path) -> None:
+    pytest.importorskip("urdf_parser_py")
+    package = tmp_path / "legs"
+    for folder in (package / "urdf", package / "meshes", package / "variants"):
+        folder.mkdir(parents=True)
+    (package / "meshes" / "sole.obj").write_text(TETRAHEDRON)
+    mesh = '<geometry><mesh filename="package://legs/meshes/sole.obj"/></geometry>'
+    text = re.sub(r"<geometry><box.*?</geometry>", mesh, crooked_urdf())
+    (package / "urdf" / "base.urdf").write_text(text)
+    heavy = {"schema": 1, "name": "heavy", "extends": "../urdf/base.urdf"}
+    (package / "variants" / "heavy.json").write_text(json.dumps(heavy))
+    packed = pack_robot(f"{package}/variants/heavy.json@base.mass=1.1", tmp_path / "packed")
+    assert packed == {"legs/variants/heavy.json", "legs/urdf/base.urdf", "legs/meshes/sole.obj"}
+    absolute = {**heavy, "extends": str(package / "urdf" / "base.urdf")}
+    (package / "variants" / "far.json").write_text(json.dumps(absolute))
+    with pytest.raises(
+        InputError, match=r"far\.json' cannot be archived: its copy needs '.*sole\.obj'; name extended"
+    ):
+        pack_robot(f"{package}/variants/far.json", tmp_path / "far")
+
+
+def test_included_files_and_meshes_travel_with_an_mjcf(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    pytest.importorskip("urdf_parser_py")
+    if not hasattr(mujoco, "mju_getXMLDependencies"):
+        pytest.skip("this MuJoCo does not list the files of a model")
+    home = tmp_path / "home"
+    (home / "meshes").mkdir(parents=True)
+    (home / "meshes" / "sole.obj").write_text(TETRAHEDRON)
+    model = mujoco.MjModel.from_xml_path(crooked(tmp_path, plain_urdf()))
+    mujoco.mj_saveLastXML(str(home / "crooked.xml"), model)
+    text, asset = (home / "crooked.xml").read_text(), '<asset><mesh name="sole" file="sole.obj"/></asset>'
+    (home / "parts.xml").write_text(f"<mujocoinclude>{asset}</mujocoinclude>")
+    text = text.replace("<worldbody>", '<include file="parts.xml"/><worldbody>')
+    text = text.replace("<compiler ", '<compiler meshdir="meshes" ')
+    text, count = re.subn(
+        r'<geom size="[^"]*" pos="([^"]*)" type="box"', r'<geom type="mesh" mesh="sole" pos="\1"', text
+    )
+    assert count == 2
+    (home / "crooked.xml").write_text(text)
+    packed = pack_robot(str(home / "crooked.xml"), tmp_path / "packed")
+    assert packed == {"home/crooked.xml", "home/parts.xml", "home/meshes/sole.obj"}
+
+
 @pytest.mark.slow
 def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
     call = CliRunner().invoke
@@ -127,7 +186,8 @@ def test_user_code_and_robots_travel_with_the_archive(tmp_path: Path, monkeypatc
     home = tmp_path / "home"
     home.mkdir()
     monkeypatch.chdir(home)
-    (home / "my.json").write_text(json.dumps(humanoid()))
+    (tmp_path / "base.json").write_text(json.dumps(humanoid()))
+    (home / "my.json").write_text(json.dumps({"schema": 1, "name": "mine", "extends": "../base.json"}))
     (home / "mine.py").write_text(
         "import helper\n\n\ndef search(f, lower, upper, evaluations, seed):\n    f(helper.middle(lower, upper)[None])\n"
     )
@@ -144,7 +204,7 @@ def test_user_code_and_robots_travel_with_the_archive(tmp_path: Path, monkeypatc
     archive = pack_study(home / "out", read_evidence(home / "out").records, tmp_path / "study.zip")
     away = tmp_path / "away"
     away.mkdir()
-    (home / "my.json").unlink()
+    (tmp_path / "base.json").unlink()
     monkeypatch.chdir(away)
     manifest, differences = unpack_archive(archive, away / "unpacked")
     assert {p.name for p in (away / "unpacked" / "code").iterdir()} == {"mine.py", "helper.py"} and not differences
