@@ -133,9 +133,7 @@ def test_meshes_and_extended_files_travel_with_a_urdf(tmp_path: Path) -> None:
     assert packed == {"legs/variants/heavy.json", "legs/urdf/base.urdf", "legs/meshes/sole.obj"}
     absolute = {**heavy, "extends": str(package / "urdf" / "base.urdf")}
     (package / "variants" / "far.json").write_text(json.dumps(absolute))
-    with pytest.raises(
-        InputError, match=r"far\.json' cannot be archived: its copy needs '.*sole\.obj'; name extended"
-    ):
+    with pytest.raises(InputError, match=r"far\.json' cannot be archived: its copy needs '.*sole\.obj'; name extended"):
         pack_robot(f"{package}/variants/far.json", tmp_path / "far")
 
 
