@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from importlib import resources
@@ -93,11 +93,19 @@ class Check:
         return replace(claim, **{**texts, "verdict": verdict, "detail": f"{detail} {note}".strip()})
 
 
-def decide(verdict: bool | Verdict, /, **values: Any) -> Check:
-    """Return a check whose verdict is given, or whether the claim holds; the claim states its criterion."""
-    if not isinstance(verdict, Verdict):
-        verdict = Verdict.HOLDS if verdict else Verdict.FAILS
-    return Check(verdict, values)
+def decide(verdict: bool | Verdict | Sequence[bool], /, **values: Any) -> Check:
+    """Return a check whose verdict is given, or whether the claim holds; the claim states its criterion.
+
+    Of several readings of the paper, under each of which it holds or not, all have to agree: else it cannot be tested.
+    """
+    if isinstance(verdict, Verdict):
+        return Check(verdict, values)
+    counts = Counter(np.atleast_1d(verdict).tolist())
+    if len(counts) == 2:
+        return Check(
+            lambda _: (Verdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"), values
+        )
+    return Check(Verdict.HOLDS if counts[True] else Verdict.FAILS, values)
 
 
 def compare_levels(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
@@ -149,23 +157,16 @@ def compare_readings(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> C
 def require_change(ours: ArrayLike, /, **values: Any) -> Check:
     """Return a check of a claim that prints a direction without a size.
 
-    It holds if all of our changes, positive in the claimed direction, are at least as large as the claim's ``least``. Of changes
-    (readings, n) it cannot be tested if that is so under some readings only.
+    It holds if all of our changes, positive in the claimed direction, are at least as large as the claim's ``least``; of changes
+    (readings, n), under every reading.
     """
 
     def rule(claim: Claim) -> tuple[Verdict, str]:
         least, _ = _parse_size(claim.least)
-        return unite_readings((np.atleast_2d(ours) >= least).all(axis=1))
+        verdict = decide([bool((row >= least).all()) for row in np.atleast_2d(ours)]).verdict
+        return (verdict, "") if isinstance(verdict, Verdict) else verdict(claim)
 
     return Check(rule, values)
-
-
-def unite_readings(held: ArrayLike) -> tuple[Verdict, str]:
-    """Return the verdict of a claim that holds under some readings of the paper, with its detail."""
-    counts = Counter(np.atleast_1d(held).tolist())
-    if len(counts) < 2:
-        return (Verdict.HOLDS if counts[True] else Verdict.FAILS), ""
-    return Verdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"
 
 
 def require_feasible(check: Check, infeasible: Iterable[str]) -> Check:

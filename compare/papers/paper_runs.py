@@ -119,10 +119,9 @@ def _rank(record: RunRecord) -> tuple[bool, bool, float]:
     return not record.claimed, not verdict.feasible, sign * verdict.objective if verdict.feasible else verdict.violation
 
 
-def list_infeasible(best: Mapping[str, RunRecord]) -> list[str]:
-    """Return for each infeasible run by name the constraint that it violates most, and by how much."""
-    found = {name: run.verdict for name, run in best.items() if not run.verdict.feasible}
-    return [f"{name}: {', '.join(verdict.violated[:1])}" for name, verdict in found.items()]
+def list_infeasible(runs: Iterable[RunRecord]) -> list[str]:
+    """Return for each infeasible run the title of its problem and the constraint that it violates most."""
+    return [f"{run.problem}: {', '.join(run.verdict.violated[:1])}" for run in runs if not run.verdict.feasible]
 
 
 def list_objectives(records: Iterable[RunRecord]) -> list[float]:

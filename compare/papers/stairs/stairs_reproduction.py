@@ -26,7 +26,6 @@ from compare.study.task import IPOPT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES, PAPER_TIMES
 
-NEAR_BOUND = 0.01  # of a gain's range
 LACKING = "the paper gives no value"  # reason in the table of differences
 
 
@@ -65,8 +64,6 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "times": PAPER_TIMES,
         "adam": runs.RULES["adam"],
         "end_rate": end_rate,
-        **_count_gains_at_bounds(findings),
-        **_compute_growth(findings),
         **plan_claims.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
         **_list_failed_equations(),
@@ -75,40 +72,13 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
 
 def _list_failed_equations() -> dict[str, str]:
     """Return the numbered equations that contradict themselves or each other, and those that only lack values."""
-    rows = [row for row in REPRODUCTION.printed.differences if row.cannot_run]
-    lacking = [row.cannot_run.startswith(LACKING) and ";" not in row.cannot_run for row in rows]
-    found = {"contradictory": False, "lacking": True}
-    return {
-        name: ", ".join(
-            f"({n})"
-            for n in list_equations(row.where for row, is_so in zip(rows, lacking, strict=True) if is_so == lacks)
-        )
-        for name, lacks in found.items()
-    }
-
-
-def _count_gains_at_bounds(findings: StairsFindings) -> dict[str, Any]:
-    """How many of the best runs on the track end at the upper bounds of both gains."""
-    tracks = [(case, findings.best("track", case, name)) for case in findings.cases for name in findings.track_solvers]
-    at_bounds = 0
-    for case, run in tracks:
-        problem = runs.make_track_spec(case, findings.plan(case)).load()
-        share = (problem.upper - [run.x[name] for name in problem.names]) / (problem.upper - problem.lower)
-        at_bounds += all(share[problem.variable_index(gain)] <= NEAR_BOUND for gain in ("kp", "kd"))
-    return {"at_bounds": at_bounds, "best_tracks": len(tracks), "near_bound": NEAR_BOUND}
-
-
-def _compute_growth(findings: StairsFindings) -> dict[str, Any]:
-    """How fast the open-loop error grows in the replay, and when the pose is lost."""
-    replays = [findings.others[f"replay-{case}"] for case in findings.cases]
-    tenths = 10 * (PAPER_TIMES[1] - PAPER_TIMES[0])
-    factors = [(replay["open_loop_t2_rad"] / replay["open_loop_t1_rad"]) ** (1 / tenths) for replay in replays]
-    lost = [replay["open_loop_lost_s"] - PAPER_TIMES[1] for replay in replays if replay["open_loop_lost_s"] is not None]
-    when = f"{min(lost):.2f} to {max(lost):.2f} s after t2" if lost else "never"
-    return {
-        "growth": f"{min(factors):.1f} to {max(factors):.1f}",
-        "lost": f"{when} ({len(lost)} of {len(replays)} cases)",
-    }
+    found: dict[str, list[str]] = {"contradictory": [], "lacking": []}
+    for row in REPRODUCTION.printed.differences:
+        if row.cannot_run:
+            found[
+                "lacking" if row.cannot_run.startswith(LACKING) and ";" not in row.cannot_run else "contradictory"
+            ].append(row.where)
+    return {name: ", ".join(f"({n})" for n in list_equations(places)) for name, places in found.items()}
 
 
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it

@@ -83,6 +83,7 @@ class StairsEffort(Effort):
     )
     other_starts: int = 8  # of IPOPT on the plan there
     poses: int = 350  # of the swing leg for which the network is trained
+    printed_poses: int = 350  # of these at the printed rate
     plan_intervals: int = 40
     ideal_intervals: int = 70
 
@@ -209,8 +210,9 @@ def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
 def make_computations(findings: StairsFindings) -> Iterator[Computation]:
     """Yield the network, and in each case the replay, the printed scheme, differences of both plans, the network in the loop."""
     effort, first = findings.effort, findings.cases[0]
+    poses = {"poses": effort.poses, "printed_poses": effort.printed_poses}
     plan_spec, plan = make_plan_spec(effort, first), findings.plan(first)
-    yield make_computation("network", plan_spec, train_network, case=first, plan=plan, poses=effort.poses)
+    yield make_computation("network", plan_spec, train_network, case=first, plan=plan, **poses)
     for case in effort.cases:
         ideal, plan = make_ideal_spec(effort, case), findings.plan(case)
         track, x = make_track_spec(case, plan), get_point(findings.best_track(case))
@@ -224,17 +226,17 @@ def make_computations(findings: StairsFindings) -> Iterator[Computation]:
         yield make_computation(f"learned-{case}", track, track_with_network, case=case, plan=plan, x=x)
 
 
-def train_network(case: int, plan: Mapping[str, float], poses: int) -> dict[str, Any]:
+def train_network(case: int, plan: Mapping[str, float], poses: int, printed_poses: int) -> dict[str, Any]:
     """Train the network on poses of a plan's swing leg: convergence, time and error against the closed form."""
     desired = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
-    q = np.cumsum(
-        desired[np.linspace(0, len(desired) - 1, poses).round().astype(int), :2], axis=1
-    )  # the knee is measured from the thigh
+    samples = np.linspace(0, len(desired) - 1, poses).round().astype(int)
+    all_poses = np.cumsum(desired[samples, :2], axis=1)  # the knee is measured from the thigh
     robot = toe_foot_biped()
     lengths = robot.link("HK").length_m, robot.link("KA").length_m
-    hip_to_ankle = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in q]).T
     found = {}
     for name, settings in RULES.items():
+        q = all_poses[: printed_poses if "printed" in name else poses]
+        hip_to_ankle = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in q]).T
         path = network_angles(hip_to_ankle, *lengths, settings)
         error = np.abs((path.angles - q + np.pi) % (2 * np.pi) - np.pi)
         bends = np.sign(np.sin(np.diff([path.angles, q], axis=2)))[..., 0]

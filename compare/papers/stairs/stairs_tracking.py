@@ -16,7 +16,6 @@ from compare.papers.claims import (
     decide,
     require_change,
     require_feasible,
-    unite_readings,
 )
 from compare.papers.paper_runs import (
     choose_best,
@@ -132,8 +131,9 @@ def _list_instants(findings: StairsFindings, case: int, name: str, decides: Deci
 
 
 def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
-    """Return the effect of each choice, as text, for the table of differences."""
-    return {"effect": {name: _describe_effect(findings, name) for name in CHOICES}}
+    """Return the effects of each choice and of Algorithm 4, as text, for the table of differences."""
+    instants = {decides: _describe_instants(findings, decides)[0] for decides in get_args(Decides)}
+    return {"effect": {name: _describe_effect(findings, name) for name in CHOICES}, "instants": instants}
 
 
 def _describe_effect(findings: StairsFindings, name: str) -> str:
@@ -165,126 +165,122 @@ def _collect(findings: StairsFindings, index: str, names: Iterable[str] = READIN
     return {name: [_read(get_best(findings, case, name), index) for case in findings.cases] for name in run}
 
 
-def _find_infeasible(findings: StairsFindings, names: Iterable[str]) -> list[str]:
-    """Return for each choice and case without a feasible step the constraint that its best one violates most."""
-    return list_infeasible(
-        {
-            f"{CHOICES[name].text}, case {case}": get_best(findings, case, name)
-            for name in names
-            for case in findings.cases
-        }
-    )
+def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str]) -> Check:
+    runs = (get_best(findings, case, name) for name in names for case in findings.cases)
+    return require_feasible(check, list_infeasible(runs))
 
 
 def _show(index: str) -> Checker:
     """Return the check of a value of Table IV that depends on what the paper does not give."""
-    return lambda findings: decide(Verdict.UNTESTABLE, found=_describe(_collect(findings, index)))
+    return lambda findings: decide(Verdict.UNTESTABLE, readings=_describe(_collect(findings, index)))
 
 
-def _compare_cases(quantity: str, index: str, compare: Callable[[Array, Array], Check]) -> Checker:
-    """Return the check of a quantity of Table IV in the others of all cases divided by that in case 2."""
+def _compare_cases(quantity: str, compare: Callable[[Array, Array], Check]) -> Checker:
+    """Return the check of a quantity of Table IV in cases 1 and 3 divided by that in case 2."""
 
     def check(findings: StairsFindings) -> Check:
-        ours = _collect(findings, index)
-        found = _describe(ours)
+        ours = _collect(findings, TABLE_4_ROWS[quantity])
+        texts = {"readings": _describe(ours), "ratios": "one case only"}
         if len(findings.cases) < len(TABLE_4):
-            return decide(Verdict.NOT_SHOWN, found=found, ratios=f"case {_join(findings.cases)} only")
-        printed = [[float(getattr(row, quantity)) for row in TABLE_4.values()]]
-        theirs, rows = (np.array(part)[:, [0, 2]] / np.array(part)[:, [1]] for part in (printed, list(ours.values())))
-        ratios = _describe(dict(zip(ours, rows, strict=True)))
-        check = replace(compare(theirs[0], rows), values={"found": found, "ratios": ratios})
-        return require_feasible(check, _find_infeasible(findings, ours))
+            return decide(Verdict.NOT_SHOWN, **texts)
+        printed = [float(getattr(row, quantity)) for row in TABLE_4.values()]
+        theirs, *ratios = (np.array(row)[[0, 2]] / row[1] for row in (printed, *ours.values()))
+        texts["ratios"] = _describe(dict(zip(ours, ratios, strict=True)))
+        return _require_steps(findings, replace(compare(theirs, np.array(ratios)), values=texts), ours)
 
     return check
 
 
 def _check_balance(findings: StairsFindings) -> Check:
     ours = _collect(findings, "zmp_margin_min_m", (*READINGS, "penalty"))
-    held = decide(all(min(row) >= 0 for row in ours.values()), found=_describe(ours))
-    return require_feasible(held, _find_infeasible(findings, ours))
+    held = decide(all(min(row) >= 0 for row in ours.values()), readings=_describe(ours))
+    return _require_steps(findings, held, ours)
 
 
 def _check_following(findings: StairsFindings) -> Check:
-    ours = _collect(findings, "largest_error_rad", UNLIMITED)
-    errors = np.array(list(ours.values()))
-    check = Check(lambda _: unite_readings((errors <= FOLLOWED_RAD).all(axis=1)), {})
-    limited = _collect(findings, "largest_error_rad", [OURS])
-    return replace(check, values={"found": _describe(ours), "ours": _describe(limited), "limit": FOLLOWED_RAD})
+    ours, limited = (_collect(findings, "largest_error_rad", names) for names in (UNLIMITED, [OURS]))
+    held = [max(errors) <= FOLLOWED_RAD for errors in ours.values()]
+    texts = {"readings": _describe(ours), "limited": _join(limited[OURS]), "limit": FOLLOWED_RAD}
+    return decide(held, **texts)
+
+
+def _collect_printed(findings: StairsFindings, name: str) -> list[float]:
+    """Return a result of the printed gains in all cases."""
+    return [findings.others[f"printed-{case}"][name] for case in findings.cases]
 
 
 def _check_printed_gains(findings: StairsFindings) -> Check:
-    """The printed gains and torso pitch, under several readings."""
-    found = {case: findings.others[f"printed-{case}"] for case in findings.cases}
     names = ("implicit", "compensated", "hip")
-    errors = [[part[f"{name}_largest_error_rad"] for part in found.values()] for name in names]
-    texts = dict(zip(names, map(_join, errors), strict=True))
+    errors = {name: _collect_printed(findings, f"{name}_largest_error_rad") for name in names}
+    held = [max(row) <= FOLLOWED_RAD for row in errors.values()]
     needed = _join(row.peak_torque_Nm / row.kp for row in TABLE_4.values())
-    held = (np.array(errors) <= FOLLOWED_RAD).all(axis=1)
-    return Check(lambda _: unite_readings(held), {**texts, "limit": FOLLOWED_RAD, "needed": needed})
+    texts = {name: _join(row) for name, row in errors.items()}
+    return decide(held, **texts, limit=FOLLOWED_RAD, needed=needed)
+
+
+def _get_instants(findings: StairsFindings, decides: Decides) -> dict[str, list[dict[str, Any]]]:
+    """Return what Algorithm 4 finds in all cases, by reading."""
+    names = [name for name, how in INSTANTS if how == decides]
+    return {name: [findings.others[f"instants-{name}-{decides}-{case}"] for case in findings.cases] for name in names}
+
+
+def _describe_instants(findings: StairsFindings, decides: Decides) -> list[str]:
+    texts = []
+    for name, parts in _get_instants(findings, decides).items():
+        until, outside, cost = ([part[key] for part in parts] for key in ("quanta", "outside_quanta", "cost"))
+        constants = _join(_collect(findings, "controller_cost", [name])[name])
+        texts.append(
+            f"{CHOICES[name].text}: {_join(until)} quanta, ZMP outside in {_join(outside)}, mean of (53) {_join(cost)}, with "
+            f"constants {constants}"
+        )
+    return texts
 
 
 def _check_instants(decides: Decides) -> Checker:
     """Return the check that Algorithm 4 finishes the step with the ZMP in the polygon."""
 
     def check(findings: StairsFindings) -> Check:
-        found = {
-            name: [findings.others[f"instants-{name}-{decides}-{case}"] for case in findings.cases]
-            for name, how in INSTANTS
-            if how == decides
-        }
-        texts = "; ".join(
-            f"{CHOICES[name].text}: until {_join(part['quanta'] * QUANTUM for part in parts)} s, outside in "
-            f"{_join(part['outside_quanta'] for part in parts)} quanta, cost {_join(part['cost'] for part in parts)}, with "
-            f"constants {_join(_read(get_best(findings, case, name), 'controller_cost') for case in findings.cases)}"
-            for name, parts in found.items()
-        )
-        count = findings.effort.instant_evaluations
-        limits = _join(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()}))
-        values = {"found": texts, "evaluations": count, "limits": limits}
+        found, evaluations = _get_instants(findings, decides), findings.effort.instant_evaluations
         held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found.values()]
-        if count < ANTS * ITERATIONS and not all(held):
-            return decide(Verdict.NOT_SHOWN, **values)
-        return Check(lambda _: unite_readings(held), values)
+        limits = _join(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()}))
+        texts = {
+            "found": "; ".join(_describe_instants(findings, decides)),
+            "evaluations": evaluations,
+            "limits": limits,
+        }
+        enough = evaluations >= ANTS * ITERATIONS or all(held)
+        return decide(held if enough else Verdict.NOT_SHOWN, **texts)
 
     return check
 
 
 def _check_online(findings: StairsFindings) -> Check:
-    count = findings.effort.instant_evaluations
-    found = [findings.others[f"instants-{OURS}-gains-{case}"] for case in findings.cases]
-    times = [part["time_s"] / part["quanta"] for part in found]
-    scaled = [time * ANTS * ITERATIONS / count for time in times]
-    texts = {name: _join(1e3 * time for time in part) for name, part in (("found", times), ("scaled", scaled))}
-    return decide(max(scaled) <= QUANTUM, evaluations=count, **texts)
+    parts, evaluations = _get_instants(findings, "gains")[OURS], findings.effort.instant_evaluations
+    times = np.array([1e3 * part["time_s"] / part["quanta"] for part in parts])
+    scaled = times * ANTS * ITERATIONS / evaluations
+    values = {"evaluations": evaluations, "found": _join(times), "scaled": _join(scaled)}
+    return decide(bool(max(scaled) <= 1e3 * QUANTUM), **values)
 
 
 def _check_cost_against_energy(_: StairsFindings) -> Check:
     """(53) contains the power, so that its mean is at least the mean power."""
-    rows, duration = TABLE_4.values(), TABLE_3["t3_s"]
-    power = [row.energy / duration for row in rows]  # of an energy in J
-    least = [row.energy / (duration / QUANTUM) for row in rows]  # of one that is a sum over quanta
-    rates = [watt / row.peak_torque_Nm / len(LINKS) for watt, row in zip(power, rows, strict=True)]
-    holds = all(row.cost >= watt for watt, row in zip(least, rows, strict=True))
-    return decide(holds, power=_join(power), least=_join(least), rates=_join(rates))
+    cost, energy, torque = np.array([[row.cost, row.energy, row.peak_torque_Nm] for row in TABLE_4.values()]).T
+    power = energy / TABLE_3["t3_s"]  # of an energy in J
+    rates, least = power / torque / len(LINKS), power * QUANTUM  # the latter of a sum over quanta
+    return decide(bool((cost >= least).all()), power=_join(power), least=_join(least), rates=_join(rates))
 
 
-def _check_torso(findings: StairsFindings) -> Check:
-    """The tuned torso pitch against an upright one, with the same gains."""
-    tuned = [findings.best_track(case).verdict.indexes for case in findings.cases]
-    upright = [findings.others[f"printed-{case}"] for case in findings.cases]
-    margins = [
-        [1e3 * own["zmp_margin_min_m"] for own in tuned],
-        [1e3 * other["upright_zmp_margin_min_m"] for other in upright],
-    ]
-    energies = [[own["energy_J"] for own in tuned], [other["upright_energy_J"] for other in upright]]
-    gains = [100 * (other / own - 1) for own, other in zip(*energies, strict=True)]
-    wider = [own - other for own, other in zip(*margins, strict=True)]
-    texts = {
-        "margins": " against ".join(map(_join, margins)),
-        "energies": " against ".join(map(_join, energies)),
-        "torso": _join(findings.best_track(case).x["torso_pitch_rad"] for case in findings.cases),
-    }
-    return require_change([*gains, *wider], **texts)
+def _check_torso(index: str, sign: float) -> Checker:
+    """Return the check that the tuned torso pitch improves a quantity from that of an upright one with the same gains [%]."""
+
+    def check(findings: StairsFindings) -> Check:
+        best = [findings.best_track(case) for case in findings.cases]
+        tuned, upright = [run.verdict.indexes[index] for run in best], _collect_printed(findings, f"upright_{index}")
+        changes = 100 * sign * (np.array(tuned) - upright) / np.abs(upright)
+        torso = _join(run.x["torso_pitch_rad"] for run in best)
+        return require_change(changes, torso=torso, tuned=_join(tuned), upright=_join(upright))
+
+    return check
 
 
 def _join(values: Iterable[float]) -> str:
@@ -294,20 +290,13 @@ def _join(values: Iterable[float]) -> str:
 TRACKING_CHECKS: dict[str, Checker] = {
     **{f"track-{quantity}": _show(index) for quantity, index in TABLE_4_ROWS.items()},
     "cost-energy": _check_cost_against_energy,
-    **{
-        f"least-{quantity}": _compare_cases(
-            quantity, TABLE_4_ROWS[quantity], lambda _, ours: require_change(100 * (ours - 1))
-        )
-        for quantity in LEAST_ROWS
-    },
-    **{
-        f"ratios-{quantity}": _compare_cases(quantity, TABLE_4_ROWS[quantity], compare_readings)
-        for quantity in LEAST_ROWS
-    },
+    **{f"least-{name}": _compare_cases(name, lambda _, ours: require_change(100 * (ours - 1))) for name in LEAST_ROWS},
+    **{f"ratios-{name}": _compare_cases(name, compare_readings) for name in LEAST_ROWS},
     "balance": _check_balance,
     "follow": _check_following,
     "printed-gains": _check_printed_gains,
-    "torso": _check_torso,
+    "torso-margin": _check_torso("zmp_margin_min_m", 1.0),
+    "torso-energy": _check_torso("energy_J", -1.0),
     "online": _check_online,
     **{f"instants-{decides}": _check_instants(decides) for decides in get_args(Decides)},
 }

@@ -18,6 +18,8 @@ LESS = {
     "jerk_starts": 1,
     "plan_evaluations": 60,
     "track_evaluations": 60,
+    "poses": 3,
+    "printed_poses": 2,
     "plan_intervals": 12,
     "plan_settings": {"iterations": 5, "compiled": False, "few_rows": False},
 }
