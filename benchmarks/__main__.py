@@ -11,7 +11,7 @@ import platform
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import derivatives, ipopt, kernel, process, search, solvers
+from benchmarks import derivatives, functions, ipopt, kernel, process, search, solvers
 from benchmarks.gaitbench import overhead
 from benchmarks.rows import Row, table
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
@@ -31,6 +31,7 @@ def main() -> None:
         lambda: kernel.paths(rounds),
         lambda: kernel.torques(rounds),
         lambda: kernel.growth(rounds),
+        lambda: functions.rows(max(5, rounds // 2)),
         lambda: search.swarms(max(3, rounds // 5)),
         lambda: derivatives.iteration(rounds),
         lambda: [] if arguments.quick else derivatives.long_starts(),

@@ -13,12 +13,12 @@ from nlp_gait.backends.kernel.library_cache import load_library
 FLAGS = ("-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-fno-math-errno", "-ffp-contract=off", "-w")
 
 
-def compiled_functions(functions: Sequence[ca.Function], optimisation: str = "-O1") -> list[ca.Function]:
+def compiled_functions(functions: Sequence[ca.Function], flags: Sequence[str] = ("-O1", *FLAGS)) -> list[ca.Function]:
     """The same functions as machine code, built side by side, once, and kept in the cache folder.
 
     Args:
         functions: with inputs and outputs of any shape.
-        optimisation: flag of the compiler.
+        flags: of the compiler.
 
     Raises:
         CompilerError: there is no compiler, or it fails.
@@ -26,7 +26,7 @@ def compiled_functions(functions: Sequence[ca.Function], optimisation: str = "-O
     compiler = find_compiler()
 
     def library(function: ca.Function) -> str:
-        return str(load_library(_source(function), compiler, (optimisation, *FLAGS), (function.name(),))[1])
+        return str(load_library(_source(function), compiler, flags, (function.name(),))[1])
 
     with ThreadPoolExecutor() as pool:
         libraries = list(pool.map(library, functions))

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 import nlp_gait
-from benchmarks.casadi_code import compiled_functions
+from benchmarks.casadi_code import FLAGS, compiled_functions
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, CompiledNlp
 from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
@@ -44,7 +44,8 @@ def iteration(rounds: int) -> list[Row]:
     interpreted = {name: usual.get_function(name) for name in NAMES}
     listed = list(interpreted.values())
     usually, optimised = (
-        dict(zip(NAMES, compiled_functions(listed, optimisation), strict=True)) for optimisation in ("-O0", "-O1")
+        dict(zip(NAMES, compiled_functions(listed, (optimisation, *FLAGS)), strict=True))
+        for optimisation in ("-O0", "-O1")
     )
     w = model.start(problem, (problem.lower + problem.upper) / 2, model.widths[0])
     ours = CompiledNlp(model.nlp, p).functions

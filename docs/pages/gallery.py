@@ -20,6 +20,7 @@ ORDER = (
     "custom_robot.py",
     "physics_engine.py",
     "export_motion.py",
+    "compile_function.py",
     "notebook.py",
     "cluster.py",
 )

@@ -32,6 +32,7 @@ EXPECTED = {
     "custom_robot.py": "nao-with-a-load: 0 kg, 0.845869 W",
     "physics_engine.py": "it stayed up",
     "export_motion.py": "gait.motion: 102 lines",
+    "compile_function.py": "cost 3.60 without a push",
     "notebook.py": "Nm",
     "cluster.py": "ipopt: 4 of 4 feasible, median 0.531886 W",
 }
@@ -41,6 +42,7 @@ FEWER = {
     "front.py": ('load("nao-dsp")', 'load("nao-dsp", intervals=4)'),
     "your_own_objective.py": ("(0.0, 0.1, 0.3, 1.0)", "(0.0, 1.0)"),
     "your_own_algorithm.py": ("range(5)", "range(2)"),
+    "compile_function.py": ("range(300)", "range(3)"),
     "custom_robot.py": ("(0.0, 0.5, 1.0)", "(0.0,)"),
     "physics_engine.py": ("starts=2", "starts=1"),
     "cluster.py": ("n_workers=2", "n_workers=1"),

@@ -114,6 +114,7 @@ class CompiledFunction:
     def _evaluate(self, pieces: Sequence[tuple[Array, bool]], results: Sequence[Array], cut: slice) -> None:
         if not hasattr(self._local, "memory"):  # scratch memory of the calling thread
             self._local.memory = np.empty(-(-self._memory_size // 8))
+            self._local.address = ctypes.c_void_p(_address(self._local.memory))
         inputs = [_address(values if shared else values[cut]) for values, shared in pieces]
         outputs = [_address(result[cut]) for result in results]
         failed = self._native(
@@ -121,7 +122,7 @@ class CompiledFunction:
             bytes(shared for _, shared in pieces),
             (ctypes.c_void_p * len(outputs))(*outputs),
             ctypes.c_longlong(cut.stop - cut.start),
-            ctypes.c_void_p(_address(self._local.memory)),
+            self._local.address,
         )
         if failed:
             raise RuntimeError(f"{self.function.name()} reported a failure")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -27,7 +28,9 @@ SCALAR = frozenset(getattr(ca, f"OP_{name}") for name in _SCALAR.split())
 OPERATIONS = {"SXFunction": SCALAR, "MXFunction": SCALAR | {getattr(ca, f"OP_{name}") for name in _MATRIX.split()}}
 # What expanding would leave out without a word.
 NOT_EXPANDED = {f"the operation {name}" for name in ("assertion", "monitor", "printme", "dump")}
-LOOPS = ("Map", "ThreadMap")
+# Longer functions keep their loops and matrices: straight-line code is faster, but its compile time grows with its length.
+MOST_EXPANDED = 5000
+LOOPS = ("Map", "ThreadMap", "MapSum")
 
 
 def make_kernel(function: ca.Function) -> ca.Function:
@@ -41,7 +44,7 @@ def make_kernel(function: ca.Function) -> ca.Function:
             raise InputError(
                 f"argument {function.name_in(i)} of {function.name()} is sparse; make it dense with casadi.densify"
             )
-    if any(_find_unsupported(function)):
+    if any(_find_unsupported(function)) or _count_operations(function) <= MOST_EXPANDED:
         function = _expand(function)
     symbols, results = apply_to_symbols(function)
     return ca.Function("kernel", symbols, [ca.densify(result) for result in results])
@@ -71,6 +74,29 @@ def _expand(function: ca.Function) -> ca.Function:
     )
 
 
+def _count_operations(function: ca.Function) -> int:
+    """Return about how many scalar operations a supported function has."""
+    if function.is_a("SXFunction"):
+        return function.n_instructions()
+    parts = function.find_functions(0)
+    if function.class_name() in LOOPS:
+        sizes = (("numel_in", function.n_in()), ("numel_out", function.n_out()))
+        counts = [
+            getattr(function, size)(i) // max(1, getattr(parts[0], size)(i)) for size, n in sizes for i in range(n)
+        ]
+        return _count_operations(parts[0]) * max(counts)
+    total = 0
+    for k in range(function.n_instructions()):
+        operation, node = function.instruction_id(k), function.instruction_MX(k)
+        if operation == ca.OP_CALL:
+            total += _count_operations(node.which_function())
+        elif operation == ca.OP_MTIMES:
+            total += 2 * node.nnz() * node.dep(1).size2()
+        elif operation != ca.OP_OUTPUT:
+            total += node.nnz()
+    return total
+
+
 def _find_unsupported(function: ca.Function) -> Iterator[str]:
     """Yield what is not supported, in words."""
     for part in (function, *function.find_functions()):
@@ -86,11 +112,15 @@ def write_rows_source(kernel: ca.Function) -> str:
     """Return the C++ source of a kernel from ``make_kernel``; the lane count is the macro LANES."""
     inputs = [str(kernel.numel_in(i)) for i in range(kernel.n_in())]
     outputs = [str(kernel.numel_out(i)) for i in range(kernel.n_out())]
+    code = generate_lane_code(kernel)
+    if kernel.is_a("SXFunction"):  # no argument or result is left out
+        code = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", code))
     return "\n".join(
         [
+            "#include <utility>",
             read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
             read_native_source("nlp_gait.backends.functions", "operations.hpp"),
-            generate_lane_code(kernel).replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)"),
+            code.replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)"),
             f"enum {{ INPUTS = {len(inputs)}, OUTPUTS = {len(outputs)} }};",
             f"static const long long input_size[] = {{{', '.join(inputs)}}};",
             f"static const long long output_size[] = {{{', '.join(outputs)}}};",

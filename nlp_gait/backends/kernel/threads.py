@@ -27,7 +27,8 @@ class RowThreads:
         cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
         jobs = [self._get_pool().submit(evaluate, cut) for cut in cuts[1:]]
         evaluate(cuts[0])
-        wait(jobs)
+        if jobs:
+            wait(jobs)
         for job in jobs:
             job.result()
         if rows:

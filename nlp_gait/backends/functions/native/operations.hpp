@@ -1,11 +1,5 @@
 // Operations of CasADi that the problems' kernels do not need, for lanes.
 
-#if defined(__clang__)
-#define UNROLL _Pragma("unroll")
-#else
-#define UNROLL _Pragma("GCC unroll 8")
-#endif
-
 #if HAS_VECTOR_LIBM(2, 35)
 VECTORISED_1(asinh)
 VECTORISED_1(acosh)

@@ -2,6 +2,77 @@
 //
 // Expects INPUTS and OUTPUTS as macros, and the sizes of all inputs and outputs in `input_size` and `output_size`.
 
+#if defined(__clang__)
+#define UNROLL _Pragma("unroll")
+#else
+#define UNROLL _Pragma("GCC unroll 8")
+#endif
+
+#if defined(__has_builtin) && LANES > 1
+#if __has_builtin(__builtin_shufflevector)
+#define HAS_SHUFFLE
+#endif
+#endif
+
+#ifdef HAS_SHUFFLE
+typedef Vector Unaligned __attribute__((aligned(8)));
+
+// Exchanges the blocks of WIDTH beside the diagonal of two rows.
+template <int WIDTH, int... K> static ALWAYS_INLINE void exchange(Lanes& a, Lanes& b, std::integer_sequence<int, K...>) {
+  const Vector low = __builtin_shufflevector(a.v, b.v, (K & WIDTH ? LANES + K - WIDTH : K)...);
+  b.v = __builtin_shufflevector(a.v, b.v, (K & WIDTH ? LANES + K : K + WIDTH)...);
+  a.v = low;
+}
+
+static ALWAYS_INLINE void transpose(Lanes* v) {
+  const std::make_integer_sequence<int, LANES> all{};
+#if LANES >= 8
+  UNROLL for (int i = 0; i < 4; ++i) exchange<4>(v[i], v[i + 4], all);
+#endif
+#if LANES >= 4
+  UNROLL for (int i = 0; i < LANES; ++i)
+    if (!(i & 2)) exchange<2>(v[i], v[i + 2], all);
+#endif
+  UNROLL for (int i = 0; i < LANES; i += 2) exchange<1>(v[i], v[i + 1], all);
+}
+
+// Calls `move(j)` for blocks of LANES columns, which may overlap.
+template <typename Move> static ALWAYS_INLINE void for_blocks(long long size, Move move) {
+  for (long long j = 0; j < size - LANES; j += LANES) move(j);
+  move(size - LANES);
+}
+#endif
+
+// Puts rows (count, size) into lanes (size); lanes without a row get the first one.
+static void gather(const double* rows, long long size, int count, Lanes* lanes) {
+#ifdef HAS_SHUFFLE
+  if (count == LANES && size >= LANES)
+    return for_blocks(size, [=](long long j) {
+      Lanes block[LANES];
+      UNROLL for (int i = 0; i < LANES; ++i) block[i] = *(const Unaligned*)(rows + i * size + j);
+      transpose(block);
+      UNROLL for (int i = 0; i < LANES; ++i) lanes[j + i] = block[i];
+    });
+#endif
+  for (long long j = 0; j < size; ++j)
+    for (int i = 0; i < LANES; ++i) ((double*)(lanes + j))[i] = rows[(i < count ? i : 0) * size + j];
+}
+
+// Puts lanes (size) into rows (count, size).
+static void scatter(const Lanes* lanes, long long size, int count, double* rows) {
+#ifdef HAS_SHUFFLE
+  if (count == LANES && size >= LANES)
+    return for_blocks(size, [=](long long j) {
+      Lanes block[LANES];
+      UNROLL for (int i = 0; i < LANES; ++i) block[i] = lanes[j + i];
+      transpose(block);
+      UNROLL for (int i = 0; i < LANES; ++i) *(Unaligned*)(rows + i * size + j) = block[i].v;
+    });
+#endif
+  for (int i = 0; i < count; ++i)
+    for (long long j = 0; j < size; ++j) rows[i * size + j] = ((const double*)(lanes + j))[i];
+}
+
 struct Sizes {
   long long inputs, outputs;
 };
@@ -44,28 +115,15 @@ extern "C" EXPORT int nlp_gait_evaluate_rows(const double* const* inputs, const 
     for (int k = 0; k < INPUTS; next += input_size[k++]) {
       arg[k] = next;
       const long long size = input_size[k];
-      if (shared[k]) {
-        if (first == 0)
-          for (long long j = 0; j < size; ++j) next[j] = inputs[k][j];
-        continue;
-      }
-      const double* row[LANES];
-      for (int i = 0; i < LANES; ++i) row[i] = inputs[k] + (first + (i < count ? i : 0)) * size;
-      for (long long j = 0; j < size; ++j) {
-        Lanes value;
-        UNROLL for (int i = 0; i < LANES; ++i) value.set(i, row[i][j]);
-        next[j] = value;
-      }
+      if (!shared[k])
+        gather(inputs[k] + first * size, size, count, next);
+      else if (first == 0)
+        for (long long j = 0; j < size; ++j) next[j] = inputs[k][j];
     }
     Lanes* result = out;
     for (int k = 0; k < OUTPUTS; result += output_size[k++]) res[k] = result;
     if (kernel(arg, res, integers, scratch, 0)) return 1;
-    for (int k = 0; k < OUTPUTS; ++k) {
-      const long long size = output_size[k];
-      double* row = outputs[k] + first * size;
-      for (int i = 0; i < count; ++i, row += size)
-        for (long long j = 0; j < size; ++j) row[j] = ((const double*)(res[k] + j))[i];
-    }
+    for (int k = 0; k < OUTPUTS; ++k) scatter(res[k], output_size[k], count, outputs[k] + first * output_size[k]);
   }
   return 0;
 }
