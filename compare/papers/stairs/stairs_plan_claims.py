@@ -64,8 +64,6 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
             f"network_{name}": f"{found['converged']} of {found['poses']}"
             for name, found in zip(("adam", "printed"), _networks(findings), strict=True)
         },
-        "aco": _join(_track_costs(findings, "aco")),
-        "aco_grid": _join(_track_costs(findings, "aco-grid")),
         "energy_factor": _join(
             TABLE_4[case].energy / findings.best_track(case).verdict.indexes["energy_J"] for case in findings.cases
         ),
@@ -85,18 +83,14 @@ def _networks(findings: StairsFindings) -> list[Mapping[str, Any]]:
     return [network["adam"], next(found for rule, found in network.items() if "printed" in rule)]
 
 
-def _track_costs(findings: StairsFindings, solver: str) -> list[float]:
-    return [findings.best("track", case, solver).verdict.objective for case in findings.cases]
-
-
 def _describe_effect(findings: StairsFindings, name: str) -> str:
     if name not in findings.effort.plan_choices:
         return "not computed"
     parts = []
     for what in list_choice_plans(name):
         least = f"least {'jerk' if what == 'jerk' else 'energy'} [{PLANS[what]}]"
-        values = (describe_plan(findings, what, choice) for choice in (name, ""))
-        parts.append(f"{least} {' instead of '.join(values)}")
+        values = [describe_plan(findings, what, choice) for choice in (name, "")]
+        parts.append(f"{least} {'unchanged' if values[0] == values[1] else ' instead of '.join(values)}")
     return f"case {DRAWN_CASE}: {', '.join(parts)}"
 
 

@@ -59,12 +59,14 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
 
 
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
-    """Yield first steps, which end where the steps with a reverse double support start."""
+    """Yield first steps, which end where the steps with a reverse double support start, and those that end anywhere."""
     for case in findings.cases:
         spec, settings = make_first_spec(findings, case), findings.effort.plan_settings
         random = make_start_tasks(spec, findings.effort.first_starts - 1, settings=settings)
         near = {**findings.best("landing", case).x, "zmp_start_m": ZMP_OF_STANDING, "zmp_end_m": ZMP_OF_STANDING}
         yield from (*random, Task(problem=spec, solver=IPOPT, settings=settings, start=near, run=len(random)))
+        free = replace(make_plan_spec(findings.effort, case, "first"), label=f"free-{case}")
+        yield Task(problem=free, solver=IPOPT, settings=settings, start=near)
 
 
 def _make_task(spec: ProblemSpec, best: RunRecord, settings: Mapping[str, Any]) -> Task:

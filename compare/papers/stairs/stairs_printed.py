@@ -37,6 +37,8 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
     points = np.stack(
         [lift, lift + [0.0, radius * (1 - math.cos(first))], cycloid(first + catch), cycloid(first + 2 * catch)]
     )
+    caught = first + 2 * catch
+    slope = radius * np.array([1 - math.cos(caught), math.sin(caught)])  # of the cycloid
     s = np.linspace(0.0, 1.0, 1001)[:, None]
     weights = np.hstack([(1 - s) ** 3, (1 - s) ** 2 * s, (1 - s) * s**2, s**3])
     printed, proper = weights @ points, (weights * [1, 3, 3, 1]) @ points
@@ -58,6 +60,9 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
         "end_rate_rad_s": end_rate,
         "landing_m_s": 2 * radius * end_rate,
         "toe_depth_mm": 1e3 * float((ground - place[:, 1]).max()),  # (eqs. 15-20)
+        "toe_jump_mm": 1e3 * lift[1],  # (eq. 16) with theta_6 = 0
+        "raised_toe_mm": 1e3 * (lift[1] + robot.foot_m * math.sin(toe)),  # with theta_6 = theta_b
+        "third_point_mm": 1e3 * math.dist(points[2], points[3] - catch * slope),
         "arc_m": tread / math.sin(2 * math.atan2(rise, tread)),  # (eq. 25)
     }
 

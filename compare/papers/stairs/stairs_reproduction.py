@@ -11,18 +11,20 @@ import numpy as np
 
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.stairs import stairs_instants, stairs_motion
+from compare.papers.stairs import stairs_effects, stairs_instants, stairs_motion
 from compare.papers.stairs import stairs_plan_claims as plan_claims
 from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs import stairs_tracking as tracking
+from compare.papers.stairs.stairs_choices import OURS
 from compare.papers.stairs.stairs_figures import draw_figures
-from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import EVAPORATION, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_printed import list_equations
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
+from metaheuristics import AntColony
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES, PAPER_TIMES
 
@@ -51,12 +53,13 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "effort": effort,
         "cases": " | ".join(f"case {case}" for case in effort.cases),
         "papers": " | ".join(f"paper {case}" for case in effort.cases),
-        "ours": " | ".join(f"ours {case}" for case in effort.cases),
         "jerks": " | ".join(f"least jerk {case}" for case in effort.cases),
         "energies": " | ".join(f"least energy {case}" for case in effort.cases),
         "cases_4f": " | ".join(".4f" for _ in effort.cases),
         "cases_6g": " | ".join(".6g" for _ in effort.cases),
         "table_3": TABLE_3,
+        "evaporation": EVAPORATION,
+        "usual_spread": AntColony().spread,
         "quantum_s": QUANTUM,
         "step_ms": 1e3 * stairs_motion.STEP_S,
         "feedback_rad_s": math.sqrt(stairs_motion.FEEDBACK[0]),
@@ -66,35 +69,34 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "end_rate": end_rate,
         **plan_claims.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
+        **stairs_effects.compute_effects(findings),
         **_list_failed_equations(),
     }
 
 
 def _list_failed_equations() -> dict[str, str]:
     """Return the numbered equations that contradict themselves or each other, and those that only lack values."""
-    found: dict[str, list[str]] = {"contradictory": [], "lacking": []}
-    for row in REPRODUCTION.printed.differences:
-        if row.cannot_run:
-            found[
-                "lacking" if row.cannot_run.startswith(LACKING) and ";" not in row.cannot_run else "contradictory"
-            ].append(row.where)
-    return {name: ", ".join(f"({n})" for n in list_equations(places)) for name, places in found.items()}
+    rows = REPRODUCTION.printed.differences
+    places = {
+        "contradictory": [row.where for row in rows if row.cannot_run],
+        "lacking": [row.where for row in rows if row.reason.startswith(LACKING)],
+    }
+    return {name: ", ".join(f"({n})" for n in list_equations(where)) for name, where in places.items()}
 
 
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it
-# Rows of Table IV: words, name in the paper's table and in our result, and where in our results.
-QUANTITIES = (
-    ("largest joint acceleration, plan of least jerk [rad/s^2]", "acceleration", "jerk"),
-    ("largest joint acceleration, plan of least energy [rad/s^2]", "acceleration", "plan"),
-    ("largest joint jerk, plan of least jerk [rad/s^3]", "jerk", "jerk"),
-    ("largest joint jerk, plan of least energy [rad/s^3]", "jerk", "plan"),
-    ("torso pitch [rad]", "torso_pitch_rad", "x"),
-    ("K_p", "kp", "x"),
-    ("K_d", "kd", "x"),
-    ("cost", "cost", "verdict"),
-    ("energy (paper: no unit; ours: J)", "energy_J", "verdict"),
-    ("peak torque [N m]", "peak_torque_Nm", "verdict"),
-)
+# Rows of Table IV: words, and name in the paper's table.
+QUANTITIES = {
+    "acceleration": "largest joint acceleration over quanta [rad/s^2]",
+    "jerk": "largest joint jerk over quanta [rad/s^3]",
+    "torso_pitch_rad": "torso pitch [rad]",
+    "kp": "K_p",
+    "kd": "K_d",
+    "cost": "mean of (53)",
+    "energy": "energy (paper: no unit; ours: J)",
+    "peak_torque_Nm": "peak torque [N m]",
+}
+TRACKED = {"jerk": "jerk", "plan": OURS}  # choice of the tracked step that follows a plan
 
 
 def make_tables(findings: StairsFindings) -> dict[str, Rows]:
@@ -160,22 +162,16 @@ def _compute_time_s(records: Sequence[RunRecord]) -> float:
 
 
 def _list_table_4(findings: StairsFindings) -> Rows:
-    """The paper's quantities in each case, then ours: of the desired angles, and of the best tracked step."""
-    rows = []
-    for words, name, where in QUANTITIES:
-        ours = []
+    """The paper's quantities in each case, then ours on both plans: of the desired angles, and of the paper's search."""
+    found: dict[str, list[float]] = {name: [] for name in QUANTITIES}
+    for what, choice in TRACKED.items():
         for case in findings.cases:
-            track = findings.best_track(case)
-            places = {
-                "jerk": findings.others[f"differences-jerk-{case}"],
-                "plan": findings.others[f"differences-plan-{case}"],
-                "x": track.x,
-                "verdict": {"cost": track.verdict.objective, **track.verdict.indexes},
-            }
-            ours.append(places[where][name])
-        printed = [float(getattr(TABLE_4[case], name.removesuffix("_J"))) for case in findings.cases]
-        rows.append([words, *printed, *ours])
-    return rows
+            run = tracking.get_best(findings, case, choice)
+            tracked = {name: tracking.read_index(run, index) for name, index in tracking.TABLE_4_ROWS.items()}
+            for name, value in {**findings.others[f"differences-{what}-{case}"], **tracked}.items():
+                found[name].append(value)
+    printed = {name: [float(getattr(TABLE_4[case], name)) for case in findings.cases] for name in QUANTITIES}
+    return [[words, *printed[name], *found[name]] for name, words in QUANTITIES.items()]
 
 
 def _list_tracks(findings: StairsFindings, case: int) -> Rows:

@@ -36,6 +36,7 @@ from nlp_gait.gaits.stairs.track import PLAN
 
 ALGORITHMS: Mapping[str, Algorithm] = {
     "aco": AntColony(population=ANTS, spread=EVAPORATION),
+    "aco-usual": AntColony(population=ANTS),  # with the spread of its authors
     "aco-grid": AntColonyGrid(population=ANTS, evaporation=EVAPORATION),
     "pso": ParticleSwarm(),
     "ga": GeneticAlgorithm(),
@@ -95,7 +96,7 @@ class StairsEffort(Effort):
     def plan_steps(self) -> int:
         """Plans under every choice, with a reverse double support, first steps, floors of the effort, and simulations."""
         chosen = sum(1 if "minimise" in PLAN_CHOICES[name].options else 2 for name in self.plan_choices)
-        return chosen + len(self.cases) * (1 + self.first_starts + 1 + 3)
+        return chosen + len(self.cases) * (1 + self.first_starts + 1 + 1 + 3)
 
     @property
     def steps(self) -> int:

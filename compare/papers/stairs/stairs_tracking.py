@@ -141,14 +141,19 @@ def _describe_effect(findings: StairsFindings, name: str) -> str:
         return "not computed"
     parts = []
     for index, text in EFFECTS.items():
-        values = [[_read(get_best(findings, case, which), index) for case in findings.cases] for which in (name, OURS)]
-        parts.append(text.format(" instead of ".join(map(_join, values))))
+        values = [
+            _join(read_index(get_best(findings, case, which), index) for case in findings.cases)
+            for which in (name, OURS)
+        ]
+        if values[0] != values[1]:
+            parts.append(text.format(" instead of ".join(values)))
     feasible = sum(get_best(findings, case, name).verdict.feasible for case in findings.cases)
     cases = " / ".join(map(str, findings.cases))
-    return f"case {cases}: {', '.join(parts)}; {feasible} of {len(findings.cases)} feasible"
+    return f"case {cases}: {', '.join(parts) or 'no change'}; {feasible} of {len(findings.cases)} feasible"
 
 
-def _read(run: RunRecord, index: str) -> float:
+def read_index(run: RunRecord, index: str) -> float:
+    """Return a tuned value or an index of a tracked step."""
     return run.x[index] if index in run.x else run.verdict.indexes[index]
 
 
@@ -162,7 +167,7 @@ def _describe(values: Mapping[str, Iterable[float]]) -> str:
 def _collect(findings: StairsFindings, index: str, names: Iterable[str] = READINGS) -> dict[str, list[float]]:
     """Return a quantity in all cases under those of the named choices that were run."""
     run = [name for name in names if name in findings.effort.choices]
-    return {name: [_read(get_best(findings, case, name), index) for case in findings.cases] for name in run}
+    return {name: [read_index(get_best(findings, case, name), index) for case in findings.cases] for name in run}
 
 
 def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str]) -> Check:

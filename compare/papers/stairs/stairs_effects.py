@@ -1,0 +1,112 @@
+"""Effects of what the stairs paper leaves open, measured along our plans and best tracked steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from compare.papers.stairs.stairs_choices import CHOICES, OURS, PLAN_CHOICES, PRINTED
+from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_4
+from compare.papers.stairs.stairs_planning import PLANS, describe_plan, list_choice_plans, move
+from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings
+from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec
+from nlp_gait.formulation import Array
+from nlp_gait.formulation.display import RIGHT
+from nlp_gait.gaits.stairs.closed_loop import QUANTUM
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING
+from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.stair import SETBACK
+
+INERTIAS = (0.0, 1.0, 2.0)  # as multiples of those of slender rods
+SETBACKS = (0.0, 0.03, SETBACK)  # of edges behind the ankle that stands on the step [m]
+NOT_COMPUTED = "not computed with this effort"
+LEARNED = ("closed-form cost", "network cost", "largest_angle_error_rad")
+
+
+def compute_effects(findings: StairsFindings) -> dict[str, Any]:
+    """Return numbers for the table of differences, as text; those of plans by plan, in the order of the cases or as above."""
+    cases = findings.cases
+    motions = {what: move(findings, what, DRAWN_CASE) for what in PLANS}
+    moments = {what: [_change_inertia(motions[what][0].arrays, share) for share in INERTIAS] for what in PLANS}
+    learned = [findings.others[f"learned-{case}"] for case in cases]
+    return {
+        "inertia_J": {what: _join(energy for energy, _ in rows) for what, rows in moments.items()},
+        "inertia_mm": {what: _join(margin for _, margin in rows) for what, rows in moments.items()},
+        "edge_mm": {what: _join(_measure_depth(findings, what, setback) for setback in SETBACKS) for what in PLANS},
+        "zmp_gap_mm": {what: _join(_measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
+        "start_m_s": _join(_measure_start(findings, case) for case in cases),
+        "turn_rad": {name: _join(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
+        "learned": [_join(row[name] for row in learned) for name in LEARNED],
+        "first": [_join(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
+        "colony": {
+            solver: _join(findings.best("track", case, solver).verdict.objective for case in cases)
+            for solver in findings.track_solvers
+        },
+        "printed_effort": ANTS * ITERATIONS,
+        "planned": {name or OURS: _describe_plans(findings, name) for name in ("", *PLAN_CHOICES)},
+        "tracked": {name: _describe_step(findings, name) for name in CHOICES},
+    }
+
+
+def _describe_plans(findings: StairsFindings, name: str) -> str:
+    if name and name not in findings.effort.plan_choices:
+        return NOT_COMPUTED
+    return ", ".join(f"{describe_plan(findings, what, name)} {PLANS[what]}" for what in list_choice_plans(name))
+
+
+def _describe_step(findings: StairsFindings, name: str) -> str:
+    if name not in findings.effort.choices:
+        return NOT_COMPUTED
+    steps = [get_best(findings, case, name).verdict for case in findings.cases]
+    cost, energy = (_join(step.indexes[index] for step in steps) for index in ("controller_cost", "energy_J"))
+    return f"mean of (53) {cost}, {energy} J" + ("" if all(step.feasible for step in steps) else ", not feasible")
+
+
+def _change_inertia(arrays: Mapping[str, Array], share: float) -> tuple[float, float]:
+    """Return energy [J] and ZMP margin [mm] of a planned motion with a multiple of the links' inertias.
+
+    The equations of motion are in absolute link angles: an inertia acts on the acceleration of its own link only.
+    """
+    robot = toe_foot_biped()
+    inertias = np.array([robot.rods[link].inertia for link in MOVING])
+    extra = (share - 1) * inertias * arrays["link_qdd"] @ np.linalg.inv(JOINT_RATES)
+    power = np.abs((arrays["tau"] + extra) * arrays["qd"]).sum(axis=1)
+    pressure = arrays["stance_pressure"][:, 0] - extra[:, 0] / arrays["stance_force"][:, 1]
+    margin = np.minimum(pressure, robot.foot_m - pressure).min()
+    return float(np.trapezoid(power, arrays["t"])), 1e3 * float(margin)
+
+
+def _measure_depth(findings: StairsFindings, what: str, setback: float) -> float:
+    """Return how deep ankle, sole or toe of the swing foot are in steps whose edges are elsewhere [mm]."""
+    tread, rise = TABLE_4[DRAWN_CASE].step_m
+    signals, legs = move(findings, what, DRAWN_CASE)
+    x, z = np.moveaxis(legs[RIGHT][signals.arrays["t"] > findings.best(what, DRAWN_CASE).x["t2_s"], 2:5], -1, 0)
+    ground = rise * (1.0 * (x >= -setback) + (x >= tread - setback) - 1.0)
+    return 1e3 * max(0.0, float((ground - z).max()))
+
+
+def _measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
+    """Return the largest distance of the ZMP of (49) from the planned one of (22) [mm]."""
+    arrays, x = move(findings, what, case)[0].arrays, findings.best(what, case).x
+    share, (tread, _) = arrays["t"] / arrays["t"][-1], TABLE_4[case].step_m
+    planned = x["zmp_start_m"] + (tread + x["zmp_end_m"] - x["zmp_start_m"]) * share**2 * (3 - 2 * share)
+    return 1e3 * float(np.abs(arrays["zmp"][:, 0] + tread - planned).max())
+
+
+def _measure_start(findings: StairsFindings, case: int) -> float:
+    """Return the speed of the hip at the start of the plan of least jerk [m/s]."""
+    arrays = move(findings, "jerk", case)[0].arrays
+    return float((arrays["hip"][1, 0] - arrays["hip"][0, 0]) / arrays["t"][1])
+
+
+def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:
+    """Return by how much a link turns at most in a quantum of the best step under a choice [rad]."""
+    problem, x = make_choice_spec(findings, case, name).load(), get_best(findings, case, name).x
+    rates = problem.signals(np.array(list(x.values()))).arrays["link_qd"]
+    return QUANTUM * float(np.abs(rates).max())
+
+
+def _join(values: Iterable[float]) -> str:
+    return " / ".join(f"{value:.4g}" for value in values)
