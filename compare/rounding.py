@@ -162,15 +162,12 @@ class _Judge:
             self.evaluate(self.centre + self.half * place)
         starts, models = [self.evaluate(self.centre)] * 4, dict[int, _Forms]()
         for _ in range(ROUNDS):
-            for start in starts:
-                if id(start) not in models:
-                    models[id(start)] = self._linearise(start)
+            models |= {id(start): self._linearise(start) for start in starts if id(start) not in models}
             cheap, costly, good, bad = (models[id(start)] for start in starts)
             predicted = bad.middle[1:] + np.abs(bad.slopes[1:]).sum(axis=1)
-            corners = [-np.sign(cheap.slopes[0]), np.sign(costly.slopes[0]), _solve_linear(good)[0]]
-            corners += [np.sign(bad.slopes[1 + k]) for k in np.argsort(-predicted)[:MOST_ROWS]]
-            origins = [starts[0], starts[1], starts[2], *[starts[3]] * MOST_ROWS]
-            for origin, corner in zip(origins, corners, strict=False):
+            worst = [np.sign(bad.slopes[1 + k]) for k in np.argsort(-predicted)[:MOST_ROWS]]
+            corners = (-np.sign(cheap.slopes[0]), np.sign(costly.slopes[0]), _solve_linear(good)[0], *worst)
+            for origin, corner in zip([*starts, *starts[3:] * MOST_ROWS], corners, strict=False):
                 for share in SHARES:
                     self.evaluate(origin.x + share * (self.centre + self.half * corner - origin.x))
             known = [point for point in self.points if math.isfinite(point.values.cost)] or self.points

@@ -47,7 +47,7 @@ def unpack_archive(path: Path, folder: Path) -> tuple[ArchiveManifest, list[str]
             for entry in entries:
                 target = folder / entry.filename
                 make_folder(target.parent)
-                target.write_bytes(_read(archive, entry, owner))
+                target.write_bytes(archive.read(entry))
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
         raise InputError(f"{owner} is damaged: {error}") from error
     raw = read_json(folder / MANIFEST, "manifest")
@@ -80,14 +80,6 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
                 f"{owner} contains {name!r} of {entry.file_size:,} bytes from {entry.compress_size:,}: too large"
             )
         seen.add(name.casefold())
-
-
-def _read(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, owner: str) -> bytes:
-    with archive.open(entry) as stream:
-        data = stream.read(entry.file_size + 1)
-    if len(data) != entry.file_size:
-        raise InputError(f"{owner} contains {entry.filename!r} of another size than it says")
-    return data
 
 
 def _compare(manifest: ArchiveManifest, folder: Path) -> Iterator[str]:

@@ -1,24 +1,28 @@
-"""Verification of a study: what holds and what does not, in a folder or in an unpacked archive."""
+"""Verification of a study: what holds and what does not, in a folder or in an archive."""
 
 from __future__ import annotations
 
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
+from typing import NamedTuple
 
 from compare.analysis.comparison import label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.archive.rerun import compare_runs, make_task
+from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import markdown_page
-from compare.study.evidence import Evidence, name_record, read_evidence
+from compare.study.evidence import name_record, read_evidence
 from compare.study.manifest import FILE, Manifest, read_manifest
 from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, load_problem
 from compare.study.simulations import load_simulations
 from nlp_gait.backends.identity import FILES, SOURCE
 from nlp_gait.errors import GaitError, InputError
+from nlp_gait.files import make_temporary_folder
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.certificate import load_certificates, read_certificate
@@ -28,8 +32,7 @@ from nlp_gait.user_code import hash_file, parse_reference
 REPORT = "report.md"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finding:
+class Finding(NamedTuple):
     """One check."""
 
     what: str  #: that was checked
@@ -40,6 +43,15 @@ class Finding:
     def sentence(self) -> str:
         """The finding as one line."""
         return f"{self.what}: {'holds' if self.holds else 'DOES NOT HOLD'}: {self.detail}"
+
+
+def verify_archive(path: Path, *, share: float = 0.0, progress: Progress = ignore_progress) -> list[Finding]:
+    """Check an archive as ``verify_folder``, and its hashes; raises InputError if it cannot be unpacked."""
+    with make_temporary_folder("nlp-gait-verify-") as folder:
+        manifest, differences = unpack_archive(path, folder)
+        detail = "; ".join(differences) or f"{len(manifest.files)} files have their SHA-256 of the manifest"
+        found = verify_folder(folder, share=share, robots=manifest.robots, is_archive=True, progress=progress)
+        return [Finding("manifest", not differences, detail), *found]
 
 
 def verify_folder(
@@ -65,78 +77,61 @@ def verify_folder(
         return load_problem(_move_files(record, places))
 
     try:
-        evidence = read_evidence(folder, "all", find_problem)
+        records, excluded = read_evidence(folder, "all", find_problem)
     except InputError as error:
-        return [Finding(what="records", holds=False, detail=str(error))]
-    findings = [_describe_records(evidence)]
+        return [Finding("records", False, str(error))]
+    count, wrong = len(records) + len(excluded), "; ".join(exclusion.sentence for exclusion in excluded)
+    detail = (
+        f"{len(excluded)} of {count} are no evidence: {wrong}" if excluded else f"all {count} follow from their points"
+    )
+    findings = [Finding("records", not excluded, detail + ", also between the samples" * (not excluded))]
     manifest = Manifest(settings=None, sessions=())
     try:
         manifest = read_manifest(folder)
-        findings += check_sessions(evidence.records, manifest)
+        findings.append(_check_sessions(records, manifest))
     except InputError as error:
-        findings.append(Finding(what=FILE, holds=False, detail=str(error)))
-    findings += _check_certificates(folder)
+        findings.append(Finding(FILE, False, str(error)))
+    findings += [_check_certificate(path) for path in sorted((folder / "certificates").glob("*.json"))]
     if is_archive:
-        findings += _check_code_files(folder, evidence.records)
-        findings.append(_check_report(folder, evidence.records, manifest))
-    if share > 0.0:
-        findings += _repeat_runs(evidence.records, share, places, progress)
-    return findings
+        findings += [*_check_code_files(folder, records), _check_report(folder, records, manifest)]
+    return [*findings, *(_repeat_runs(records, share, places, progress) if share > 0.0 else ())]
 
 
-def _describe_records(evidence: Evidence) -> Finding:
-    count = len(evidence.records) + len(evidence.excluded)
-    if not evidence.excluded:
-        return Finding(
-            what="records", holds=True, detail=f"all {count} follow from their points, also between the samples"
-        )
-    listed = "; ".join(exclusion.sentence for exclusion in evidence.excluded)
-    return Finding(what="records", holds=False, detail=f"{len(evidence.excluded)} of {count} are no evidence: {listed}")
-
-
-def check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> list[Finding]:
+def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> Finding:
     """Compare the code and machines of records with the sessions of the manifest that computed them."""
-    own = [record for record in records if record.origin is not None]
+    own = [(record, record.origin) for record in records if record.origin is not None]
+    if own and not manifest.sessions:
+        return Finding(FILE, False, "no session is recorded")
     codes = {session.versions.get("code") for session in manifest.sessions}
     machines = {f"{s.machine.get('processor')}, {s.machine.get('system')}" for s in manifest.sessions}
     started = min((session.started for session in manifest.sessions), default="")
     wrong = [
-        f"{name_record(r)} ({why})"
-        for r in own
-        for why in (
-            "" if r.origin is None or r.origin.code_sha256[:8] in codes else "no session ran its code",
-            "" if r.origin is None or r.origin.machine in machines else "no session ran on its machine",
-            "" if r.time_s.finished >= started else "it ended before the first session",
+        f"{name_record(record)} ({why})"
+        for record, origin in own
+        for holds, why in (
+            (origin.code_sha256[:8] in codes, "no session ran its code"),
+            (origin.machine in machines, "no session ran on its machine"),
+            (record.time_s.finished >= started, "it ended before the first session"),
         )
-        if why
+        if not holds
     ]
-    if own and not manifest.sessions:
-        wrong = ["no session is recorded"]
-    if wrong:
-        return [Finding(what=FILE, holds=False, detail="; ".join(wrong))]
     installed = hash_installed_code()
-    used = {r.origin.code_sha256 for r in own if r.origin is not None}
-    note = (
-        "" if used <= {installed} else f"; other code is installed here ({installed[:8]}), so runs cannot be repeated"
-    )
-    return [Finding(what=FILE, holds=True, detail=f"{len(manifest.sessions)} sessions explain {len(own)} runs{note}")]
+    other = any(origin.code_sha256 != installed for _, origin in own)
+    note = f"; other code is installed here ({installed[:8]}), so runs cannot be repeated" if other else ""
+    detail = "; ".join(wrong) or f"{len(manifest.sessions)} sessions explain {len(own)} runs{note}"
+    return Finding(FILE, not wrong, detail)
 
 
-def _check_certificates(folder: Path) -> list[Finding]:
-    """Compare archived certificates with the shipped ones; others are checked as by ``certainty --check``."""
-    findings = []
-    for path in sorted((folder / "certificates").glob("*.json")):
-        try:
-            file = read_certificate(path)
-            if any(file == shipped for shipped in load_certificates().values()):
-                detail = f"bound {file.certificate.bound:.9g}, equal to the shipped one"
-            else:
-                check = check_certificate(file)
-                detail = f"bound {file.certificate.bound:.9g}, {check.paths} paths of its proof followed"
-            findings.append(Finding(what=f"certificates/{path.name}", holds=True, detail=detail))
-        except GaitError as error:
-            findings.append(Finding(what=f"certificates/{path.name}", holds=False, detail=str(error)))
-    return findings
+def _check_certificate(path: Path) -> Finding:
+    """Compare an archived certificate with the shipped ones; another one is checked as by ``certainty --check``."""
+    what = f"certificates/{path.name}"
+    try:
+        file = read_certificate(path)
+        shipped = any(file == other for other in load_certificates().values())
+        how = "equal to the shipped one" if shipped else f"{check_certificate(file).paths} paths of its proof followed"
+        return Finding(what, True, f"bound {file.certificate.bound:.9g}, {how}")
+    except GaitError as error:
+        return Finding(what, False, str(error))
 
 
 def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Finding]:
@@ -148,7 +143,7 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
         path = folder / "code" / Path(name).name
         same = path.is_file() and hash_file(path) == digest
         detail = "it is the code of the records" if same else "it is missing, or is not the code of the records"
-        findings.append(Finding(what=f"code/{path.name}", holds=same, detail=detail))
+        findings.append(Finding(f"code/{path.name}", same, detail))
     return findings
 
 
@@ -157,18 +152,14 @@ def _check_report(folder: Path, records: Sequence[RunRecord], manifest: Manifest
     labelled = label_editions(records)
     try:
         simulated = load_simulations(folder, select_best_gaits(labelled))
-        again = markdown_page(make_study_document(labelled, manifest, simulated=simulated))
-        known = (folder / REPORT).read_text(encoding="utf-8")
+        again = markdown_page(make_study_document(labelled, manifest, simulated=simulated)).split("\n")
+        known = (folder / REPORT).read_text(encoding="utf-8").split("\n")
     except (GaitError, OSError, UnicodeError) as error:
-        return Finding(what=REPORT, holds=False, detail=str(error))
-    for number, (a, b) in enumerate(zip(known.splitlines(), again.splitlines(), strict=False), start=1):
+        return Finding(REPORT, False, str(error))
+    for number, (a, b) in enumerate(zip_longest(known, again), start=1):
         if a != b:
-            return Finding(
-                what=REPORT, holds=False, detail=f"line {number} is {a[:100]!r}, but the records give {b[:100]!r}"
-            )
-    if known != again:
-        return Finding(what=REPORT, holds=False, detail="it is shorter or longer than what the records give")
-    return Finding(what=REPORT, holds=True, detail="it follows from the records")
+            return Finding(REPORT, False, f"line {number} is {a!r:.100}, but the records give {b!r:.100}")
+    return Finding(REPORT, True, "it follows from the records")
 
 
 def _repeat_runs(
@@ -180,12 +171,12 @@ def _repeat_runs(
     for record in chosen:
         progress(name_record(record))
         try:
-            moved = _move_files(record, places)
-            difference = compare_runs(record, make_task(moved, record), records)
+            task = make_task(_move_files(record, places), record)
+            difference = compare_runs(record, task, records)
         except (GaitError, ValueError) as error:
             difference = f"it cannot be repeated: {error}"
         detail = difference or f"the same {record.evaluations['f']} evaluations, point and history, to the last bit"
-        findings.append(Finding(what=f"repeated: {name_record(record)}", holds=not difference, detail=detail))
+        findings.append(Finding(f"repeated: {name_record(record)}", not difference, detail))
     return findings
 
 

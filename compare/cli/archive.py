@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,9 +11,6 @@ from compare.cli.command import command
 from compare.cli.common import end_if_excluded, fail, output_file, print_json, print_written, progress_bar, stdout
 from compare.cli.options import AsJson, Code, name_all
 from nlp_gait.errors import InputError
-
-if TYPE_CHECKING:
-    from compare.archive import Finding
 
 
 @command
@@ -61,34 +57,21 @@ def verify(
 
     Examples: `nlp-gait verify results`, `nlp-gait verify study.zip --rerun 5%`
     """
-    from compare.archive import unpack_archive, verify_folder
-    from nlp_gait.files import make_temporary_folder
+    from compare.archive import verify_archive, verify_folder
 
     share = _parse_share(rerun)
     name_all(code)
     with progress_bar("repeated runs", None) as advance:
-        if study.is_dir():
-            findings = verify_folder(study, share=share, progress=advance)
-        else:
-            with make_temporary_folder("nlp-gait-verify-") as folder:
-                manifest, differences = unpack_archive(study, folder)
-                found = verify_folder(folder, share=share, robots=manifest.robots, is_archive=True, progress=advance)
-                findings = [*_describe_hashes(len(manifest.files), differences), *found]
+        check = verify_folder if study.is_dir() else verify_archive
+        findings = check(study, share=share, progress=advance)
     wrong = [finding for finding in findings if not finding.holds]
     if as_json:
-        print_json({"holds": not wrong, "findings": [asdict(finding) for finding in findings]})
+        print_json({"holds": not wrong, "findings": [finding._asdict() for finding in findings]})
     else:
         for finding in findings:
             stdout.print(finding.sentence, soft_wrap=True)
     if wrong:
         fail(f"{len(wrong)} of {len(findings)} checks do not hold")
-
-
-def _describe_hashes(count: int, differences: list[str]) -> list[Finding]:
-    from compare.archive import Finding
-
-    detail = "; ".join(differences) or f"{count} files have their SHA-256 of the manifest"
-    return [Finding(what="manifest", holds=not differences, detail=detail)]
 
 
 def _parse_share(text: str) -> float:

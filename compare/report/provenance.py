@@ -12,6 +12,7 @@ from compare.analysis.comparison import read_objective
 from compare.analysis.statistics.run_length import find_best_known
 from compare.analysis.units import percent, with_unit
 from compare.report.document import Prose, Table, text_table
+from compare.study.description import describe_solver, list_described_names
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
@@ -33,20 +34,18 @@ TERMS = Prose(
 
 def make_solver_table(records: Iterable[RunRecord]) -> Table:
     """Return settings, budget and seeds of the solvers of all records, a row for each difference."""
-    rows: dict[tuple[str, str, str], list[RunRecord]] = {}
+    groups: dict[tuple[str, str, str], list[RunRecord]] = {}
     for record in records:
-        rows.setdefault((record.solver, format_settings(record.settings), describe_budget(record)), []).append(record)
-    cells = [
-        (
-            solver,
-            *compare_with_defaults(group[0]),
-            f"{min(r.seed for r in group)} to {max(r.seed for r in group)}",
-            str(len(group)),
-            str(len({r.problem for r in group})),
-        )
-        for (solver, _, _), group in rows.items()
-    ]
-    return text_table(("solver", *SETTINGS, "seeds", "runs", "problems"), cells, prose=True)
+        key = record.solver, format_settings(record.definition["settings"]), describe_budget(record)
+        groups.setdefault(key, []).append(record)
+    rows = []
+    for (solver, *_), group in groups.items():
+        run = next((r for r in group if r.settings), group[0])  # a failed run has none
+        seeds = f"{min(r.seed for r in group)} to {max(r.seed for r in group)}"
+        title = describe_solver(solver).title if solver in list_described_names() else "-"
+        counts = str(len(group)), str(len({r.problem for r in group}))
+        rows.append((solver, *compare_with_defaults(run), seeds, *counts, title))
+    return text_table(("solver", *SETTINGS, "seeds", "runs", "problems", "what"), rows, prose=True)
 
 
 def make_reference_table(records: Iterable[RunRecord]) -> Table | str:

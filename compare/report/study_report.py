@@ -14,14 +14,12 @@ from compare.drawing.comparison_figures import list_expected_costs, plot_perform
 from compare.report.document import Document, Figure, Section, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import (
-    SETTINGS,
     TERMS,
-    compare_with_defaults,
     format_settings,
+    make_solver_table,
 )
 from compare.report.session_section import make_citation_section, make_session_section
 from compare.report.writing import write_document
-from compare.study.description import describe_solver, list_described_names
 from compare.study.evidence import Exclusion, read_evidence
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
@@ -110,7 +108,7 @@ def _make_method_section(comparisons: Sequence[Comparison], manifest: Manifest, 
         title="Methods",
         parts=(
             _counting(comparisons, weighting),
-            _solver_settings(comparisons),
+            _list_settings(comparisons),
             *(make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)),
         ),
     )
@@ -132,28 +130,17 @@ def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Sectio
     )
 
 
-def _solver_settings(comparisons: Sequence[Comparison]) -> Section:
-    rows = []
-    for comparison in comparisons:
-        for solver in comparison.solvers:
-            run = next((r for r in solver.records if r.settings), solver.records[0])
-            seeds = f"{solver.records[0].seed} to {solver.records[-1].seed}"
-            what = describe_solver(solver.name).title if solver.name in list_described_names() else "-"
-            rows.append((comparison.problem, solver.name, seeds, *compare_with_defaults(run), what))
-        problem = comparison.records[0].definition.get("problem", {})
-        rows.append(
-            (
-                comparison.problem,
-                "(problem)",
-                "-",
-                "-",
-                format_settings(problem.get("parameters", {})) or "none",
-                format_settings(problem.get("options", {})),
-                "options of the problem, and changed values",
-            )
-        )
-    header = ("problem", "solver", "seeds", *SETTINGS, "what")
-    return Section(title="Settings and seeds", parts=(text_table(header, rows, prose=True),))
+def _list_settings(comparisons: Sequence[Comparison]) -> Section:
+    problems = {c.problem: c.records[0].definition["problem"] for c in comparisons}
+    rows = [
+        (name, format_settings(problem["parameters"]) or "none", format_settings(problem["options"]))
+        for name, problem in problems.items()
+    ]
+    solvers = make_solver_table(record for comparison in comparisons for record in comparison.records)
+    return Section(
+        title="Settings and seeds",
+        parts=(solvers, text_table(("problem", "changed values", "options"), rows, prose=True)),
+    )
 
 
 def _write_csv_files(folder: Path, records: Sequence[RunRecord]) -> list[Path]:

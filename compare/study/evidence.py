@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -32,8 +32,7 @@ MOST_INTERPRETED = 1000
 SLACK = 1e-4
 
 
-@dataclass(frozen=True, kw_only=True)
-class Exclusion:
+class Exclusion(NamedTuple):
     """A record that is no evidence, and why."""
 
     name: str  #: problem, solver and run, or the file
@@ -89,13 +88,13 @@ def check_records(
         why += check_claims(record)
     find_copies(records, reasons)
     check_code(records, reasons, needs_origin)
-    kept = [record for record, why in zip(records, reasons, strict=True) if not why]
-    excluded = [
-        Exclusion(name=name_record(record), reasons=tuple(why), record=record)
-        for record, why in zip(records, reasons, strict=True)
-        if why
-    ]
-    return Evidence(kept, excluded)
+    evidence = Evidence([], [])
+    for record, why in zip(records, reasons, strict=True):
+        if why:
+            evidence.excluded.append(Exclusion(name_record(record), tuple(why), record))
+        else:
+            evidence.records.append(record)
+    return evidence
 
 
 def read_evidence(
@@ -107,18 +106,14 @@ def read_evidence(
         InputError: there are no records, or none of them can be used.
     """
     found = read_each(folder)
-    damaged = [
-        Exclusion(name=path.relative_to(folder).as_posix(), reasons=(str(record),))
-        for path, record in found
-        if isinstance(record, InputError)
-    ]
     readable = [record for _, record in found if isinstance(record, RunRecord)]
     evidence = check_records(readable, find_problem=find_problem, between_samples=between_samples)
-    excluded = damaged + evidence.excluded
+    damaged = [(path, error) for path, error in found if isinstance(error, InputError)]
+    evidence.excluded[:0] = [Exclusion(path.relative_to(folder).as_posix(), (str(error),)) for path, error in damaged]
     if not evidence.records:
-        sentences = "; ".join(exclusion.sentence for exclusion in excluded)
+        sentences = "; ".join(exclusion.sentence for exclusion in evidence.excluded)
         raise InputError(f"none of the {len(found)} records in {str(folder)!r} can be used: {sentences}")
-    return Evidence(evidence.records, excluded)
+    return evidence
 
 
 def name_record(record: RunRecord) -> str:
@@ -129,8 +124,7 @@ def name_record(record: RunRecord) -> str:
 def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: Reasons) -> None:
     """Compare objective, violation, feasibility and indexes with the exact functions at x."""
     identity, described, here = identify_problem(problem), asdict(problem.objective), Origin.make()
-    placed: list[int] = []
-    points: list[Array] = []
+    points: dict[int, Array] = {}
     for k, (record, why) in enumerate(zip(records, reasons, strict=True)):
         known = record.definition["problem"].get(HASH)
         other_casadi = record.origin is not None and record.origin.casadi != here.casadi
@@ -142,54 +136,36 @@ def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: R
             why += _check_failed(record)
             continue
         try:
-            points.append(problem.check_x(record.x))
-            placed.append(k)
+            points[k] = problem.check_x(record.x)
         except (GaitError, ValueError) as error:
             why.append(f"its point does not belong to the problem: {error}")
-    if not points:
-        return
-    values = _evaluate_points(problem, np.array(points))
-    for k, found in zip(placed, values, strict=True):
-        wrong = list(_compare_verdict(records[k].verdict, found))
-        if wrong and found.indexes is None:  # decided by the interpreted functions
-            wrong = list(_compare_verdict(records[k].verdict, _evaluate_one(problem, problem.check_x(records[k].x))))
-        reasons[k] += wrong
-
-
-class _Values(NamedTuple):
-    objective: float
-    violation: float
-    indexes: Mapping[str, float] | None  # None if they were not evaluated
-
-
-def _evaluate_points(problem: GaitProblem, points: Array) -> list[_Values]:
-    """Return the exact values at points (P, n)."""
-    sign = problem.objective.sign
     if len(points) > MOST_INTERPRETED:
-        f, violation = compile_objective(problem)(points)
-        return [_Values(sign * float(a), float(b), None) for a, b in zip(f, violation, strict=True)]
-    return [_evaluate_one(problem, x) for x in points]
+        costs, violations = compile_objective(problem)(np.array(list(points.values())))
+        for k, cost, violation in zip(list(points), costs.tolist(), violations.tolist(), strict=True):
+            if not any(_compare_verdict(records[k].verdict, problem.objective.sign * cost, violation)):
+                del points[k]  # what remains is decided by the interpreted functions
+    for k, x in points.items():
+        exact = build_exact_model(problem).at(x, problem.p)
+        objective = problem.objective.sign * exact.cost
+        reasons[k] += _compare_verdict(records[k].verdict, objective, exact.violation, exact.indexes)
 
 
-def _evaluate_one(problem: GaitProblem, x: Array) -> _Values:
-    values = build_exact_model(problem).at(x, problem.p)
-    return _Values(problem.objective.sign * values.cost, values.violation, values.indexes)
-
-
-def _compare_verdict(verdict: Verdict, found: _Values) -> Iterator[str]:
-    if not is_same(verdict.objective, found.objective):
-        yield f"its objective is {verdict.objective:.9g}, but that of its x is {found.objective:.9g}"
-    violation = math.inf if math.isnan(found.violation) else found.violation
+def _compare_verdict(
+    verdict: Verdict, objective: float, violation: float, indexes: Mapping[str, float] | None = None
+) -> Iterator[str]:
+    if not is_same(verdict.objective, objective):
+        yield f"its objective is {verdict.objective:.9g}, but that of its x is {objective:.9g}"
+    violation = math.inf if math.isnan(violation) else violation
     if not is_same(verdict.violation, violation, 1.0):
         yield f"its violation is {verdict.violation:.3g}, but that of its x is {violation:.3g}"
     if verdict.feasible != (verdict.violation <= FEASIBILITY_TOLERANCE):
         yield f"it is called {'feasible' if verdict.feasible else 'infeasible'} with a violation of {verdict.violation:.3g}"
-    if found.indexes is not None and verdict.indexes:
-        if verdict.indexes.keys() != found.indexes.keys():
+    if indexes is not None and verdict.indexes:
+        if verdict.indexes.keys() != indexes.keys():
             yield "its indexes have other names than those of the problem"
-        for name in verdict.indexes.keys() & found.indexes.keys():
-            if not is_same(verdict.indexes[name], found.indexes[name], 1.0):
-                yield f"its index {name} is {verdict.indexes[name]:.9g}, but that of its x is {found.indexes[name]:.9g}"
+        for name in verdict.indexes.keys() & indexes.keys():
+            if not is_same(verdict.indexes[name], indexes[name], 1.0):
+                yield f"its index {name} is {verdict.indexes[name]:.9g}, but that of its x is {indexes[name]:.9g}"
 
 
 def _check_failed(record: RunRecord) -> Iterator[str]:

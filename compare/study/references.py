@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -118,15 +118,10 @@ def _find_by_settings(description: str) -> Shipped | None:
     if raw.get("name") not in PROBLEMS:  # user code is not run
         return None
     try:
-        problem = decode(StoredProblem, {HASH: "", **raw})
-        return next((s for s in load_shipped() if _has_settings(s, problem) and _has_value(s)), None)
+        problem = decode(StoredProblem, {**raw, HASH: ""})
+        return next((s for s in load_shipped() if replace(s.problem, sha256="") == problem and _has_value(s)), None)
     except (GaitError, ValueError):
         return None
-
-
-def _has_settings(shipped: Shipped, problem: StoredProblem) -> bool:
-    known = shipped.problem
-    return (known.name, known.options, known.parameters) == (problem.name, problem.options, problem.parameters)
 
 
 def _has_value(shipped: Shipped) -> bool:

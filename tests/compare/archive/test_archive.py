@@ -59,9 +59,9 @@ def verify(content: bytes, folder: Path, **options: object) -> list[Finding]:
     try:
         manifest, differences = unpack_archive(path, folder / "unpacked")
     except InputError as error:
-        return [Finding(what="archive", holds=False, detail=str(error))]
+        return [Finding("archive", False, str(error))]
     found = verify_folder(folder / "unpacked", robots=manifest.robots, **options)  # type: ignore[arg-type]
-    return [Finding(what="manifest", holds=not differences, detail="; ".join(differences)), *found]
+    return [Finding("manifest", not differences, "; ".join(differences)), *found]
 
 
 def test_an_archive_has_everything_and_every_run_can_be_repeated(files: Files, tmp_path: Path) -> None:
