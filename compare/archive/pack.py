@@ -21,7 +21,7 @@ from compare.study.record import RunRecord
 from compare.study.record_files import RECORDS
 from nlp_gait.backends.identity import FILES, HASH, SOURCE
 from nlp_gait.errors import InputError
-from nlp_gait.files import make_file_name, read_bytes, replace_file
+from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.loading import list_robot_files
@@ -31,7 +31,6 @@ README, LOCK, CRATE = "README.md", "requirements.txt", "ro-crate-metadata.json"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
 PARTS = (FILE, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # time of all entries, so that equal studies give equal archives
-LICENSE = "not stated; ask the authors of the study"
 
 
 def pack_study(folder: Path, records: Sequence[RunRecord], out: Path) -> Path:
@@ -143,33 +142,24 @@ def _describe(records: Sequence[RunRecord]) -> str:
 
 
 def _make_readme(records: Sequence[RunRecord], manifest: Manifest, content: Iterable[str]) -> str:
-    template = files("compare.archive").joinpath("readme.md").read_text(encoding="utf-8")
     commands = "\n".join(f"    {session.command}" for session in manifest.sessions) or "    (not recorded)"
     code = (
         " User code is in `code/`: read it, unpack it, and name it by `--code FILE.py:NAME`; it runs only then."
         if any(name.startswith("code/") for name in content)
         else ""
     )
+    template = _read_template("readme.md")
     return template.format(title=_describe(records), version=version("nlp-gait"), commands=commands, code=code)
 
 
 def _make_crate(records: Sequence[RunRecord], content: Mapping[str, bytes]) -> dict[str, Any]:
     """Return the metadata of an RO-Crate 1.1 (https://w3id.org/ro/crate/1.1): a root data set and its files."""
-    names = [name for name in sorted(content) if name != CRATE]
-    entities = [{"@id": name, "@type": "File", "contentSize": str(len(content[name]))} for name in names]
-    root = {
-        "@id": "./",
-        "@type": "Dataset",
-        "name": f"Study of nlp-gait on {', '.join(make_file_name(p) for p in sorted({r.problem for r in records}))}",
-        "description": _describe(records),
-        "datePublished": format_now()[:10],
-        "license": LICENSE,
-        "hasPart": [{"@id": name} for name in names],
-    }
-    descriptor = {
-        "@id": CRATE,
-        "@type": "CreativeWork",
-        "conformsTo": {"@id": "https://w3id.org/ro/crate/1.1"},
-        "about": {"@id": "./"},
-    }
-    return {"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": [descriptor, root, *entities]}
+    crate: dict[str, Any] = json.loads(_read_template("ro-crate.json"))
+    parts = [{"@id": name} for name in sorted(content)]
+    crate["@graph"][1] |= {"description": _describe(records), "datePublished": format_now()[:10], "hasPart": parts}
+    crate["@graph"] += [{**p, "@type": "File", "contentSize": str(len(content[p["@id"]]))} for p in parts]
+    return crate
+
+
+def _read_template(name: str) -> str:
+    return files("compare.archive").joinpath(name).read_text(encoding="utf-8")

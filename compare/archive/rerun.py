@@ -74,10 +74,5 @@ def compare_runs(record: RunRecord, task: Task, records: Sequence[RunRecord]) ->
         ("verdict", record.verdict.objective, again.verdict.objective),
     ):
         if before != now:
-            return f"its {what} differs: recorded {_shorten(before)}, found {_shorten(now)}"
+            return f"its {what} differs: recorded {before!s:.100}, found {now!s:.100}"
     return ""
-
-
-def _shorten(value: object) -> str:
-    text = str(value)
-    return text if len(text) <= 100 else f"{text[:100]} ..."
