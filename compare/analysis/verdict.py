@@ -81,27 +81,24 @@ def write_verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
             "The failed runs below give the reasons.",
         )
     return (
-        "Best known: " + "; ".join(_describe_best_known(c) for c in known) + ".",
+        "Best known: " + "; ".join(f"on {c.problem} {describe_best_known(c)}" for c in known) + ".",
         "Median gap to the best known value: " + "; ".join(_distance(c) for c in known) + ".",
         "Expected cost to reach a gap of 0.1 %: " + "; ".join(_cost(c) for c in known) + ".",
     )
 
 
 def describe_best_known(comparison: Comparison) -> str:
-    """Return the best known value, its source, and what is proven, for a line on a terminal."""
+    """Return the best known value, its source, the solvers that reach it, and what is proven."""
     if not math.isfinite(comparison.reference):
         return "no feasible point was found"
-    best = f"best known {with_unit(comparison.reference, comparison.objective.unit)} ({comparison.known.source})"
-    return "; ".join(filter(None, (best, describe_proof(comparison), describe_better(comparison))))
-
-
-def _describe_best_known(comparison: Comparison) -> str:
     counts = [(s, sum(len(c.gap) > 0 and c.gap.min() <= FOUND for c in s.curves)) for s in comparison.solvers]
     finders = [f"{s.name} in {n} of {len(s.curves)} runs" for s, n in counts if n]
     best = with_unit(comparison.reference, comparison.objective.unit)
     reached = f"reached to 1e-6 by {join_words(finders)}" if finders else "not reached to 1e-6"
-    text = f"on {comparison.problem} {comparison.objective.name} {best} ({comparison.known.source}), {reached}"
-    return ", and ".join(filter(None, (text, describe_proof(comparison), describe_better(comparison))))
+    text = f"{comparison.objective.name} {best} ({comparison.known.source}), {reached}"
+    bound = comparison.known.bound
+    proof = "" if bound is None else describe_bound(bound, comparison.reference, comparison.objective.unit)
+    return ", and ".join(filter(None, (text, proof, describe_better(comparison))))
 
 
 def _distance(comparison: Comparison) -> str:
@@ -128,12 +125,6 @@ def _cost(comparison: Comparison) -> str:
     text = f"on {comparison.problem} {join_words(parts) or 'no solver'}"
     text += f", never by {join_words(never)}" if never else ""
     return text + (f", unknown for {join_words(unknown)}" if unknown else "")
-
-
-def describe_proof(comparison: Comparison) -> str:
-    """Describe the proven bound of a comparison's problem, see ``describe_bound``."""
-    bound = comparison.known.bound
-    return "" if bound is None else describe_bound(bound, comparison.reference, comparison.objective.unit)
 
 
 def describe_better(comparison: Comparison) -> str:

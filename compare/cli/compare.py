@@ -201,7 +201,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
         for sentence in describe_unknown(comparison):
             stdout.print(f"{comparison.problem}, {sentence}", soft_wrap=True)
-        stdout.print(f"{comparison.problem}: {describe_best_known(comparison)}", soft_wrap=True)
+        stdout.print(f"{comparison.problem}, best known: {describe_best_known(comparison)}", soft_wrap=True)
     stdout.print(HOW_TO_READ)
 
 

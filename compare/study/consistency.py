@@ -117,7 +117,7 @@ def find_copies(records: Sequence[RunRecord], reasons: Reasons) -> None:
                 why.append(f"its settings are not those of run {first.run}")
 
 
-def check_code(records: Sequence[RunRecord], reasons: Reasons, needs_origin: bool) -> None:
+def check_code(records: Sequence[RunRecord], reasons: Reasons) -> None:
     """Find runs of other code than the installed one, or, if no record is of that, than most records."""
     found = Counter((r.origin.code_sha256, r.origin.casadi) for r in records if r.origin is not None)
     own = [key for key in found if key[0] == hash_installed_code()]
@@ -126,8 +126,7 @@ def check_code(records: Sequence[RunRecord], reasons: Reasons, needs_origin: boo
         if "imported" in record.definition:
             continue
         if record.origin is None:
-            if needs_origin:
-                why.append("it does not say which code computed it")
+            why.append("it does not say which code computed it")
         elif (record.origin.code_sha256, record.origin.casadi) != usual:
             why.append(
                 f"it was computed by other code ({record.origin.code}) than the others ({usual[0][:8]}, CasADi {usual[1]})"

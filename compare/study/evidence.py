@@ -59,7 +59,6 @@ def check_records(
     records: Sequence[RunRecord],
     *,
     find_problem: Callable[[RunRecord], GaitProblem] | None = None,
-    needs_origin: bool = True,
     between_samples: Scope = "best",
 ) -> Evidence:
     """Check records against their points, proofs, each other and the code that made them.
@@ -67,7 +66,6 @@ def check_records(
     Args:
         records: in any order, each once.
         find_problem: returns the problem of a record; by default it is loaded by name, and the command must name user code.
-        needs_origin: whether a record must say which code computed it.
         between_samples: for which runs the verdict between the samples is repeated, a tenth of a second each: for the best one of
             every solver, all or none.
     """
@@ -87,7 +85,7 @@ def check_records(
         why += check_history(record)
         why += check_claims(record)
     find_copies(records, reasons)
-    check_code(records, reasons, needs_origin)
+    check_code(records, reasons)
     evidence = Evidence([], [])
     for record, why in zip(records, reasons, strict=True):
         if why:

@@ -141,7 +141,6 @@ def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str
     evidence = check_records(
         list(records.values()),
         find_problem=lambda record: problems[id(record)].load(),
-        needs_origin=False,
         between_samples="none",
     )
     for exclusion in evidence.excluded:
