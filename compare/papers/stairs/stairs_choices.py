@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import get_args
 
 from compare.papers.claims import read_tables
-from compare.papers.stairs.stairs_instants import Decides
 from nlp_gait.decoding import decode
 
 OURS, FREE, PRINTED = "ours", "free", "printed"
@@ -24,5 +22,5 @@ class Choice:
 
 
 CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_choices.toml").items()}
-INSTANTS = tuple((name, decides) for name in (OURS, FREE, PRINTED) for decides in get_args(Decides))  # of Algorithm 4
+INSTANTS = (OURS, FREE, PRINTED)  # with which Algorithm 4 runs
 PLAN_CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_plan_choices.toml").items()}

@@ -17,10 +17,9 @@ from nlp_gait.formulation.display import RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import SETBACK
 
 INERTIAS = (0.0, 1.0, 2.0)  # as multiples of those of slender rods
-SETBACKS = (0.0, 0.03, SETBACK)  # of edges behind the ankle that stands on the step [m]
+SETBACKS = (0.0, 0.03, 0.09)  # of edges behind the ankle that stands on the step [m]
 NOT_COMPUTED = "not computed with this effort"
 LEARNED = ("closed-form cost", "network cost", "largest_angle_error_rad")
 
@@ -84,7 +83,7 @@ def _measure_depth(findings: StairsFindings, what: str, setback: float) -> float
     signals, legs = move(findings, what, DRAWN_CASE)
     x, z = np.moveaxis(legs[RIGHT][signals.arrays["t"] > findings.best(what, DRAWN_CASE).x["t2_s"], 2:5], -1, 0)
     ground = rise * (1.0 * (x >= -setback) + (x >= tread - setback) - 1.0)
-    return 1e3 * max(0.0, float((ground - z).max()))
+    return round(1e3 * float((ground - z).max()), 1) + 0.0
 
 
 def _measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from compare.papers.paper_runs import (
     make_start_tasks,
 )
 from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, PLAN_CHOICES, PRINTED
+from compare.papers.stairs.stairs_instants import Decides
 from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
@@ -70,6 +71,7 @@ class StairsEffort(Effort):
     instant_evaluations: int = ANTS * ITERATIONS  # of each search of Algorithm 4
     plan_choices: tuple[str, ...] = tuple(PLAN_CHOICES)  # of the planner
     choices: tuple[str, ...] = tuple(CHOICES)  # readings of the tracked step
+    instants: tuple[str, ...] = INSTANTS  # readings of Algorithm 4
     plan_settings: Mapping[str, Any] = field(default_factory=dict)  # of IPOPT on plans
     track_ipopt: bool = True  # whether IPOPT runs on the track
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
@@ -93,6 +95,11 @@ class StairsEffort(Effort):
         return min(3, self.other_starts) if rise >= IMPOSSIBLE_RISE_M else self.other_starts
 
     @property
+    def instant_searches(self) -> tuple[tuple[str, Decides], ...]:
+        """Readings of Algorithm 4, and what it decides."""
+        return tuple((name, decides) for name in self.instants for decides in get_args(Decides))
+
+    @property
     def plan_steps(self) -> int:
         """Plans under every choice, with a reverse double support, first steps, floors of the effort, and simulations."""
         chosen = sum(1 if "minimise" in PLAN_CHOICES[name].options else 2 for name in self.plan_choices)
@@ -102,7 +109,7 @@ class StairsEffort(Effort):
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
         gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + self.track_ipopt
-        case = gradient + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs + PER_CASE + len(INSTANTS)
+        case = gradient + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs + PER_CASE + len(self.instant_searches)
         others = sum(1 + self.count_other_starts(rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2 + self.plan_steps
 

@@ -24,7 +24,7 @@ from compare.papers.paper_runs import (
     make_computation,
     make_search_tasks,
 )
-from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, OURS, PRINTED
+from compare.papers.stairs.stairs_choices import CHOICES, OURS, PRINTED
 from compare.papers.stairs.stairs_instants import Decides, Instants, track_by_instants
 from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsFindings, make_track_spec
@@ -81,7 +81,7 @@ def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation
     """Yield Algorithm 4 in each case, which decides gains or torques."""
     effort = findings.effort
     for case in effort.cases:
-        for name, decides in INSTANTS:
+        for name, decides in effort.instant_searches:
             spec, plan = make_choice_spec(findings, case, name), findings.plan(case, CHOICES[name].plan)
             arguments = {
                 "torso_rad": plan["torso_pitch_rad"],
@@ -111,7 +111,9 @@ def make_tracking_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name."""
     return {
         "choices": [_list_choice(findings, case, name) for case in findings.cases for name in findings.effort.choices],
-        "instants": [_list_instants(findings, case, *how) for case in findings.cases for how in INSTANTS],
+        "instants": [
+            _list_instants(findings, case, *how) for case in findings.cases for how in findings.effort.instant_searches
+        ],
     }
 
 
@@ -225,8 +227,8 @@ def _check_printed_gains(findings: StairsFindings) -> Check:
 
 def _get_instants(findings: StairsFindings, decides: Decides) -> dict[str, list[dict[str, Any]]]:
     """Return what Algorithm 4 finds in all cases, by reading."""
-    names = [name for name, how in INSTANTS if how == decides]
-    return {name: [findings.others[f"instants-{name}-{decides}-{case}"] for case in findings.cases] for name in names}
+    others, cases = findings.others, findings.cases
+    return {name: [others[f"instants-{name}-{decides}-{case}"] for case in cases] for name in findings.effort.instants}
 
 
 def _describe_instants(findings: StairsFindings, decides: Decides) -> list[str]:
