@@ -19,6 +19,7 @@ from compare.study.manifest import FILE, Manifest, read_manifest
 from compare.study.origin import format_now, hash_installed_code
 from compare.study.record import RunRecord
 from compare.study.record_files import RECORDS
+from compare.study.references import find_reference
 from nlp_gait.backends.identity import FILES, HASH, SOURCE
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file
@@ -125,7 +126,7 @@ def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> No
 
 
 def _collect_certificates(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
-    known = {record.definition["problem"].get(HASH) for record in records}
+    known = {find_reference(record.definition["problem"]).proven_as for record in records}
     for name, file in load_certificates().items():
         if file.problem[HASH] in known:
             content[f"certificates/{name}.json"] = read_bytes(CERTIFICATES / f"{name}.json", "certificate")

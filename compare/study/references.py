@@ -36,6 +36,7 @@ class Reference:
     x: tuple[float, ...] = ()  #: (n,) its point
     bound: float | None = None  #: proven: no feasible point has a better objective; None without a certificate
     source: str = OWN  #: in words, for example "shipped, proven to 1 %"
+    proven_as: str = ""  #: hash of the problem of the certificate
 
     def to_json(self) -> dict[str, Any]:
         """Return value, bound and source as plain data."""
@@ -94,8 +95,10 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
     if shipped is None:
         known = any(entry.problem.name == problem.get("name") for entry in load_shipped())
         return Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
-    bound = proven_bound({HASH: shipped.proven_as or shipped.problem.sha256})
+    proven_as = shipped.proven_as or shipped.problem.sha256
+    bound = proven_bound({HASH: proven_as})
     return Reference(
+        proven_as=proven_as if bound is not None else "",
         objective=shipped.objective,
         x=shipped.x,
         bound=bound,

@@ -33,6 +33,7 @@ def test_an_instance_has_its_proof_also_where_it_holds_variables_constant(id: st
     known = of_instance(id)
     assert known.objective is not None and known.bound is not None and known.source.startswith("shipped, proven to ")
     assert abs(known.bound - known.objective) / known.objective < 0.0101
+    assert known.proven_as == json.loads((CERTIFICATES / f"{id}.json").read_text())["problem"][HASH]
     instance = gaitbench.load(id)
     values = build_exact_model(instance.gait_problem).at(known.x, instance.gait_problem.p)
     assert abs(values.cost) == pytest.approx(known.objective, rel=1e-9)
