@@ -171,7 +171,7 @@ class _Judge:
                 for share in SHARES:
                     self.evaluate(origin.x + share * (self.centre + self.half * corner - origin.x))
             known = [point for point in self.points if math.isfinite(point.values.cost)] or self.points
-            found = [min(known, key=_cost), max(known, key=_cost), min(known, key=_largest), max(known, key=_largest)]
+            found = [choose(known, key=key) for key in (lambda p: p.values.cost, _largest) for choose in (min, max)]
             if all(a is b for a, b in zip(found, starts, strict=True)):
                 return
             starts = found
@@ -236,10 +236,6 @@ class _Judge:
 
 def _build_enclosure(problem: GaitProblem) -> AffineFunction:
     return AffineFunction(build_kernel(problem).function)
-
-
-def _cost(point: _Point) -> float:
-    return point.values.cost
 
 
 def _largest(point: _Point) -> float:

@@ -178,33 +178,26 @@ class Sweep(Question[list[SweepPoint]]):
                 *(f"{value:g}" for value in point.at.values()),
                 with_unit(point.objective if point.feasible else None, objective.unit),
                 point.status,
+                _describe_known(place(problem, point.at)),
             )
             for point in findings
         ]
-        known = [find_reference(identify_problem(place(problem, point.at))) for point in findings]
-        header = (*axes, objective.name, "status")
-        if any(value.objective is not None for value in known):
-            header = (*header, "best known")
-            rows = [
-                (
-                    *row,
-                    "-"
-                    if value.objective is None
-                    else f"{with_unit(value.objective, objective.unit)} ({value.source})",
-                )
-                for row, value in zip(rows, known, strict=True)
-            ]
         shown = "Optimum over the first axis; crosses where no feasible point was found."
         return Answer(
             stem=stem,
             title=f"{problem.name} by {solver}",
             parts=(
-                text_table(header, rows, "Optima"),
+                text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem, solver)),
                 _make_csv(stem, findings, problem),
             ),
             data={"problem": problem.name, "points": [asdict(point) for point in findings]},
         )
+
+
+def _describe_known(problem: GaitProblem) -> str:
+    known = find_reference(identify_problem(problem))
+    return "-" if known.objective is None else f"{with_unit(known.objective, problem.objective.unit)} ({known.source})"
 
 
 def _run_searches(tasks: Sequence[Task], work: Work) -> list[RunRecord]:
