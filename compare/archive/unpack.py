@@ -83,11 +83,10 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
 
 
 def _compare(manifest: ArchiveManifest, folder: Path) -> Iterator[str]:
-    there = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     for name, known in manifest.files.items():
         if name not in there:
             yield f"{name} is missing"
-        elif hashlib.sha256(there[name].read_bytes()).hexdigest() != known:
+        elif hashlib.sha256((folder / name).read_bytes()).hexdigest() != known:
             yield f"{name} differs from its SHA-256 in the manifest"
-    for name in sorted(there.keys() - manifest.files.keys() - {MANIFEST}):
-        yield f"{name} is not in the manifest"
+    yield from (f"{name} is not in the manifest" for name in sorted(there - manifest.files.keys() - {MANIFEST}))

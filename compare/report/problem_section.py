@@ -10,8 +10,8 @@ from compare.analysis.published import make_published_rows
 from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.analysis.solver_table import HEADER, SolverSummary, count, describe_unknown, format_cells, summarise
 from compare.analysis.statistics.run_length import TARGETS
-from compare.analysis.units import BY_UNIT, heading, seconds, with_unit
-from compare.analysis.verdict import compare_pairs, describe_better
+from compare.analysis.units import BY_UNIT, heading, seconds
+from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, text_table
@@ -77,17 +77,10 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
 
 
 def describe_reference(comparison: Comparison) -> str:
-    """Return the value that gaps are relative to and its source, and whether a run is better."""
-    if not math.isfinite(comparison.reference):
-        return "No run is feasible, so there are no gaps."
-    best = with_unit(comparison.reference, comparison.objective.unit)
-    better = describe_better(comparison)
-    file = (
-        f" The file better-{make_file_name(comparison.problem)}.json has its point, judged again: please contribute it."
-    )
-    return f"Gaps are relative to the best known value, {best}: {comparison.known.source}." + (
-        f" {better[0].upper()}{better[1:]}.{file}" if better else ""
-    )
+    """Return the value that gaps are relative to, its source and proof, and whether a run is better."""
+    file = f"better-{make_file_name(comparison.problem)}.json"
+    offer = f" The file {file} has its point, judged again: please contribute it." if comparison.better else ""
+    return f"Gaps are relative to the best known value: {describe_best_known(comparison)}.{offer}"
 
 
 def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:

@@ -123,11 +123,9 @@ def check_code(records: Sequence[RunRecord], reasons: Reasons) -> None:
     own = [key for key in found if key[0] == hash_installed_code()]
     usual = max(own or found, key=lambda key: found[key], default=("", ""))
     for record, why in zip(records, reasons, strict=True):
-        if "imported" in record.definition:
-            continue
-        if record.origin is None:
+        if record.origin is None and "imported" not in record.definition:
             why.append("it does not say which code computed it")
-        elif (record.origin.code_sha256, record.origin.casadi) != usual:
+        elif record.origin is not None and (record.origin.code_sha256, record.origin.casadi) != usual:
             why.append(
                 f"it was computed by other code ({record.origin.code}) than the others ({usual[0][:8]}, CasADi {usual[1]})"
             )
