@@ -119,9 +119,10 @@ def _rank(record: RunRecord) -> tuple[bool, bool, float]:
     return not record.claimed, not verdict.feasible, sign * verdict.objective if verdict.feasible else verdict.violation
 
 
-def list_infeasible(runs: Iterable[RunRecord]) -> list[str]:
-    """Return for each infeasible run the title of its problem and the constraint that it violates most."""
-    return [f"{run.problem}: {', '.join(run.verdict.violated[:1])}" for run in runs if not run.verdict.feasible]
+def list_infeasible(runs: Iterable[RunRecord], *, dense: bool = False) -> list[str]:
+    """Return for each run that is infeasible, on the dense grid too if wanted, its problem and worst violation."""
+    wrong = [run for run in runs if not run.verdict.feasible or (dense and run.verdict.dense_feasible is False)]
+    return [f"{run.problem}: {', '.join(run.verdict.violated[:1])}" for run in wrong]
 
 
 def list_objectives(records: Iterable[RunRecord]) -> list[float]:

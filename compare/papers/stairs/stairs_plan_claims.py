@@ -108,8 +108,8 @@ DRASTIC = 0.1  # share of the first pose's time
 LEAST_POSES = 100  # of the network, for a verdict on its times
 
 
-def _find_infeasible(findings: StairsFindings, *plans: str) -> list[str]:
-    return list_infeasible(findings.best(what, case) for what in plans for case in findings.cases)
+def _find_infeasible(findings: StairsFindings, *plans: str, dense: bool = False) -> list[str]:
+    return list_infeasible((findings.best(what, case) for what in plans for case in findings.cases), dense=dense)
 
 
 def _compare_time(time: str) -> Checker:
@@ -195,14 +195,16 @@ def _describe_hips(findings: StairsFindings) -> dict[str, str]:
 
 def _check_hip_height(findings: StairsFindings) -> Check:
     ours = _join(findings.best("jerk", case).x["hip_height_m"] for case in findings.cases)
-    held = require_feasible(decide(True), _find_infeasible(findings, "hip"))
+    held = require_feasible(decide(True), _find_infeasible(findings, "hip", dense=True))
     return replace(held, values={**_describe_hips(findings), "starts": findings.effort.hip_starts, "ours": ours})
 
 
 def _check_step(what: str) -> Checker:
     def check(findings: StairsFindings) -> Check:
         margins = [1e3 * findings.best(what, case).verdict.indexes["zmp_margin_min_m"] for case in findings.cases]
-        return require_feasible(decide(min(margins) >= 0, found=_join(margins)), _find_infeasible(findings, what))
+        return require_feasible(
+            decide(min(margins) >= 0, found=_join(margins)), _find_infeasible(findings, what, dense=True)
+        )
 
     return check
 
