@@ -34,6 +34,13 @@ class Verdict(StrEnum):
     UNTESTABLE = "cannot be tested here"
 
 
+class Series(list[float]):
+    """Values that a text shows next to each other."""
+
+    def __format__(self, spec: str) -> str:
+        return " / ".join(format(value, spec or ".4g") for value in self)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
     """A claim of a paper, and what is found here; texts have fields such as ``{power:.2f}`` for values of its check."""

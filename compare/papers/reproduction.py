@@ -24,6 +24,8 @@ from compare.papers.claims import (
     Claim,
     ClaimsFile,
     Difference,
+    Verdict,
+    decide,
     fill_differences,
     make_claims_table,
     make_differences_table,
@@ -109,17 +111,19 @@ class Reproduction(Generic[E, F]):
         self.write_report(folder, findings, effort, runner, sessions)
         return findings
 
-    def check_claims(self, findings: F) -> dict[str, Claim]:
-        """Return all claims by id, in the order of the report."""
-        return {
-            name: self.checks[name](findings).apply(claim) if name in self.checks else claim
-            for name, claim in self.printed.claims.items()
-        }
+    def check_claims(self, findings: F, values: Mapping[str, Any] | None = None) -> dict[str, Claim]:
+        """Return all claims by id, in the order of the report; their texts may have values of the report."""
+        checked = {}
+        for name, claim in self.printed.claims.items():
+            check = self.checks[name](findings) if name in self.checks else decide(Verdict(claim.verdict))
+            checked[name] = replace(check, values={**(values or {}), **check.values}).apply(claim)
+        return checked
 
     def write_report(self, folder: Path, findings: F, effort: E, runner: Runner, sessions: Sequence[Session]) -> None:
         """Write the report, tables, figures and ``summary.json``."""
         template = resources.files("compare.papers") / self.name / f"{self.name}_report.md"
-        values, claims = self.values(findings), self.check_claims(findings)
+        values = self.values(findings)
+        claims = self.check_claims(findings, values)
         differences = fill_differences(self.printed.differences, values)
         with style():
             figures = self.figures(findings)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from compare.papers.claims import (
     Check,
+    Series,
     Verdict,
     compare_levels,
     compare_readings,
@@ -41,34 +41,34 @@ from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK
 
 
 def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
-    """Return the effects of choices and of printed equations, for the table of differences."""
-    landing = [findings.best("landing", case).verdict.objective for case in findings.cases]
-    flat = [findings.best("jerk", case).verdict.objective for case in findings.cases]
+    """Return numbers of plans, and the effects of choices and of printed equations, for claims and differences."""
     return {
+        "plans": {what: _collect(findings, what) for what in ("jerk", "plan", "first", "landing")},
+        "by_quanta": {what: {name: _get_peaks(findings, name, what) for name in PEAKS} for what in PLANS},
+        "between": "; ".join(", ".join(findings.best("jerk", case).verdict.violated[:1]) for case in findings.cases),
         "plan_effect": {name: _describe_effect(findings, name) for name in PLAN_CHOICES},
         "eq": compute_printed(findings),
-        "landing_jerk": _join(landing),
-        "flat_jerk": _join(flat),
-        "jerk_by_quanta": _join(_get_peaks(findings, "jerk")),
         "drawn_case": DRAWN_CASE,
         "of": _name_cases(findings),
         "least_ratio": min(row.rise_run_ratio for row in TABLE_4.values()),
         "fixed_hip": _describe_hips(findings),
-        "shank_depth": {what: _join(depths) for what, depths in _measure_shanks(findings).items()},
+        "shank_depth": _measure_shanks(findings),
         "online": ONLINE,
-        "quanta": {
-            name: _join(findings.others[f"printed-{case}"][f"explicit{name}_quanta"] for case in findings.cases)
-            for name in ("_printed", "_floating", "_slack", "_free")
-        },
         **{
             f"network_{name}": f"{found['converged']} of {found['poses']}"
             for name, found in zip(("adam", "printed"), _networks(findings), strict=True)
         },
-        "energy_factor": _join(
+        "energy_factor": Series(
             TABLE_4[case].energy / findings.best_track(case).verdict.indexes["energy_J"] for case in findings.cases
         ),
         "ideal_climbs": "; ".join(describe_climb(findings.others[f"climb-ideal-{case}"]) for case in findings.cases),
     }
+
+
+def _collect(findings: StairsFindings, what: str) -> dict[str, Series]:
+    """Return variables and indexes of the best plans of all cases."""
+    best = [{**run.x, **run.verdict.indexes} for run in (findings.best(what, case) for case in findings.cases)]
+    return {name: Series(one[name] for one in best) for name in best[0]}
 
 
 def compute_printed(findings: StairsFindings) -> dict[str, float]:
@@ -94,36 +94,32 @@ def _describe_effect(findings: StairsFindings, name: str) -> str:
     return f"case {DRAWN_CASE}: {', '.join(parts)}"
 
 
-def _join(values: Iterable[float]) -> str:
-    return " / ".join(f"{value:.4g}" for value in values)
-
-
 def _name_cases(findings: StairsFindings) -> str:
     return f"case{'s' if len(findings.cases) > 1 else ''} {' / '.join(map(str, findings.cases))}"
 
 
 Checker = Callable[[StairsFindings], Check]
-CONTINUOUS = 0.01  # largest jump that counts as none [m, m/s, m/s^2]
+PEAKS = {"acceleration": "peak_acceleration_rad_s2", "jerk": "peak_jerk_rad_s3"}  # in Table IV, and in our plans
+CONTINUOUS = 0.01  # largest jump that counts as none [m/s, m/s^2]
 DRASTIC = 0.1  # share of the first pose's time
 LEAST_POSES = 100  # of the network, for a verdict on its times
 
 
-def _find_infeasible(findings: StairsFindings, *plans: str, dense: bool = False) -> list[str]:
-    return list_infeasible((findings.best(what, case) for what in plans for case in findings.cases), dense=dense)
+def _require_plans(findings: StairsFindings, check: Check, *plans: str, dense: bool = False) -> Check:
+    runs = (findings.best(what, case) for what in plans for case in findings.cases)
+    return require_feasible(check, list_infeasible(runs, dense=dense))
 
 
 def _compare_time(time: str) -> Checker:
     """Return the check of a time of Table III, by all cases, and by all choices of the planner."""
 
     def check(findings: StairsFindings) -> Check:
-        ours, other = ([findings.best(what, case).x[time] for case in findings.cases] for what in PLANS)
+        ours, other = (_collect(findings, what)[time] for what in PLANS)
         names = [name for name in findings.effort.plan_choices if name not in ("times", "ratio")]
         chosen = [get_choice(findings, "jerk", name) for name in names]
-        read = [run.x[time] for run in chosen if run.verdict.feasible]
-        low, high = min([*ours, *read]), max([*ours, *read])
-        texts = {"found": _join(ours), "other": _join(other), "low": low, "high": high}
-        check = compare_readings(TABLE_3[time], np.array([[*ours, *read]]).T, **texts)
-        return require_feasible(check, _find_infeasible(findings, "jerk"))
+        read = [*ours, *(run.x[time] for run in chosen if run.verdict.feasible)]
+        texts = {"found": ours, "other": other, "low": min(read), "high": max(read)}
+        return _require_plans(findings, compare_readings(TABLE_3[time], np.array([read]).T, **texts), "jerk")
 
     return check
 
@@ -135,76 +131,57 @@ def _check_times(findings: StairsFindings) -> Check:
     return require_feasible(compare_levels(0.0, more, **peaks, more=more), list_infeasible(runs.values()))
 
 
-def _get_peaks(findings: StairsFindings, quantity: str, what: str = "jerk") -> list[float]:
-    return [findings.others[f"differences-{what}-{case}"][quantity] for case in findings.cases]
+def _get_peaks(findings: StairsFindings, quantity: str, what: str) -> Series:
+    return Series(findings.others[f"differences-{what}-{case}"][quantity] for case in findings.cases)
 
 
-def _measure_peaks(findings: StairsFindings, quantity: str) -> tuple[Array, dict[str, str]]:
-    """Return peaks (4, cases) of least jerk and least energy, by quanta and at samples each, and their texts."""
-    index, rows = {"acceleration": "peak_acceleration_rad_s2", "jerk": "peak_jerk_rad_s3"}[quantity], []
-    for what in PLANS:
-        sampled = [findings.best(what, case).verdict.indexes[index] for case in findings.cases]
-        rows += [_get_peaks(findings, quantity, what), sampled]
-    texts = dict(zip(("found", "sampled", "other", "other_sampled"), map(_join, rows), strict=True))
-    worst = [(case, findings.best("jerk", case).verdict.violated[:1]) for case in findings.cases]
-    between = "; ".join(f"case {case} {' '.join(row) or 'none'}" for case, row in worst)
-    return np.array(rows), {**texts, "between": between}
+def _measure_peaks(findings: StairsFindings, quantity: str) -> Array:
+    """Return peaks (4, cases) of least jerk and least energy, by quanta and at samples each."""
+    sampled = [_collect(findings, what)[PEAKS[quantity]] for what in PLANS]
+    quanta = [_get_peaks(findings, quantity, what) for what in PLANS]
+    return np.array([quanta[0], sampled[0], quanta[1], sampled[1]])
 
 
 def _compare_peaks(quantity: str) -> Checker:
     def check(findings: StairsFindings) -> Check:
-        peaks, texts = _measure_peaks(findings, quantity)
         printed = [float(getattr(TABLE_4[case], quantity)) for case in findings.cases]
-        return require_feasible(compare_readings(printed, peaks[:2], **texts), _find_infeasible(findings, "jerk"))
+        return _require_plans(findings, compare_readings(printed, _measure_peaks(findings, quantity)[:2]), "jerk")
 
     return check
 
 
 def _require_least_peak(quantity: str) -> Checker:
     def check(findings: StairsFindings) -> Check:
-        peaks, texts = _measure_peaks(findings, quantity)
+        peaks = _measure_peaks(findings, quantity)
         if peaks.shape[1] < len(TABLE_4):
-            return decide(Verdict.NOT_SHOWN, **texts)
+            return decide(Verdict.NOT_SHOWN)
         changes = 100 * (peaks[:, [0, 2]] / peaks[:, [DRAWN_CASE - 1]] - 1)
-        return require_feasible(require_change(changes, **texts), _find_infeasible(findings, *PLANS))
+        return _require_plans(findings, require_change(changes), *PLANS)
 
     return check
 
 
 def _compare_jerk_changes(findings: StairsFindings) -> Check:
-    peaks, texts = _measure_peaks(findings, "jerk")
-    ratio, own = (get_choice(findings, "jerk", name).verdict.indexes["peak_jerk_rad_s3"] for name in ("ratio", ""))
-    values: dict[str, Any] = {**texts, "ratio": ratio, "own": own}
+    peaks = _measure_peaks(findings, "jerk")[:2]
     if peaks.shape[1] < len(TABLE_4):
-        return decide(Verdict.NOT_SHOWN, **values, changes="one case only")
+        return decide(Verdict.NOT_SHOWN, changes="one case only")
     printed = np.array([row.jerk for row in TABLE_4.values()])
-    theirs, changes = (100 * (row[..., 1:] / row[..., :-1] - 1) for row in (printed, peaks[:2]))
-    check = compare_readings(theirs, changes, **values, changes="; ".join(map(_join, changes)))
-    return require_feasible(check, _find_infeasible(findings, "jerk"))
+    theirs, changes = (100 * (row[..., 1:] / row[..., :-1] - 1) for row in (printed, peaks))
+    return _require_plans(findings, compare_readings(theirs, changes, changes=Series(changes.ravel())), "jerk")
 
 
-def _describe_hips(findings: StairsFindings) -> dict[str, str]:
+def _describe_hips(findings: StairsFindings) -> dict[str, str | Series]:
     """Return by case how many starts with the printed height of the hip are feasible, and the worst violation of the best."""
     best = {case: findings.best("hip", case).verdict for case in findings.cases}
-    feasible = [sum(run.verdict.feasible for run in findings.runs[f"hip-{case}", IPOPT]) for case in best]
-    return {
-        "feasible": _join(feasible),
-        "worst": "; ".join(", ".join(run.violated[:1]) or "nothing" for run in best.values()),
-    }
-
-
-def _check_hip_height(findings: StairsFindings) -> Check:
-    ours = _join(findings.best("jerk", case).x["hip_height_m"] for case in findings.cases)
-    held = require_feasible(decide(True), _find_infeasible(findings, "hip", dense=True))
-    return replace(held, values={**_describe_hips(findings), "starts": findings.effort.hip_starts, "ours": ours})
+    feasible = Series(sum(run.verdict.feasible for run in findings.runs[f"hip-{case}", IPOPT]) for case in best)
+    worst = "; ".join(", ".join(run.violated[:1]) or "nothing" for run in best.values())
+    return {"feasible": feasible, "worst": worst}
 
 
 def _check_step(what: str) -> Checker:
     def check(findings: StairsFindings) -> Check:
-        margins = [1e3 * findings.best(what, case).verdict.indexes["zmp_margin_min_m"] for case in findings.cases]
-        return require_feasible(
-            decide(min(margins) >= 0, found=_join(margins)), _find_infeasible(findings, what, dense=True)
-        )
+        held = decide(min(_collect(findings, what)["zmp_margin_min_m"]) >= 0)
+        return _require_plans(findings, held, what, dense=True)
 
     return check
 
@@ -223,23 +200,14 @@ def measure_shank_depth(findings: StairsFindings, what: str, case: int) -> float
     return 1e3 * depth
 
 
-def _measure_shanks(findings: StairsFindings) -> dict[str, list[float]]:
+def _measure_shanks(findings: StairsFindings) -> dict[str, Series]:
     steps = ("jerk", "plan", "first")
-    return {what: [measure_shank_depth(findings, what, case) for case in findings.cases] for what in steps}
-
-
-def _check_collisions(findings: StairsFindings) -> Check:
-    depths = _measure_shanks(findings)
-    return decide(max(map(max, depths.values())) <= 0, **{what: _join(row) for what, row in depths.items()})
+    return {what: Series(measure_shank_depth(findings, what, case) for case in findings.cases) for what in steps}
 
 
 def _check_easier(findings: StairsFindings) -> Check:
-    indexes = [[findings.best(what, case).verdict.indexes for case in findings.cases] for what in ("first", "landing")]
-    names = ("zmp_margin_min_m", "peak_torque_Nm", "energy_J", "peak_jerk_rad_s3")
-    found = {name: [[own[name] for own in step] for step in indexes] for name in names}
-    texts = {name: f"{_join(first)} against {_join(landing)}" for name, (first, landing) in found.items()}
-    wider = 1e3 * np.diff(found[names[0]][::-1], axis=0)
-    return require_feasible(require_change(wider, **texts), _find_infeasible(findings, "first", "landing"))
+    first, following = (np.array(_collect(findings, what)["zmp_margin_min_m"]) for what in ("first", "landing"))
+    return _require_plans(findings, require_change(1e3 * (first - following)), "first", "landing")
 
 
 def _check_adaptation(findings: StairsFindings) -> Check:
@@ -252,8 +220,8 @@ def _check_adaptation(findings: StairsFindings) -> Check:
 
 
 def _check_network(findings: StairsFindings) -> Check:
-    adam, printed = _networks(findings)
-    return decide(printed["converged"] == printed["poses"], adam=adam, printed=printed)
+    printed = _networks(findings)[1]
+    return decide(printed["converged"] == printed["poses"])
 
 
 def _compare_poses(held: Callable[[float, float], bool]) -> Checker:
@@ -278,7 +246,7 @@ def _check_continuity(findings: StairsFindings) -> Check:
     eq = compute_printed(findings)
     ends = _measure_accelerations(findings)
     jumps = np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=1)
-    return decide([eq["lift_off_m_s"] <= CONTINUOUS, max(jumps) <= CONTINUOUS], eq=eq, found=_join(jumps))
+    return decide([eq["lift_off_m_s"] <= CONTINUOUS, max(jumps) <= CONTINUOUS], found=Series(jumps))
 
 
 def _measure_accelerations(findings: StairsFindings) -> Array:
@@ -297,30 +265,28 @@ def _check_cycloid_begin(findings: StairsFindings) -> Check:
 
 
 def _check_cycloid_end(findings: StairsFindings) -> Check:
-    rates = [findings.best("jerk", case).x["end_rate_rad_s"] for case in findings.cases]
-    ours = [rate**2 * TABLE_4[case].step_m[1] for rate, case in zip(rates, findings.cases, strict=True)]
-    return compare_levels(np.zeros(len(ours) + 1), [GRAVITY, *ours], found=_join(ours), printed_m_s2=GRAVITY)
+    rates = _collect(findings, "jerk")["end_rate_rad_s"]
+    ours = Series(rate**2 * TABLE_4[case].step_m[1] for rate, case in zip(rates, findings.cases, strict=True))
+    return compare_levels(np.zeros(len(ours) + 1), [GRAVITY, *ours], found=ours, printed_m_s2=GRAVITY)
 
 
 def _check_jerk_terms(_: StairsFindings) -> Check:
     """Shares of the jerk terms in (31) and (32), of the acceleration terms, with the maxima of Table IV."""
-    speeds, places = (
-        [100 * row.jerk * QUANTUM / (part * row.acceleration) for row in TABLE_4.values()] for part in (2, 3)
-    )
-    return compare_levels(np.zeros(6), [*speeds, *places], speeds=_join(speeds), places=_join(places))
+    ratios = [100 * row.jerk * QUANTUM / row.acceleration for row in TABLE_4.values()]
+    speeds, places = (Series(ratio / part for ratio in ratios) for part in (2, 3))
+    return compare_levels(np.zeros(6), [*speeds, *places], speeds=speeds, places=places)
 
 
 def _check_best_ratio(_: StairsFindings) -> Check:
-    ratios = {case: 1 / row.rise_run_ratio for case, row in TABLE_4.items()}
-    nearest = min(ratios, key=lambda case: abs(ratios[case] - math.pi / 2))
-    return decide(nearest == DRAWN_CASE, found=_join(ratios.values()), nearest=nearest)
+    ratios = Series(1 / row.rise_run_ratio for row in TABLE_4.values())
+    nearest = 1 + int(np.abs(np.subtract(ratios, math.pi / 2)).argmin())
+    return decide(nearest == DRAWN_CASE, found=ratios, nearest=nearest)
 
 
 PLANNING_CHECKS: dict[str, Checker] = {
     **{f"jerk-{name}": _compare_time(name) for name in ("t1_s", "t2_s", "t_bc_s")},
     "jerk-times": _check_times,
-    "knot-shifting": lambda findings: replace(_check_times(findings), verdict=Verdict.UNTESTABLE),
-    "hip-height": _check_hip_height,
+    "hip-height": lambda findings: _require_plans(findings, decide(True), "hip", dense=True),
     **{f"peak-{quantity}": _compare_peaks(quantity) for quantity in ("acceleration", "jerk")},
     **{f"least-{quantity}": _require_least_peak(quantity) for quantity in ("acceleration", "jerk")},
     "jerk-changes": _compare_jerk_changes,
@@ -330,7 +296,7 @@ PLANNING_CHECKS: dict[str, Checker] = {
     "continuity": _check_continuity,
     "first-step": _check_step("first"),
     "reverse-support": _check_step("landing"),
-    "collisions": _check_collisions,
+    "collisions": lambda findings: decide(max(map(max, _measure_shanks(findings).values())) <= 0),
     "easier": _check_easier,
     "adapts": _check_adaptation,
     "network": _check_network,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
@@ -11,6 +11,7 @@ import numpy as np
 
 from compare.papers.claims import (
     Check,
+    Series,
     Verdict,
     compare_readings,
     decide,
@@ -41,16 +42,17 @@ ACO = "aco"  # the paper's search
 FOLLOWED_RAD = 0.1
 READINGS = (OURS, "jerk", PRINTED, "printed-b10000")  # that claims compare
 UNLIMITED = ("unlimited", "jerk-unlimited", PRINTED, "printed-b10000")  # whose searches do not limit the errors
-# Rows of Table IV that a rollout has: name in the table, and in our results; and those in which case 2 is called best.
-TABLE_4_ROWS = {
-    "torso_pitch_rad": "torso_pitch_rad",
-    "kp": "kp",
-    "kd": "kd",
+LEAST_ROWS = {
     "cost": "controller_cost",
     "energy": "energy_J",
     "peak_torque_Nm": "peak_torque_Nm",
+}  # of Table IV and ours
+TABLE_4_ROWS = {"torso_pitch_rad": "torso_pitch_rad", "kp": "kp", "kd": "kd", **LEAST_ROWS}  # that a rollout has
+READ: Mapping[str, Sequence[str]] = {  # what claims tell of readings
+    **dict.fromkeys(TABLE_4_ROWS.values(), READINGS),
+    "zmp_margin_min_m": (*READINGS, "penalty"),
+    "largest_error_rad": (*UNLIMITED, OURS),
 }
-LEAST_ROWS = ("cost", "energy", "peak_torque_Nm")
 EFFECTS = {  # of a choice: indexes of the best step, and their texts
     "controller_cost": "mean of (53) {}",
     "energy_J": "energy {} J",
@@ -133,9 +135,16 @@ def _list_instants(findings: StairsFindings, case: int, name: str, decides: Deci
 
 
 def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
-    """Return the effects of each choice and of Algorithm 4, as text, for the table of differences."""
-    instants = {decides: _describe_instants(findings, decides)[0] for decides in get_args(Decides)}
-    return {"effect": {name: _describe_effect(findings, name) for name in CHOICES}, "instants": instants}
+    """Return numbers of tracked steps, and the effects of choices, for claims and differences."""
+    tracks = [{**run.x, **run.verdict.indexes} for run in map(findings.best_track, findings.cases)]
+    return {
+        "effect": {name: _describe_effect(findings, name) for name in CHOICES},
+        "instants": {decides: _describe_instants(findings, decides) for decides in get_args(Decides)},
+        "reading": {index: _describe(_collect(findings, index, names)) for index, names in READ.items()},
+        "best": {name: Series(one[name] for one in tracks) for name in tracks[0]},
+        "gains": {name: _collect_printed(findings, name) for name in findings.others[f"printed-{findings.cases[0]}"]},
+        "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()})),
+    }
 
 
 def _describe_effect(findings: StairsFindings, name: str) -> str:
@@ -143,15 +152,12 @@ def _describe_effect(findings: StairsFindings, name: str) -> str:
         return "not computed"
     parts = []
     for index, text in EFFECTS.items():
-        values = [
-            _join(read_index(get_best(findings, case, which), index) for case in findings.cases)
-            for which in (name, OURS)
-        ]
-        if values[0] != values[1]:
+        values = [f"{row}" for row in _collect(findings, index, (name, OURS)).values()]
+        if values[0] != values[-1]:
             parts.append(text.format(" instead of ".join(values)))
     feasible = sum(get_best(findings, case, name).verdict.feasible for case in findings.cases)
-    cases = " / ".join(map(str, findings.cases))
-    return f"case {cases}: {', '.join(parts) or 'no change'}; {feasible} of {len(findings.cases)} feasible"
+    what = ", ".join(parts) or "no change"
+    return f"case {Series(findings.cases)}: {what}; {feasible} of {len(findings.cases)} feasible"
 
 
 def read_index(run: RunRecord, index: str) -> float:
@@ -162,14 +168,14 @@ def read_index(run: RunRecord, index: str) -> float:
 Checker = Callable[[StairsFindings], Check]
 
 
-def _describe(values: Mapping[str, Iterable[float]]) -> str:
-    return "; ".join(f"{CHOICES[name].text}: {_join(row)}" for name, row in values.items())
+def _describe(values: Mapping[str, Series]) -> str:
+    return "; ".join(f"{CHOICES[name].text}: {row}" for name, row in values.items())
 
 
-def _collect(findings: StairsFindings, index: str, names: Iterable[str] = READINGS) -> dict[str, list[float]]:
+def _collect(findings: StairsFindings, index: str, names: Iterable[str] = READINGS) -> dict[str, Series]:
     """Return a quantity in all cases under those of the named choices that were run."""
     run = [name for name in names if name in findings.effort.choices]
-    return {name: [read_index(get_best(findings, case, name), index) for case in findings.cases] for name in run}
+    return {name: Series(read_index(get_best(findings, case, name), index) for case in findings.cases) for name in run}
 
 
 def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str]) -> Check:
@@ -177,52 +183,40 @@ def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str])
     return require_feasible(check, list_infeasible(runs))
 
 
-def _show(index: str) -> Checker:
-    """Return the check of a value of Table IV that depends on what the paper does not give."""
-    return lambda findings: decide(Verdict.UNTESTABLE, readings=_describe(_collect(findings, index)))
-
-
 def _compare_cases(quantity: str, compare: Callable[[Array, Array], Check]) -> Checker:
     """Return the check of a quantity of Table IV in cases 1 and 3 divided by that in case 2."""
 
     def check(findings: StairsFindings) -> Check:
-        ours = _collect(findings, TABLE_4_ROWS[quantity])
-        texts = {"readings": _describe(ours), "ratios": "one case only"}
+        ours = _collect(findings, LEAST_ROWS[quantity])
         if len(findings.cases) < len(TABLE_4):
-            return decide(Verdict.NOT_SHOWN, **texts)
+            return decide(Verdict.NOT_SHOWN, ratios="one case only")
         printed = [float(getattr(row, quantity)) for row in TABLE_4.values()]
         theirs, *ratios = (np.array(row)[[0, 2]] / row[1] for row in (printed, *ours.values()))
-        texts["ratios"] = _describe(dict(zip(ours, ratios, strict=True)))
+        texts = {"ratios": _describe(dict(zip(ours, map(Series, ratios), strict=True)))}
         return _require_steps(findings, replace(compare(theirs, np.array(ratios)), values=texts), ours)
 
     return check
 
 
 def _check_balance(findings: StairsFindings) -> Check:
-    ours = _collect(findings, "zmp_margin_min_m", (*READINGS, "penalty"))
-    held = decide(all(min(row) >= 0 for row in ours.values()), readings=_describe(ours))
-    return _require_steps(findings, held, ours)
+    ours = _collect(findings, "zmp_margin_min_m", READ["zmp_margin_min_m"])
+    return _require_steps(findings, decide(all(min(row) >= 0 for row in ours.values())), ours)
 
 
 def _check_following(findings: StairsFindings) -> Check:
-    ours, limited = (_collect(findings, "largest_error_rad", names) for names in (UNLIMITED, [OURS]))
-    held = [max(errors) <= FOLLOWED_RAD for errors in ours.values()]
-    texts = {"readings": _describe(ours), "limited": _join(limited[OURS]), "limit": FOLLOWED_RAD}
-    return decide(held, **texts)
+    errors = _collect(findings, "largest_error_rad", UNLIMITED)
+    return decide([max(row) <= FOLLOWED_RAD for row in errors.values()], limit=FOLLOWED_RAD)
 
 
-def _collect_printed(findings: StairsFindings, name: str) -> list[float]:
+def _collect_printed(findings: StairsFindings, name: str) -> Series:
     """Return a result of the printed gains in all cases."""
-    return [findings.others[f"printed-{case}"][name] for case in findings.cases]
+    return Series(findings.others[f"printed-{case}"][name] for case in findings.cases)
 
 
 def _check_printed_gains(findings: StairsFindings) -> Check:
     names = ("implicit", "compensated", "hip")
-    errors = {name: _collect_printed(findings, f"{name}_largest_error_rad") for name in names}
-    held = [max(row) <= FOLLOWED_RAD for row in errors.values()]
-    needed = _join(row.peak_torque_Nm / row.kp for row in TABLE_4.values())
-    texts = {name: _join(row) for name, row in errors.items()}
-    return decide(held, **texts, limit=FOLLOWED_RAD, needed=needed)
+    errors = [_collect_printed(findings, f"{name}_largest_error_rad") for name in names]
+    return decide([max(row) <= FOLLOWED_RAD for row in errors], limit=FOLLOWED_RAD)
 
 
 def _get_instants(findings: StairsFindings, decides: Decides) -> dict[str, list[dict[str, Any]]]:
@@ -231,42 +225,32 @@ def _get_instants(findings: StairsFindings, decides: Decides) -> dict[str, list[
     return {name: [others[f"instants-{name}-{decides}-{case}"] for case in cases] for name in findings.effort.instants}
 
 
-def _describe_instants(findings: StairsFindings, decides: Decides) -> list[str]:
+def _describe_instants(findings: StairsFindings, decides: Decides) -> str:
     texts = []
     for name, parts in _get_instants(findings, decides).items():
-        until, outside, cost = ([part[key] for part in parts] for key in ("quanta", "outside_quanta", "cost"))
-        constants = _join(_collect(findings, "controller_cost", [name])[name])
-        texts.append(
-            f"{CHOICES[name].text}: {_join(until)} quanta, ZMP outside in {_join(outside)}, mean of (53) {_join(cost)}, with "
-            f"constants {constants}"
-        )
-    return texts
+        until, outside, cost = (Series(part[key] for part in parts) for key in ("quanta", "outside_quanta", "cost"))
+        constants = _collect(findings, "controller_cost", [name])[name]
+        what = f"{until} quanta, ZMP outside in {outside}, mean of (53) {cost}, with constants {constants}"
+        texts.append(f"{CHOICES[name].text}: {what}")
+    return "; ".join(texts)
 
 
 def _check_instants(decides: Decides) -> Checker:
     """Return the check that Algorithm 4 finishes the step with the ZMP in the polygon."""
 
     def check(findings: StairsFindings) -> Check:
-        found, evaluations = _get_instants(findings, decides), findings.effort.instant_evaluations
-        held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found.values()]
-        limits = _join(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()}))
-        texts = {
-            "found": "; ".join(_describe_instants(findings, decides)),
-            "evaluations": evaluations,
-            "limits": limits,
-        }
-        enough = evaluations >= ANTS * ITERATIONS or all(held)
-        return decide(held if enough else Verdict.NOT_SHOWN, **texts)
+        found = _get_instants(findings, decides).values()
+        held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found]
+        enough = findings.effort.instant_evaluations >= ANTS * ITERATIONS or all(held)
+        return decide(held if enough else Verdict.NOT_SHOWN)
 
     return check
 
 
 def _check_online(findings: StairsFindings) -> Check:
-    parts, evaluations = _get_instants(findings, "gains")[OURS], findings.effort.instant_evaluations
-    times = np.array([1e3 * part["time_s"] / part["quanta"] for part in parts])
-    scaled = times * ANTS * ITERATIONS / evaluations
-    values = {"evaluations": evaluations, "found": _join(times), "scaled": _join(scaled)}
-    return decide(bool(max(scaled) <= 1e3 * QUANTUM), **values)
+    parts, share = _get_instants(findings, "gains")[OURS], ANTS * ITERATIONS / findings.effort.instant_evaluations
+    times = Series(1e3 * part["time_s"] / part["quanta"] for part in parts)
+    return decide(share * max(times) <= 1e3 * QUANTUM, found=times, scaled=Series(share * time for time in times))
 
 
 def _check_cost_against_energy(_: StairsFindings) -> Check:
@@ -274,28 +258,21 @@ def _check_cost_against_energy(_: StairsFindings) -> Check:
     cost, energy, torque = np.array([[row.cost, row.energy, row.peak_torque_Nm] for row in TABLE_4.values()]).T
     power = energy / TABLE_3["t3_s"]  # of an energy in J
     rates, least = power / torque / len(LINKS), power * QUANTUM  # the latter of a sum over quanta
-    return decide(bool((cost >= least).all()), power=_join(power), least=_join(least), rates=_join(rates))
+    return decide(bool((cost >= least).all()), power=Series(power), least=Series(least), rates=Series(rates))
 
 
 def _check_torso(index: str, sign: float) -> Checker:
     """Return the check that the tuned torso pitch improves a quantity from that of an upright one with the same gains [%]."""
 
     def check(findings: StairsFindings) -> Check:
-        best = [findings.best_track(case) for case in findings.cases]
-        tuned, upright = [run.verdict.indexes[index] for run in best], _collect_printed(findings, f"upright_{index}")
-        changes = 100 * sign * (np.array(tuned) - upright) / np.abs(upright)
-        torso = _join(run.x["torso_pitch_rad"] for run in best)
-        return require_change(changes, torso=torso, tuned=_join(tuned), upright=_join(upright))
+        tuned = [findings.best_track(case).verdict.indexes[index] for case in findings.cases]
+        upright = np.array(_collect_printed(findings, f"upright_{index}"))
+        return require_change(100 * sign * (tuned - upright) / np.abs(upright))
 
     return check
 
 
-def _join(values: Iterable[float]) -> str:
-    return " / ".join(f"{value:.4g}" for value in values)
-
-
 TRACKING_CHECKS: dict[str, Checker] = {
-    **{f"track-{quantity}": _show(index) for quantity, index in TABLE_4_ROWS.items()},
     "cost-energy": _check_cost_against_energy,
     **{f"least-{name}": _compare_cases(name, lambda _, ours: require_change(100 * (ours - 1))) for name in LEAST_ROWS},
     **{f"ratios-{name}": _compare_cases(name, compare_readings) for name in LEAST_ROWS},
