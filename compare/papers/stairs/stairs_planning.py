@@ -99,6 +99,13 @@ def load_spec(findings: StairsFindings, what: str, case: int) -> ProblemSpec:
 
 def move(findings: StairsFindings, what: str, case: int) -> tuple[Signals, dict[str, Array]]:
     """Return the motion of a plan and its points by leg and sagittal coordinates: hip, knee, ankle, sole, toe (T, 5, 2)."""
+    if (what, case) not in findings.motions:
+        findings.motions[what, case] = _move(findings, what, case)
+    found: tuple[Signals, dict[str, Array]] = findings.motions[what, case]
+    return found
+
+
+def _move(findings: StairsFindings, what: str, case: int) -> tuple[Signals, dict[str, Array]]:
     problem = load_spec(findings, what, case).load().dense(DENSITY)
     if problem is None or problem.display.skeleton is None:
         raise TypeError("the planner has samples and a skeleton")

@@ -156,6 +156,7 @@ class StairsFindings:
     effort: StairsEffort
     runs: Runs
     others: Mapping[str, Any] = field(default_factory=dict)
+    motions: dict[tuple[str, int], Any] = field(default_factory=dict)  # of plans, kept by ``move``
 
     @property
     def cases(self) -> Sequence[int]:
