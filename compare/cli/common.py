@@ -34,7 +34,7 @@ STACKED_WIDTH = 60  # of terminals on which tables are stacked: a block of lines
 LONGEST_CELL = 24  # characters of a cell on one line
 MOST_EXCLUDED = 20  # records named on a terminal
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
-GAP = 3  # characters between two columns of a table
+GAP = 2  # characters between two columns of a table
 
 
 class PlainConsole(Console):
@@ -115,7 +115,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
     header, rows = [escape_controls(name) for name in header], [[escape_controls(text) for text in row] for row in rows]
     needs = [_measure_column(name, [row[i] for row in rows]) for i, name in enumerate(header)]
     groups: list[list[int]] = [[0]]
-    space = stdout.width - needs[0] - GAP - 1
+    space = stdout.width - needs[0] - 2
     left = space
     for i in range(1, len(header)):
         if needs[i] + GAP > left and len(groups[-1]) > 1:
@@ -127,7 +127,7 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
         stdout.print(title if k == 0 else f"{title}, continued")
         table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
         for i in group:
-            need = min(needs[i], space)
+            need = min(needs[i], space - GAP)
             justify: Literal["left", "right"] = "right" if i and all(_is_number(row[i]) for row in rows) else "left"
             flexible = any(len(row[i]) > LONGEST_CELL for row in rows)
             table.add_column(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,7 +30,11 @@ def list_problems(
         bool, typer.Option("--algorithms", help="Show the settings of all algorithms and solvers.")
     ] = False,
     robot: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Show a robot as read: URDF, MJCF (.xml), JSON, or a name.")
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show a robot as read: URDF, MJCF (.xml), JSON, or a name; with a problem, that problem for this robot.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG.")
@@ -40,22 +44,24 @@ def list_problems(
     """List problems, algorithms and robots, or describe one of them.
 
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
-    `nlp-gait list --robot my_robot.urdf --out my_robot.png`
+    `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
     from compare.study.description import list_described_names
 
-    if robot is not None:
+    if robot is not None and name is None:
         _robot(robot, out, as_json)
         return
     if out is not None:
-        raise InputError("--out is the figure of a robot; name one with --robot FILE")
+        raise InputError("--out is the figure of a robot; give --robot FILE, and no problem")
     known = list_described_names()
+    if robot is not None and (algorithms or name in known):
+        raise InputError("--robot takes a problem, or no name")
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
     elif name is None:
         _overview(as_json)
     else:
-        _details(name, as_json)
+        _details(name, {} if robot is None else {"robot": robot}, as_json)
 
 
 def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
@@ -130,8 +136,8 @@ def _overview(as_json: bool) -> None:
     stdout.print("your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME")
 
 
-def _details(name: str, as_json: bool) -> None:
-    problem = load(name)
+def _details(name: str, given: Mapping[str, Any], as_json: bool) -> None:
+    problem = load(name, **given)
     if as_json:
         print_json(
             {
@@ -143,7 +149,8 @@ def _details(name: str, as_json: bool) -> None:
         )
         return
     rows = [(v.name, f"{v.lower:g}", f"{v.upper:g}", v.unit, v.description) for v in problem.variables]
-    print_table(f"{name}: variables", ("name", "lower", "upper", "unit", "description"), rows)
+    where = "".join(f" with --{key} {value}" for key, value in given.items())
+    print_table(f"{name}{where}: variables", ("name", "lower", "upper", "unit", "description"), rows)
     limits = [(q.name, f"{q.default:g}", q.unit, q.description) for q in problem.own_parameters]
     print_table(f"{name}: parameters, for --set", ("name", "default", "unit", "description"), limits)
     options = ", ".join(f"{key}={value}" for key, value in problem.options.items())

@@ -135,13 +135,13 @@ class AnyProblem(ProblemOptions):
 
     name: Annotated[
         str | None,
-        typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out with --motion or --check."),
+        typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out where a file names it."),
     ] = None
 
     def spec(self) -> ProblemSpec:
         """Return the problem; raises as ``make_spec``."""
         if self.name is None:
-            raise InputError("name the problem, for example nao-ssp; it may be left out only with --motion and --check")
+            raise InputError("name the problem, for example nao-ssp; it may be left out only where a file names it")
         return self.make_spec(self.name)
 
 

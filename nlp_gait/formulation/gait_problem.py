@@ -83,6 +83,8 @@ class GaitProblem:
     #: What the mathematics was built with (robot, intervals, ...); written by ``formulation.registry.maker``
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)  #: parameters that differ from their defaults
+    #: Parameters that the problem has with another option, as ``{"speed_m_s": "objective=power"}``
+    with_other_options: Mapping[str, str] = field(default_factory=dict)
     #: Makes the same problem with a number of times as many samples; None if there is no finer grid
     refine: Callable[[int], GaitProblem] | None = None
     grid: Grid | None = None  #: samples, or None if the problem has none
@@ -379,6 +381,10 @@ class GaitProblem:
                 raise UnknownNameError(
                     f"{name!r} is an option of {self.name}, not a parameter: another value is another problem; "
                     f"load it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
+                )
+            if name in self.with_other_options:
+                raise UnknownNameError(
+                    f"{name!r} is no parameter of {self.name} with these options; add --option {self.with_other_options[name]}"
                 )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 

@@ -88,6 +88,9 @@ def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(flag for flag in BASE_FLAGS if flag != "-w") + " -w",
+        "LOWER": ", ".join(map(repr, instance.lower.tolist())),
+        "UPPER": ", ".join(map(repr, instance.upper.tolist())),
+        "NAMES": "\n".join(f"  '{name}'" for name in instance.names),
         "BEST_X": ", ".join(map(repr, instance.best_x.tolist())),
         "VARIABLES": format_comment(
             f"{k:4d}  {v.name} [{v.unit}] from {low:g} to {high:g}: {v.description}"

@@ -282,9 +282,10 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
             feet = infer_feet(
                 name, legs, links, joints, feet, lambda link: read_points(model, link), file.forward, notes
             )
-    for note in notes:
-        if "foot:" not in note:
-            warn_once("robot %r: %s", name, note)
+    count = sum("foot:" not in note for note in notes)
+    if count:
+        parts = f"{count} note{'s' * (count > 1)} on welded or repaired parts"
+        warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, parts)
     changed = {
         "links": {key: file.links[key]._replace(raw=raw) for key, raw in links.items()},
         "joints": {key: file.joints[key]._replace(raw=raw) for key, raw in joints.items()},

@@ -50,6 +50,10 @@ def test_files_stand_alone(built: tuple[str, Path]) -> None:
     assert f"objective, to be minimised{' [W]' if id.startswith('ssp') else ''}; infinite" in header
     for name, unit in zip(instance.names, instance.units, strict=True):
         assert f"{name} [{unit}]" in header
+    caller = (folder / f"{prefix}_example.m").read_text()
+    assert all(f"  '{name}'\n" in caller for name in instance.names) and "@" not in caller
+    for kind, values in (("lower", instance.lower), ("upper", instance.upper)):
+        assert f"{kind} = [{', '.join(map(repr, values.tolist()))}];" in caller
     if shutil.which("ldd"):
         linked = subprocess.run(["ldd", str(folder / f"lib{prefix}.so")], capture_output=True, text=True, check=True)
         libraries = {line.split()[0].split(".")[0] for line in linked.stdout.splitlines()}

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlp_gait.errors import GaitError, InputError, RobotDataError
+from nlp_gait.errors import GaitError, InputError, RobotDataError, warn_once
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.tree import partner, partners
@@ -71,11 +71,14 @@ def test_legs_with_the_same_content_are_equal(tmp_path: Path, robot: Robot) -> N
 
 def test_what_is_ignored_is_reported(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     text = crooked_urdf().replace('<joint name="A_knee"', '<joint dont_collapse="true" name="A_knee"')
+    warn_once.cache_clear()
     with caplog.at_level(logging.WARNING, logger="nlp_gait"):
         found = load_robot(crooked(tmp_path, text))
     assert "dont_collapse" in caplog.text
     assert any("'A_finger' is welded to its parent 'A_arm'" in note for note in found.notes)
     assert any("'B_hand' is welded to its parent 'B_arm'" in note for note in found.notes)
+    notes = [message for message in caplog.messages if "welded" in message]
+    assert len(notes) == 1 and "4 notes on welded or repaired parts; see nlp-gait list --robot FILE" in notes[0]
 
 
 def test_images_are_found_where_names_mislead(robot: Robot) -> None:

@@ -87,14 +87,19 @@ class CasadiSolver(Solver):
         solver, watch, create_s = problem.build_once(_build_solver, self)
         widths, bounds = model.widths, model.bounds(problem)
         primal = model.start(problem, x0, widths[0])
-        iterations, evaluations, stats = 0, Evaluations(), {}
+        iterations, evaluations = 0, Evaluations()
+        stats: dict[str, Any] = {}
         started = time.perf_counter()
         alone = stop is never and self.watched
         with defer_interrupts() if alone else contextlib.nullcontext(stop) as pressed:
             watch.begin(pressed, math.inf if self.time_limit_s is None else started + self.time_limit_s)
             for width in widths:
-                with _silence_stdout():
-                    result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+                try:
+                    with _silence_stdout():
+                        result = solver(x0=primal, p=np.append(problem.p, width), **bounds)
+                except RuntimeError as error:  # of the solver itself
+                    stats = {"success": False, "return_status": str(error).strip().rpartition(": ")[2]}
+                    break
                 primal = np.array(result["x"]).ravel()
                 stats = solver.stats()
                 iterations += int(stats.get("iter_count") or 0)

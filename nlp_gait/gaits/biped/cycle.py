@@ -275,6 +275,7 @@ def make_cycle_problem(
         variables=cycle.decisions,
         own_parameters=cycle.parameters,
         objective=cycle.objective,
+        with_other_options={} if cycle.at_given_speed else {SPEED: "objective=power"},
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
         rows_over_time=cycle.rows_over_time if rows_over_time else (),

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import PANELS, app, common
 from compare.cli.common import PlainConsole, print_table
-from tests.compare.cli.calls import as_json
+from compare.cli.compare import HOW_TO_READ, READ_FIRST
+from tests.compare.cli.calls import as_json, one_sentence
 
 ROOT = Path(__file__).parents[3]
 HEADER = (
@@ -43,6 +44,14 @@ def test_no_table_is_wider_than_the_terminal_and_none_loses_a_cell(monkeypatch, 
     for row in ROWS:
         assert all(" ".join(cell.split()) in text for cell in row if len(cell) <= common.LONGEST_CELL)
     assert text.count("continued") == (0 if width == 200 else 1)
+
+
+def test_the_first_columns_of_a_study_fit_eighty_columns_with_names_of_sixteen_letters(monkeypatch, capsys):
+    monkeypatch.setattr(common, "stdout", PlainConsole(highlight=False, markup=False, width=80))
+    row = ("genetic-algorit1", "31/31", "125.4978 %", "123.907415 W/s", "10 000", "12.345 s")
+    print_table("Solvers", READ_FIRST, [row])
+    text = capsys.readouterr().out
+    assert "continued" not in text and all(cell in text for cell in row) and len(HOW_TO_READ) <= 80
 
 
 def test_at_sixty_columns_a_table_is_stacked(monkeypatch, capsys):
@@ -97,6 +106,17 @@ def test_a_broken_pipe_does_not_lose_the_solution_file(tmp_path):
     command = f"{sys.executable} -P -m nlp_gait solve nao-dsp --starts 1 --out {target} | true"
     subprocess.run(command, shell=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)
     assert '"claimed": true' in target.read_text()
+
+
+def test_a_problem_is_listed_for_a_robot():
+    heights = [
+        next(
+            each["upper"] for each in as_json("list", "humanoid-cycle", *robot)["variables"] if "hip_z" in each["name"]
+        )
+        for robot in ((), ("--robot", ROOT / "tests/fuzz/seeds/biped/crooked.urdf"))
+    ]
+    assert heights[1] > 1.2 * heights[0]
+    assert "--robot takes a problem" in one_sentence("list", "pso", "--robot", "nao-v5")
 
 
 def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():

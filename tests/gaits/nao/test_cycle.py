@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
@@ -214,6 +214,13 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
     lift_off = mirrored_row(single, "tau", 0) - double.arrays["tau"][-1]
     assert figures["touch_down_torque_jump_Nm"] == pytest.approx(np.abs(touch_down).max(), rel=ROUNDING)
     assert figures["lift_off_torque_jump_Nm"] == pytest.approx(np.abs(lift_off).max(), rel=ROUNDING)
+
+
+def test_the_speed_without_its_option_is_one_sentence() -> None:
+    with pytest.raises(
+        UnknownNameError, match="'speed_m_s' is no parameter of nao-cycle .* add --option objective=power"
+    ):
+        load("nao-cycle").with_values(speed_m_s=0.03)
 
 
 def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
