@@ -34,12 +34,7 @@ from compare.papers.claims import (
 )
 from compare.papers.paper_runs import Effort, Runner
 from compare.report.document import Rows, Section, Table, text_table
-from compare.report.provenance import (
-    TERMS,
-    format_settings,
-    make_reference_table,
-    make_solver_table,
-)
+from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.session_section import make_citation_section, make_session_section
 from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts

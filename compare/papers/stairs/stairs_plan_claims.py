@@ -55,7 +55,7 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
         "shank_depth": _measure_shanks(findings),
         "online": ONLINE,
         **{
-            f"network_{name}": f"{found['converged']} of {found['poses']}"
+            f"network_{name}": f"{found['converged']} of {found['poses']} (knee bent the other way in {found['bent_otherwise']})"
             for name, found in zip(("adam", "printed"), _networks(findings), strict=True)
         },
         "energy_factor": Series(

@@ -57,7 +57,6 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "energies": " | ".join(f"least energy {case}" for case in effort.cases),
         "cases_4f": " | ".join(".4f" for _ in effort.cases),
         "cases_6g": " | ".join(".6g" for _ in effort.cases),
-        "table_3": TABLE_3,
         "evaporation": EVAPORATION,
         "usual_spread": AntColony().spread,
         "quantum_s": QUANTUM,
@@ -108,7 +107,6 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
         ],
         "table4": _list_table_4(findings),
         "tracks": [row for case in findings.cases for row in _list_tracks(findings, case)],
-        "fixed-hip": [_list_fixed_hip(findings, case) for case in findings.cases],
         **planning.make_planning_tables(findings),
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
@@ -182,12 +180,6 @@ def _list_tracks(findings: StairsFindings, case: int) -> Rows:
         others = [own["energy_J"], own["zmp_margin_min_m"], own["largest_error_rad"], *get_point(run)]
         rows.append([case, solver, verdict.objective, verdict.feasible, *others])
     return rows
-
-
-def _list_fixed_hip(findings: StairsFindings, case: int) -> Sequence[Value]:
-    found, verdict = findings.runs[f"hip-{case}", IPOPT], findings.best("hip", case).verdict
-    feasible = sum(run.verdict.feasible for run in found)
-    return [case, f"{feasible} of {len(found)}", "; ".join(verdict.violated[:3]) or "nothing"]
 
 
 def _list_other_stairs(findings: StairsFindings) -> Rows:

@@ -38,7 +38,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "fig03 fig06-07 fig08-09 fig10-11 fig12 fig13 fig14-20 fig21-27 fig28 fig29",
-        "table3 table4 plans plan-choices steps energies fixed-hip tracks printed-scheme ideal replay other-stairs network "
+        "table3 table4 plans plan-choices steps energies tracks printed-scheme ideal replay other-stairs network "
         "learned claims differences choices instants",
     )
 
