@@ -7,7 +7,7 @@ code that it cites (the id with ``-damped``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -17,7 +17,6 @@ from compare.papers.claims import (
     Check,
     Verdict,
     compare_changes,
-    compare_levels,
     decide,
     require_change,
     require_significance,
@@ -58,17 +57,21 @@ def _check_better(phase: PhaseFindings, swarm: str) -> Check:
         share=100 * (of_ga / of_pso - 1),
         survival=phase.test(swarm, "ga-generational").p_two_sided,
         penalty=phase.test(f"{swarm}-penalty", "ga-penalty").p_two_sided,
+        more=phase.test(f"{swarm}-more", "ga-more").p_two_sided,
+        pairs=len(phase.final_powers("ga-more")),
     )
     return require_significance(check, RANK_SUM, test.p_two_sided)
 
 
-def _check_statistic(phase: PhaseFindings) -> Check:
-    printed, runs = phase.paper.test, 11
-    variance = runs * runs * (2 * runs + 1) / 12
-    z = (printed.rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(variance)
-    p = math.erfc(abs(z) / math.sqrt(2))
-    both = [printed.z, printed.p_two_sided, printed.p_less]
-    return compare_levels(both, [z, p, p / 2], test=printed, z=z, p=p, p_less=p / 2)
+def _check_more_pairs(phase: PhaseFindings) -> Check:
+    """Check damped PSO's lead over GA [mW] over the further initial populations."""
+    pso, ga = (phase.final_powers(f"{name}-more") for name in ALGORITHMS)
+    printed = 1000 * (phase.paper.optima["ga"].power_W - phase.paper.optima["pso"].power_W)
+    lead, p = 1000 * float(np.median(ga) - np.median(pso)), phase.test("pso-more", "ga-more").p_two_sided
+    check = compare_changes(
+        printed, lead, swarm=NAMES["pso"], printed_lead=printed, lead=lead, pairs=len(pso), p=p, wins=100 * a12(pso, ga)
+    )
+    return require_significance(check, RANK_SUM, p)
 
 
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
@@ -298,6 +301,47 @@ def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:
     return decide(all(share > 0.5 for share in shares.values()), shares=words, best=best)
 
 
+def _check_dearer(phase: PhaseFindings, positions: Sequence[int], beyond: float) -> Check:
+    """Check how much more the cheapest optimum costs at which a velocity is at least this far beyond zero [%], per variable."""
+    dearer = []
+    for position in positions:
+        powers = [point.power_W for point in phase.sweeps[position] if point.feasible and abs(point.at) > beyond]
+        dearer.append(100 * (min(powers) / phase.best - 1) if powers else math.inf)
+    words = ", ".join("none feasible" if math.isinf(value) else f"{value:.2f} %" for value in dearer)
+    return require_change(dearer, found=words)
+
+
+def _check_near_zero(phase: PhaseFindings) -> Check:
+    """Check how much rarer solutions are between zero and the printed range of x6 than within it, by its width [%]."""
+    x6 = np.concatenate([points.x[:, 5] for points in phase.points.values()])
+    printed = PAPER.velocity_ranges["lateral-velocity-dsp"]
+    near, within = np.mean((x6 > printed.high) & (x6 <= 0)), np.mean((printed.low <= x6) & (x6 <= printed.high))
+    density = (near / -printed.high) / (within / (printed.high - printed.low)) if within else math.inf
+    return require_change(100 * (1 - density), near=100 * near, within=100 * within, density=density)
+
+
+def _check_positive(phase: PhaseFindings) -> Check:
+    """Check how much more the cheapest solutions with a positive lateral velocity cost than the best [%]."""
+    found = {name: points.power_W[points.x[:, 5] > 0] for name, points in phase.points.items()}
+    cheapest = min((float(power.min()) for power in found.values() if len(power)), default=math.nan)
+    share = sum(map(len, found.values())) / sum(len(points.power_W) for points in phase.points.values())
+    change = 100 * (cheapest / phase.best - 1)
+    words = f"the cheapest costs {change:.0f} % more" if share else "none"
+    return require_change(change if share else -math.inf, words=words, share=100 * share)
+
+
+def _check_faster(findings: NaoFindings) -> Check:
+    """Check how much faster the hip moves forwards in the shortest feasible duration of double than of single support [%]."""
+    speeds, ranges = [], []
+    for phase in findings.phases:
+        times = [point.at for point in phase.sweeps[phase.paper.duration] if point.feasible]
+        hip = phase.problem.signals(phase.problem.check_x(phase.paper.optima["pso"].x)).arrays["hip"]
+        speeds.append(float(hip[-1, 0] - hip[0, 0]) / min(times))
+        ranges.append(max(times) / min(times))
+    change = 100 * (speeds[1] / speeds[0] - 1)
+    return require_change(change, speeds=speeds, ranges=ranges, change=change)
+
+
 def _check_same_median(phase: PhaseFindings, swarm: str) -> Check:
     pso, ga = phase.median_run(swarm), phase.median_run("ga")
     return decide(pso == ga, swarm=NAMES[swarm], pso=pso, ga=ga)
@@ -318,10 +362,15 @@ CHECKS: dict[str, Callable[[NaoFindings], Check]] = {
     "slope-ssp": _in(SSP, partial(_check_signs, signs={"hip_vz_start_m_s": -1, "hip_vz_end_m_s": 1})),
     "rise-dsp": _in(DSP, partial(_check_signs, signs={"hip_vz_start_m_s": 1})),
     "gaps": _in(DSP, _check_gaps),
+    "forward-power": _in(SSP, partial(_check_dearer, positions=(3, 4), beyond=0.008)),
+    "lateral-power": _in(DSP, partial(_check_dearer, positions=(5, 6), beyond=0.075)),
+    "near-zero": _in(DSP, _check_near_zero),
+    "positive": _in(DSP, _check_positive),
+    "faster-dsp": _check_faster,
     **GAIT_CHECKS,
 }
 for _suffix, _phase in (("ssp", SSP), ("dsp", DSP)):
-    CHECKS[f"statistic-{_suffix}"] = _in(_phase, _check_statistic)
+    CHECKS[f"better-{_suffix}-more"] = _in(_phase, _check_more_pairs)
     CHECKS[f"higher-hip-{_suffix}"] = _in(_phase, _check_higher_hip)
     CHECKS[f"slower-{_suffix}"] = _in(_phase, _check_slower)
     CHECKS[f"average-speed-{_suffix}"] = _in(_phase, _check_average_speed)

@@ -12,8 +12,7 @@ import numpy as np
 
 from compare.analysis.statistics.inference import RankSum, rank_sum_normal
 from compare.papers.nao.nao_paper import PAPER, PrintedPhase
-from compare.papers.nao.nao_runs import ALGORITHMS, SweepPoint, compute_power_with_legs_twice, evaluate_indexes
-from compare.papers.nao.nao_torque_changes import compute_torque_changes
+from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
@@ -165,14 +164,12 @@ class NaoFindings:
     @cached_property
     def torque_changes_Nm(self) -> dict[str, tuple[float, float]]:
         """Torque change of the printed solutions of double support, by candidate for its cause and search."""
-        dsp, options = self.dsp, ("lever", "finite", "separate", "held", "v6")
-        pso, ga = (compute_torque_changes(dsp.problem, dsp.paper.optima[name].x) for name in ALGORITHMS)
-        others = {PAPER.choices[name].title: dsp.printed_by_choice[name] for name in options}
+        others = {PAPER.choices[name].title: found for name, found in self.dsp.printed_by_choice.items()}
         by_option = {
             title: (found["pso"]["torque_change_Nm"], found["ga"]["torque_change_Nm"])
             for title, found in others.items()
         }
-        return {name: (pso[name], ga[name]) for name in pso} | by_option
+        return {**PAPER.torque_changes_Nm, **by_option}
 
     def swing_power(self, height_m: float) -> float:
         """Return the least power at one of the paper's swing heights [W]."""

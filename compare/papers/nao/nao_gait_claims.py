@@ -174,6 +174,28 @@ def _check_oscillation_torque(findings: NaoFindings) -> Check:
     return require_change(ours, ours=ours, greatest=greatest)
 
 
+def _check_relief(findings: NaoFindings) -> Check:
+    """Check how much less torque knees and ankles need with the hip at its upper than at its lower bound [%, rms]."""
+    ours = []
+    for phase in findings.phases:
+        x, ends = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x)), []
+        for end in ("lower", "upper"):
+            at = x | {"hip_height_m": phase.problem.value(f"hip_height_m.{end}")}
+            signals = phase.problem.signals(np.array(list(at.values())))
+            kinds = [[name[1:].startswith(kind) for name in signals.joints] for kind in ("Knee", "Ankle")]
+            ends.append([float(np.sqrt((signals.arrays["tau"][:, kind] ** 2).mean())) for kind in kinds])
+        ours += [100 * (1 - high / low) for low, high in zip(*ends, strict=True)]
+    return require_change(ours, ours=ours)
+
+
+def _check_lateral_margin(phase: PhaseFindings) -> Check:
+    """Check how much the margins in y of PSO's printed solution lose when both lateral velocities are halved [mm]."""
+    x, here = phase.paper.optima["pso"].x, phase.printed_here["pso"]
+    halved = phase.evaluate_printed(hip_vy_start_m_s=x[5] / 2, hip_vy_end_m_s=x[6] / 2)
+    ours = [1000 * (here[index] - halved[index]) for index in ("dbm_y_min_m", "dbm_y_mean_m")]
+    return require_change(max(ours), ours=ours)
+
+
 def _check_torque_limit(phase: PhaseFindings) -> Check:
     """Check whether the limit of 1.2 Nm binds at an end of a run or at IPOPT's optimum."""
     ends = [run.verdict.indexes["torque_change_Nm"] for runs in phase.searches.values() for run in runs]
@@ -246,6 +268,8 @@ GAIT_CHECKS: dict[str, Checked] = {
     "lower-hip-x": partial(_check_lower_hip, axis="x"),
     "lower-hip-y": partial(_check_lower_hip, axis="y"),
     "arms": _check_arms,
+    "relief": _check_relief,
+    "lateral-margin": lambda f: _check_lateral_margin(f.ssp),
     "straight": _check_straight,
     "oscillation": _check_oscillation,
     "oscillation-torque": _check_oscillation_torque,

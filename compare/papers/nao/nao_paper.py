@@ -50,7 +50,7 @@ class Choice:
 
     title: str  # in words
     phases: tuple[str, ...] = ("nao-ssp", "nao-dsp")  # problems
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, str | bool] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -65,6 +65,7 @@ class NaoPaper:
     durations_s: tuple[float, ...]  # of single support
     velocity_ranges: Mapping[str, VelocityRange]  # by id of the claim
     choices: Mapping[str, Choice]
+    torque_changes_Nm: Mapping[str, tuple[float, float]]  # ours, by candidate for the cause of the printed ones
 
 
 PAPER = read_printed(NaoPaper, "nao/nao_paper.toml")

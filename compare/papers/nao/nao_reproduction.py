@@ -24,8 +24,13 @@ from compare.study.record import RunRecord
 from compare.study.record_files import locate_record
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, Task
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solvers import ipopt
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.robots import load_robot
 from nlp_gait.simulation import simulate
+from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
+from nlp_gait.simulation.simulate import SETTLE_TIME
 
 
 def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
@@ -81,7 +86,7 @@ def _sweep_phase(
         starts=starts,
         sweeps=dict(enumerate(_solve_sweeps(runner, sweeps).values())),
         points=points,
-        variants={name: runs[paper.problem, name] for name in nao.VARIANTS},
+        variants={name: runs[paper.problem, name] for name in (*nao.VARIANTS, *nao.MORE)},
         choices=nao.list_choices(paper.problem, effort, solved=False),
         choice_starts={k: runs[spec.title, IPOPT] for k, spec in nao.list_choices(paper.problem, effort).items()},
         simulations={name: simulated[f"simulate-{paper.problem}-{name}"] for name in ALGORITHMS},
@@ -119,6 +124,20 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "nearest_Nm": changes[misses.argmin()],
         "nearest_miss": misses.min(),
         "candidates": len(changes),
+        "bodies": len(load_robot(str(ssp.problem.options["robot"])).links),
+        "masses_kg": [load_robot(robot).mass_kg for robot in ("nao-v5", "nao-v6")],
+        "simulator": {
+            "drive": nao.WEBOTS_DRIVE,
+            "friction": FRICTION,
+            "step_ms": 1000 * TIME_STEP,
+            "settle_s": SETTLE_TIME,
+        },
+        "pairs": len(ssp.final_powers("ga-more")),
+        "printed_feasible": sum(
+            build_exact_model(p.problem).at(p.problem.check_x(o.x), p.problem.p).violation <= FEASIBILITY_TOLERANCE
+            for p in findings.phases
+            for o in p.paper.optima.values()
+        ),
         "margin_gap_mm": 1000
         * max(
             abs(optimum.indexes[index] - dsp.printed_here[name][index])
@@ -140,12 +159,15 @@ def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
     optimum = phase.optimum.verdict
     shares = compute_joint_shares(phase.problem, phase.paper.optima["pso"].x)
     medians = {
-        name.replace("-", "_"): float(np.median(phase.final_powers(name))) for name in (*nao.SEARCHES, *nao.VARIANTS)
+        name.replace("-", "_"): float(np.median(phase.final_powers(name))) for name in (*nao.SEARCHES, *phase.variants)
     }
     return {
         "effects": {name: describe_effect(phase, name) for name in phase.choices},
         "median_W": medians,
         "best_W": phase.best,
+        "printed_W": {name: here["power_W"] for name, here in phase.printed_here.items()},
+        "more": phase.test("pso-more", "ga-more"),
+        "more_a12": a12(phase.final_powers("pso-more"), phase.final_powers("ga-more")),
         "dense_W": (optimum.dense or {}).get("power_W", math.nan),
         "yaw_mW": 1000 * shares["HipYawPitch"] * phase.printed_here["pso"]["power_W"],
         "converged": phase.converged,
@@ -174,6 +196,9 @@ def make_tables(findings: NaoFindings) -> dict[str, Rows]:
         "power-gap": [row for phase in findings.phases for row in _list_gaps(phase)],
     }
     for phase in findings.phases:
+        for name, position in (("hip", 0), ("durations", phase.paper.duration)):
+            rows: Rows = [(p.at, p.power_W if p.feasible else "none found") for p in phase.sweeps[position]]
+            tables[f"{name}-{phase.problem.name}"] = rows
         variables, indexes = phase.paper.tables
         tables |= {
             f"runs-{phase.problem.name}": _list_runs(phase),
@@ -237,7 +262,7 @@ def _list_choice(
 def _list_variants(phase: PhaseFindings) -> Rows:
     """Median power of each choice that the paper leaves open, against both kinds of PSO and GA."""
     rows: list[list[Value]] = []
-    for name in (*nao.SEARCHES, *nao.VARIANTS):
+    for name in (*nao.SEARCHES, *phase.variants):
         powers = phase.final_powers(name)
         p = [phase.test(name, other).p_two_sided for other in nao.SEARCHES]
         feasible = sum(map(math.isfinite, powers))

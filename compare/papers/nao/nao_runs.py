@@ -40,7 +40,10 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "ga-penalty": {"solver": "ga", "handling": PENALTY},
     "pso-penalty": {"solver": "pso", "handling": PENALTY},
     "pso-constant-penalty": {"solver": "pso-constant", "handling": PENALTY},
+    "pso-fast": {"solver": "pso", "settings": {"velocity_limit": 1.0}},
+    "pso-constant-fast": {"solver": "pso-constant", "settings": {"velocity_limit": 1.0}},
 }
+MORE = {f"{name}-more": name for name in SEARCHES}  # searches from further initial populations
 SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
 WEBOTS_DRIVE = Drive(period_s=0.04, interpolation="held", feed_forward="none")  # section 5.4
 
@@ -51,11 +54,13 @@ class NaoEffort(Effort):
 
     runs: int = 11  # of each search, as in the paper
     variant_runs: int = 11  # of each other choice of the searches
+    more_runs: int = 44  # of each search, with the seeds after those of ``runs``
     evaluations: int = 10_000  # of a search, as in the paper
     starts: int = 20  # of IPOPT
     choices: tuple[str, ...] = tuple(PAPER.choices)  # with an optimum; all have values at the printed solutions
     choice_starts: int = 5  # of IPOPT for each of them
     intervals: int = 10  # between the samples of a phase, as in the paper
+    robot: str = "nao-v5"
     sweep_starts: int = 2  # at both ends of a sweep
     sweep_points: tuple[int, int] = (13, 10)  # over the range of all feasible solutions, and of the cheap ones
 
@@ -84,6 +89,10 @@ def make_tasks(effort: NaoEffort) -> list[Task]:
             tasks += [Task(problem=spec, solver=name, stop=stop, run=k) for k in range(effort.runs)]
         for label, kind in VARIANTS.items():
             tasks += [Task(problem=spec, label=label, stop=stop, run=k, **kind) for k in range(effort.variant_runs)]
+        more = range(effort.runs, effort.runs + effort.more_runs)
+        tasks += [
+            Task(problem=spec, solver=name, label=label, stop=stop, run=k) for label, name in MORE.items() for k in more
+        ]
         tasks += [Task(problem=spec, solver=IPOPT, run=k) for k in range(effort.starts)]
         for chosen in list_choices(phase.problem, effort).values():
             tasks += [Task(problem=chosen, solver=IPOPT, run=k) for k in range(effort.choice_starts)]
@@ -102,7 +111,7 @@ def list_choices(problem: str, effort: NaoEffort, *, solved: bool = True) -> dic
 
 def make_spec(problem: str, effort: NaoEffort) -> ProblemSpec:
     """Return a phase of the paper."""
-    return ProblemSpec(name=problem, options={"intervals": effort.intervals})
+    return ProblemSpec(name=problem, options={"intervals": effort.intervals, "robot": effort.robot})
 
 
 def run_and_store_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:

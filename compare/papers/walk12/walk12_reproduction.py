@@ -4,41 +4,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
 from typing import Any, get_args
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from compare.analysis.units import join_words
 from compare.judge import DENSE_INTERVALS
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
 from compare.papers.walk12 import walk12_runs as runs
-from compare.papers.walk12.walk12_claims import CHECKS
+from compare.papers.walk12 import walk12_walks
+from compare.papers.walk12.walk12_claims import CHECKS, count_upright
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
 from compare.papers.walk12.walk12_findings import (
     Walk12Findings,
-    compute_corner_slopes,
     compute_hip_miss,
     compute_straightest_knee,
 )
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
-from compare.papers.walk12.walk12_runs import (
-    CORNER_M,
-    HORIZONS,
-    MODEL,
-    PAPER,
-    PathPoint,
-    Walk12Effort,
-    WalkedGait,
-    compute_f1,
-)
+from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
+from compare.papers.walk12.walk12_walks import DRIVES, PERTURBATION_RAD, WALKED_STEPS, WalkedGait
 from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS, make_rigid_bodies
 from nlp_gait.gaits.walk12.walk12_model import Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
 
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
@@ -50,14 +48,14 @@ def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     records |= runner.run_tasks(runs.make_second_tasks(effort, records))
     paths = runner.compute(runs.make_paths(effort), code=(runs,))
     weighted, front = ([PathPoint(**row) for row in rows] for rows in paths.values())
-    last = runner.compute(runs.make_last(effort, records), code=(runs,))
+    last = runner.compute(runs.make_last(effort, records), code=(runs, walk12_walks))
     return Walk12Findings(
         effort=effort,
         runs=records,
         weighted=weighted,
         front=front,
         printed_step=last["printed-step"],
-        walks=[WalkedGait(**row) for row in last["walks"]],
+        walks=[WalkedGait(**row) for name, rows in last.items() if name.startswith("walks") for row in rows],
     )
 
 
@@ -78,7 +76,9 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
     problem, robot, lengths = load("walk12"), load_point_mass_biped(), _get_step_lengths()
     return {
         "effort": findings.effort,
-        "steps": runs.WALKED_STEPS,
+        "steps": WALKED_STEPS,
+        "own": robot,
+        "bounds": problem.variables,
         "ga_evaluations": runs.GA_EVALUATIONS,
         "f1max": F1MAX,
         "f2max": F2MAX,
@@ -165,7 +165,6 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "f1_change": {zmp: f"{low:+z.2f} % to {high:+z.2f} %" for zmp, (low, high) in changes.items()},
         "free": list_objectives(free),
         "hip_miss_mm": 1e3 * compute_hip_miss(),
-        "corner_slopes": compute_corner_slopes(),
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
         "up_mm": 1e3 * load_point_mass_biped().foot_com_height_m,
@@ -175,7 +174,6 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
             f"{findings.stable[k].first_s:.2f} to {findings.stable[k].last_s:.2f} s at λ = {TABLE_3[k].weight:g}"
             for k in (0, 1, -1)
         ),
-        "f1_read": {name: f"{low:+z.2f} % to {high:+z.2f} %" for name, (low, high) in findings.f1_changes.items()},
         "step_gap": _compute_gap(f1["step"], implied),
         "horizon_gap": _compute_gap(f1["1s"], implied),
     }
@@ -202,10 +200,12 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         for name, record in (("bound", findings.optimum(PAPER, 1.0)), ("simpson_bound", simpson[-1]))
     }
     return {
-        "walked": _count_walks(findings, 1.0),
-        "walked_slowly": _count_walks(findings, runs.ROBOT_STEP_S),
-        "unbent": list_objectives(unbent),
-        "bent": [findings.optimum(PAPER, weight).verdict.objective for weight in weights],
+        "walked": _count_walks(findings),
+        "simulator": _list_simulator_numbers(),
+        "perturbed": findings.effort.perturbed_starts,
+        "bent_weights": join_words(f"{weight:g}" for weight in weights),
+        "unbent": join_words(f"{f:.6f}" for f in list_objectives(unbent)),
+        "bent": join_words(f"{findings.optimum(PAPER, weight).verdict.objective:.6f}" for weight in weights),
         "straightest": min(compute_straightest_knee(get_point(best)) for best in _list_optima(findings, PAPER)),
         "printed_step": f"the optima at λ = {', '.join(findings.printed_step)} change by at most {max(shifts):.0e} in f",
         "simpson_claim": max(r.verdict.objective - get_dense(r)["f"] for r in simpson),
@@ -215,14 +215,33 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "ga_median": float(np.median(list_f(ga["ga"]))),
         "ga_no_elite": float(np.median(list_f(ga["ga-no-elite"]))),
         "ga_tournament_3": float(np.median(list_f(ga["ga-tournament-3"]))),
+        "ga_plus": float(np.median(list_f(ga["ga-plus"]))),
+        "ga_chromosome": float(np.median(list_f(ga["ga-chromosome"]))),
     }
 
 
-def _count_walks(findings: Walk12Findings, step_time_s: float) -> dict[str, str]:
-    """Count the paper's gaits that do not fall, as words, by whether the drives are as printed."""
-    own = [walk for walk in findings.walks if walk.by == "paper" and walk.step_time_s == step_time_s]
-    counts = {drive: [walk.fell_at_s is None for walk in own if walk.as_printed == drive] for drive in (True, False)}
-    return {str(drive): f"{sum(upright)} of {len(upright)}" for drive, upright in counts.items()}
+def _count_walks(findings: Walk12Findings) -> dict[str, str]:
+    """Count the walks of the paper's gaits from perturbed starts that do not fall, as words, by drives."""
+    return {drives: count_upright(findings.walks, drives, "paper") for drives in DRIVES}
+
+
+def _list_simulator_numbers() -> dict[str, Any]:
+    """Return the numbers of the simulated robot that the paper does not print."""
+    world = Xml.fromstring(resources.files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
+    contact, drive = world.find("default/geom"), Drive()
+    assert contact is not None  # in our own file
+    torques = [joint.torque_limit_Nm for joint in make_rigid_bodies(load_point_mass_biped()).joints.values()]
+    return {
+        "friction": FRICTION,
+        "contact_ms": 1e3 * float(contact.get("solref", "").split()[0]),
+        "engine_step_ms": 1e3 * TIME_STEP,
+        "drive": drive,
+        "period_ms": 1e3 * drive.period_s,
+        "torques": compute_range(torques),
+        "radius_mm": 1e3 * SPHERE_RADIUS,
+        "sole_share": 200 * SOLE_SHARE,
+        "noise_rad": PERTURBATION_RAD,
+    }
 
 
 def _find_bound(record: RunRecord) -> float | None:
@@ -253,12 +272,13 @@ def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
         "table4": _list_table_4(findings),
         "quadrature": _list_quadratures(findings),
         "walks": [_make_walk_row(walk) for walk in findings.walks],
+        "second-optima": [row for weight in (0.9, 1.0) for row in _list_second_optima(findings, weight)],
     }
 
 
 def _make_walk_row(walk: WalkedGait) -> Sequence[Value]:
-    drives = "printed" if walk.as_printed else "ours"
-    return [walk.weight, walk.by, walk.step_time_s, drives, walk.steps, walk.fell_at_s, walk.walked_share]
+    upright = f"{walk.upright} of {walk.starts}"
+    return [walk.weight, walk.by, walk.step_time_s, walk.drives, walk.steps, walk.fell_at_s, walk.walked_share, upright]
 
 
 def _list_quadratures(findings: Walk12Findings) -> Rows:
@@ -271,6 +291,19 @@ def _list_quadratures(findings: Walk12Findings) -> Rows:
         )
         ours = [best.verdict.objective, _find_bound(best), findings.printed_step.get(f"{row.weight:g}")]
         rows.append([row.weight, *ours, simpson.verdict.objective, get_dense(simpson)["f"], _find_bound(simpson)])
+    return rows
+
+
+def _list_second_optima(findings: Walk12Findings, weight: float) -> Rows:
+    """Both gaits at which starts of IPOPT end, where there are two: the best one, and the best that does not agree with it."""
+    begun, best = findings.records(PAPER, weight, IPOPT), findings.optimum(PAPER, weight)
+    ends = [run for run in begun if run.claimed and run.verdict.feasible]
+    other = [run for run in ends if best.verdict.objective - run.verdict.objective >= SAME_OPTIMUM]
+    rows: list[list[Value]] = []
+    for run in (best, *([choose_best(other)] if other else [])):
+        agreeing = sum(abs(end.verdict.objective - run.verdict.objective) < SAME_OPTIMUM for end in ends)
+        x = get_point(run)
+        rows.append([weight, agreeing, run.verdict.objective, *x, compute_straightest_knee(x)])
     return rows
 
 

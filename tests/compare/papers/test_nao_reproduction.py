@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -17,7 +18,6 @@ from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, 
 from compare.papers.nao.nao_paper import DSP, PAPER, PHASES, SSP
 from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
-from compare.papers.nao.nao_torque_changes import compute_torque_changes
 from compare.study.record import RunRecord, read_record
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import Array, GaitProblem
@@ -26,17 +26,26 @@ from nlp_gait.simulation import mjcf
 from nlp_gait.simulation import simulate as simulating
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 from tests.compare.papers.nao_geometry import compare_geometry
+from tests.compare.papers.nao_readings import compute_load_shares, compute_mean_margins, compute_powers
+from tests.compare.papers.nao_torque_changes import compute_torque_changes
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     """The least work; simulations, sweeps, choices, plots and proofs of one kind are computed once for all."""
-    effort: dict[str, Any] = {"intervals": 3, "runs": 2, "variant_runs": 1, "evaluations": 600, "starts": 1}
+    effort: dict[str, Any] = {
+        "intervals": 3,
+        "runs": 2,
+        "variant_runs": 1,
+        "more_runs": 1,
+        "evaluations": 600,
+        "starts": 1,
+    }
     simulate, sweep, draw, prove = (
         nao_runs.simulate_solution,
         nao_runs.solve_sweep,
         nao_figures._draw_scatter,
-        judge.guarantee,
+        judge.guarantee,  # type: ignore[attr-defined]
     )
     draw_gait = nao_figures._draw_gait
     known, swept = dict[str, Any](), dict[str, Any]()
@@ -63,8 +72,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
         patch.setattr(nao_runs, "simulate_solution", simulate_once)
         patch.setattr(nao_runs, "solve_sweep", sweep_once)
         patch.setattr(nao_figures, "_draw_scatter", lambda phase, at: draw(phase, at) if len(at) == 1 else Figure())
-        for name in ("finite", "separate", "reach"):
-            patch.setitem(PAPER.choices, name, replace(PAPER.choices["held"], title=name))  # type: ignore[arg-type]
+        for name in ("finite", "separate", "reach", "points"):
+            patch.setitem(PAPER.choices, name, replace(PAPER.choices["held"], title=name))
         folder = tmp_path_factory.mktemp("nao")
         drawn = ("fig09", "fig13")
         return reproduce("nao", folder, coarse=True, drawn=drawn, **effort, choices=("lever",), sweep_points=(0, 0))
@@ -75,7 +84,8 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
         finished,
         "fig09 fig10 fig11 fig12 fig13 fig14 fig20a swing-height fig15 fig16 fig17 fig18 fig19 fig20b",
         "table6 table7 table7-swing-heights table8 table9 rank-sum-tests power-gap claims differences durations runs-nao-ssp "
-        "runs-nao-dsp choices search-choices torque-changes simulations",
+        "runs-nao-dsp choices search-choices torque-changes simulations hip-nao-ssp hip-nao-dsp durations-nao-ssp "
+        "durations-nao-dsp",
     )
 
 
@@ -119,7 +129,7 @@ def test_an_interrupted_reproduction_continues(finished: Finished) -> None:
 
 
 def test_the_full_effort_counts_all_its_steps() -> None:
-    searches, choices = len(PHASES) * (3 + 6) * 11, 5 * (5 + 6)
+    searches, choices = len(PHASES) * ((3 + 8) * 11 + 3 * 44), 5 * (6 + 7)
     assert REPRODUCTION.full.steps == searches + len(PHASES) * 20 + choices + 2 + 9 + 8 + 4 + 1
 
 
@@ -196,12 +206,39 @@ def test_the_printed_solutions_have_the_values_of_the_audit(printed: dict[str, G
 
 def test_candidates_for_the_torque_change_change_one_thing_each(printed: dict[str, GaitProblem]) -> None:
     problem = printed["nao-dsp"]
-    found = compute_torque_changes(problem, DSP.optima["pso"].x)
+    found, ga = (compute_torque_changes(problem, DSP.optima[name].x) for name in ("pso", "ga"))
+    assert PAPER.torque_changes_Nm == {name: (round(found[name], 4), round(ga[name], 4)) for name in found}
     own = evaluate_indexes(problem, DSP.optima["pso"].x)["torque_change_Nm"]
     assert found["torque of one joint over one interval, as here"] == pytest.approx(own, rel=1e-9)
     assert found["gravity only"] == pytest.approx(own, rel=0.02)  # in 2 s nearly static
     assert found["sum over all joints"] > found["over two intervals"] > own
     assert found["half of the torso on each leg"] < found["the whole torso on each leg"]
+
+
+def test_numbers_in_the_texts_are_those_of_our_model(printed: dict[str, GaitProblem]) -> None:
+    texts = str(REPRODUCTION.printed.differences)
+    for phase in PHASES:
+        problem = printed[phase.problem]
+        for name, optimum in phase.optima.items():
+            powers = compute_powers(problem, optimum.x)
+            ends = [
+                powers[key] for key in (("legs", "one_motor") if name == "pso" else ()) + ("left_ends", "right_ends")
+            ]
+            assert all(f"{power:.4f}" in texts for power in ends), (phase.problem, name)
+            if phase is SSP:
+                assert all(f"{value:.1f}" in texts for value in compute_mean_margins(problem, optimum.x).values())
+    shares = compute_load_shares(printed["nao-dsp"], DSP.optima["pso"].x)
+    assert f"{shares.min():.4f} to {shares.max():.4f} of the weight" in texts
+
+
+def test_printed_statistics_follow_from_the_rank_sums() -> None:
+    for name, phase in (("statistic-ssp", SSP), ("statistic-dsp", DSP)):
+        z = (phase.test.rank_sum - 11 * 23 / 2 + 0.5) / math.sqrt(121 * 23 / 12)
+        p = math.erfc(abs(z) / math.sqrt(2))
+        claim = REPRODUCTION.printed.claims[name]
+        assert claim.found.startswith(f"z = {z:.4f}, p = {p:.3g}, left-tailed {p / 2:.3g} by")
+        right = abs(phase.test.p_less / (p / 2) - 1) < 0.05
+        assert claim.verdict == ("holds" if right else "does not hold")
 
 
 def test_the_robot_has_the_geometry_of_the_printed_tables_with_their_slips_corrected() -> None:

@@ -8,13 +8,19 @@ from dataclasses import replace
 import pytest
 
 from compare.papers.claims import Verdict
-from compare.papers.walk12 import walk12_runs
+from compare.papers.walk12 import walk12_walks
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
 from nlp_gait.gaits.walk12 import walk12_problem
 from nlp_gait.simulation import measurements, mjcf, simulate
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
+from tests.compare.papers.walk12_readings import (
+    compute_corner_slopes,
+    compute_f1_variants,
+    compute_unreachable_share,
+    is_rounding,
+)
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +28,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
     """The least of the quick reproduction: one start, one step in the engine, few of the paper's time steps."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(vars(REPRODUCTION), "quick", replace(REPRODUCTION.quick, starts=1, runs=1))
-        patch.setattr(walk12_runs, "WALKED_STEPS", 1)
+        patch.setattr(walk12_walks, "WALKED_STEPS", 1)
+        patch.setattr(walk12_walks, "STEP_TIMES_S", (1.0,))
         patch.setattr(simulate, "SETTLE_TIME", 0.0)
         for module in (mjcf, measurements, simulate):
             patch.setattr(module, "TIME_STEP", 0.002)
@@ -40,8 +47,20 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "tradeoff fig08 fig09 fig10 fig12-13 fig14-15 fig16-17 circle",
-        "claims differences table3-paper table3-model table4 gaits quadrature walks walk-straight walk-circle",
+        "claims differences table3-paper table3-model table4 gaits quadrature walks second-optima walk-straight walk-circle",
     )
+
+
+def test_numbers_in_the_texts_are_those_of_our_model() -> None:
+    known = [compute_f1_variants(row.x) for row in TABLE_3]
+    texts = str(REPRODUCTION.printed)
+    for name in ("ground", "g", "foot", "moments", "spheres"):
+        changes = [100 * (f1[name] / f1["ours"] - 1) for f1 in known]
+        assert f"{min(changes):+z.2f} % to {max(changes):+z.2f} %" in texts, name
+    slopes = compute_corner_slopes()
+    assert all(f"{slopes[name]:+.3f} per m" in texts for name in ("foot_lift_m", "bending_height_m"))
+    assert f"{100 * compute_unreachable_share():.1f} % of the bounds (7)" in texts
+    assert f"{sum(map(is_rounding, TABLE_3))} of 7" in texts
 
 
 def test_claims_are_decided_by_sizes(finished: Finished) -> None:

@@ -1,0 +1,120 @@
+"""What the paper of the 12-joint walk leaves open about the ZMP, read in other ways for a printed gait."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import product
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from scipy.stats import qmc
+
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, PaperRow
+from compare.papers.walk12.walk12_runs import CORNER_M, compute_f1, load_walk12
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.formulation import Array
+from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS
+from nlp_gait.gaits.walk12.walk12_model import GRAVITY, compute_legs, compute_mass_motion, list_masses
+from nlp_gait.gaits.walk12.walk12_problem import make_rule
+from nlp_gait.symbolic.nonsmooth import Exact
+
+STEP_M = 1e-4  # of a difference quotient
+SAMPLES = 4096  # points within the bounds (7)
+DIGIT_M, DIGIT_F = 5e-4, 5e-4  # half the last printed digit
+ROD_SHARE = 0.1  # of the actuators' mass: section 6 gives 5 to 10 %
+
+
+def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
+    """Return f1 [1/(m^2 s)] at T = 1 s by (14), as in the problem and with what the paper leaves open read in another way.
+
+    "ground": heights of the masses from the ground, with an ankle at the height L of the foot's mass above it; "g": 9.8 m/s^2;
+    "foot": the foot's mass stays at the height L above its ankle; "moments": (13) with M of uniform rods for thighs and shanks,
+    a tenth of the actuators' mass in all; "spheres": with M of the spheres that are the legs' masses in the engine.
+    """
+    robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
+    m, up = np.array(list_masses(robot)).ravel(), robot.foot_com_height_m
+    sample = _make_mass_function(robot)
+    samples = [[np.array(value) for value in sample(np.array(x), phase)] for phase in phases]
+    P, A, ankle, ankle_a = (np.array(values) for values in zip(*samples, strict=True))  # (n, 3, 7) and (n, 3, 1)
+
+    def f1(P: Array, A: Array, g: float = GRAVITY, base: float = 0.0, moments: Array | float = 0.0) -> float:
+        xy = P[:, :2] * (A[:, 2:] + g) - (P[:, 2:] + base) * A[:, :2]
+        return float(1 / (weights @ (((xy @ m + moments) / (g * m.sum())) ** 2).sum(axis=1)))
+
+    P_foot, A_foot = P.copy(), A.copy()
+    P_foot[:, :, [0]], A_foot[:, :, [0]] = np.array([[0.0], [0.0], [up]]), 0.0
+    P_foot[:, :, [6]], A_foot[:, :, [6]] = ankle + np.array([[0.0], [0.0], [up]]), ankle_a
+    still, turning = np.zeros_like(ankle), {name: np.zeros((len(phases), 3)) for name in ("rods", "spheres")}
+    thigh, shank = (
+        robot.hip_mass_kg / 3 + robot.knee_mass_kg / 2,
+        robot.knee_mass_kg / 2 + (1 - 2 * SOLE_SHARE) * robot.foot_mass_kg,
+    )
+    feet = ((still, still), (ankle, ankle_a))
+    for (foot, foot_a), knee, hip in zip(feet, (1, 5), (2, 4), strict=True):
+        for mass, rod, rod_a in (
+            (shank, P[:, :, [knee]] - foot, A[:, :, [knee]] - foot_a),
+            (thigh, P[:, :, [hip]] - P[:, :, [knee]], A[:, :, [hip]] - A[:, :, [knee]]),
+        ):
+            spin = np.cross(rod[:, :, 0], rod_a[:, :, 0])  # l^2 u x u''
+            turning["rods"] += ROD_SHARE / 4 * m.sum() / 12 * spin
+            turning["spheres"] += 0.4 * mass * SPHERE_RADIUS**2 * spin / (rod[:, :, 0] ** 2).sum(axis=1, keepdims=True)
+    moments = {name: f1(P, A, moments=spin[:, [1, 0]] * [-1.0, 1.0]) for name, spin in turning.items()}
+    return {
+        "ours": f1(P, A),
+        "ground": f1(P, A, base=up),
+        "g": f1(P, A, g=9.8),
+        "foot": f1(P_foot, A_foot),
+        "moments": moments["rods"],
+        "spheres": moments["spheres"],
+    }
+
+
+@cache
+def _make_mass_function(robot: PointMassBiped) -> ca.Function:
+    """Return the function of (x, phase) to positions and accelerations of the masses and of the swing ankle, at T = 1 s."""
+    x, phase = SX.sym("x", 4), SX.sym("phase")
+    stance, swing = compute_legs(x, phase, SX(1), SX(0), SX(0), robot, Exact())
+    masses = compute_mass_motion(stance, swing, robot)
+    ankle = swing.ankle
+    return ca.Function("masses", [x, phase], [masses.position, masses.acceleration, ankle.position, ankle.acceleration])
+
+
+def compute_corner_slopes() -> dict[str, float]:
+    """Return the change of f per metre from the corner (0.13, 0.13, 0.13, 0.13) inward along each variable.
+
+    Lambda is 0.15, on 400 intervals.
+    """
+    dense = load_walk12().dense(20)
+    assert dense is not None  # its grid can be refined
+    problem = dense.with_values(**{"lambda": 0.15, "f1max": F1MAX})
+    function, corner = build_exact_model(problem).function, np.full(4, CORNER_M)
+
+    def f(x: np.ndarray) -> float:
+        return -float(function(x, problem.p)[0])
+
+    shifts = dict(zip(problem.names, STEP_M * np.eye(4), strict=True))
+    return {name: (f(corner - shift) - f(corner)) / STEP_M for name, shift in shifts.items()}
+
+
+def compute_unreachable_share() -> float:
+    """Return the share of the bounds (7) whose gaits no leg reaches, or only with a knee straighter than the limit."""
+    problem = load_walk12()
+    points = qmc.scale(qmc.Sobol(len(problem.names), rng=0).random(SAMPLES), problem.lower, problem.upper)
+    _, violation = compile_objective(problem, threads=1)(points)
+    return float(np.mean(violation > 0.0))
+
+
+def is_rounding(row: PaperRow) -> bool:
+    """Return whether the printed f is that of a gait whose variables have the printed digits."""
+    corners = [PaperRow(weight=row.weight, x=_shift(row, signs), f=row.f) for signs in product((-1, 0, 1), repeat=4)]
+    f = [c.weight * compute_f1(c) / F1MAX + (1 - c.weight) * c.x[0] / F2MAX for c in corners]
+    return min(f) - DIGIT_F <= row.f <= max(f) + DIGIT_F
+
+
+def _shift(row: PaperRow, signs: Sequence[int]) -> tuple[float, float, float, float]:
+    s, n, lift, bend = (value + sign * DIGIT_M for value, sign in zip(row.x, signs, strict=True))
+    return s, n, lift, bend
