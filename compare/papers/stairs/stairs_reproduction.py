@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.stairs import stairs_effects, stairs_instants, stairs_motion
+from compare.papers.stairs import stairs_effects, stairs_instants
 from compare.papers.stairs import stairs_plan_claims as plan_claims
 from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
@@ -26,7 +25,7 @@ from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from metaheuristics import AntColony
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
-from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES, PAPER_TIMES
+from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES
 
 LACKING = "the paper gives no value"  # reason in the table of differences
 
@@ -42,7 +41,7 @@ def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
         *planning.make_planning_computations(findings),
         *tracking.make_tracking_computations(findings),
     ]
-    return replace(findings, others=runner.compute(computations, (runs, planning, stairs_motion, stairs_instants)))
+    return replace(findings, others=runner.compute(computations, (runs, planning, stairs_instants)))
 
 
 def compute_values(findings: StairsFindings) -> dict[str, Any]:
@@ -60,10 +59,6 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "evaporation": EVAPORATION,
         "usual_spread": AntColony().spread,
         "quantum_s": QUANTUM,
-        "step_ms": 1e3 * stairs_motion.STEP_S,
-        "feedback_rad_s": math.sqrt(stairs_motion.FEEDBACK[0]),
-        "lost_rad": runs.LOST_RAD,
-        "times": PAPER_TIMES,
         "adam": runs.RULES["adam"],
         "end_rate": end_rate,
         **plan_claims.compute_planning_values(findings),
@@ -111,7 +106,6 @@ def make_tables(findings: StairsFindings) -> dict[str, Rows]:
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
         "printed-scheme": [row[:8] for row in _list_results(findings, "printed")],
-        "replay": _list_results(findings, "replay"),
         "learned": _list_results(findings, "learned"),
         **tracking.make_tracking_tables(findings),
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any, get_args
 
 import numpy as np
@@ -21,7 +20,6 @@ from compare.papers.paper_runs import (
 )
 from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, PLAN_CHOICES, PRINTED
 from compare.papers.stairs.stairs_instants import Decides
-from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
 from compare.study.store import Computation
@@ -32,7 +30,6 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, leg_vector, network_angles
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import PAPER_TIMES
 from nlp_gait.gaits.stairs.track import PLAN
 
 ALGORITHMS: Mapping[str, Algorithm] = {
@@ -45,14 +42,13 @@ ALGORITHMS: Mapping[str, Algorithm] = {
 DRAWN_CASE = 2  # where the paper draws one case only
 TRACK_START = {"kp": 60.0, "kd": 60.0, "torso_pitch_rad": 1.4}
 IMPOSSIBLE_RISE_M = 0.5
-LOST_RAD = 0.1  # a replayed pose this far from the planned one is lost
 RULES = {
     "adam": NetworkSettings(),
     "gradient 0.3": NetworkSettings(rule="gradient", rate=0.3),
     "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
     "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
 }
-PER_CASE = 5  # see ``make_computations``
+PER_CASE = 4  # see ``make_computations``
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,17 +213,14 @@ def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
 
 
 def make_computations(findings: StairsFindings) -> Iterator[Computation]:
-    """Yield the network, and in each case the replay, the printed scheme, differences of both plans, the network in the loop."""
+    """Yield the network, and in each case the printed scheme, differences of both plans, the network in the loop."""
     effort, first = findings.effort, findings.cases[0]
     poses = {"poses": effort.poses, "printed_poses": effort.printed_poses}
     plan_spec, plan = make_plan_spec(effort, first), findings.plan(first)
     yield make_computation("network", plan_spec, train_network, case=first, plan=plan, **poses)
     for case in effort.cases:
-        ideal, plan = make_ideal_spec(effort, case), findings.plan(case)
-        track, x = make_track_spec(case, plan), get_point(findings.best_track(case))
-        ideal_x = get_point(findings.best("ideal", case))
-        yield make_computation(f"replay-{case}", ideal, partial(replay_ideal, ideal), x=ideal_x)
-        jerk = findings.plan(case, "jerk")
+        plan, jerk, x = findings.plan(case), findings.plan(case, "jerk"), get_point(findings.best_track(case))
+        track = make_track_spec(case, plan)
         yield make_computation(f"printed-{case}", track, run_printed_scheme, case=case, plan=plan, jerk=jerk, x=x)
         for what, used in (("plan", plan), ("jerk", jerk)):
             spec = make_track_spec(case, used)
@@ -311,21 +304,6 @@ def track_with_network(case: int, plan: Mapping[str, float], x: list[float]) -> 
         angles.append(problem.signals(np.array(x)).arrays["q_desired"])
     error = np.abs(angles[0] - angles[1])[:, [LINKS.index(link) for leg in LEGS for link in leg]]
     return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
-
-
-def replay_ideal(ideal: ProblemSpec, x: list[float]) -> dict[str, float | None]:
-    """Replay the torques of an ideal step by another integrator: errors of the pose with feedback, and without."""
-    arrays = ideal.load().signals(np.array(x)).arrays
-    _, followed = replay(arrays, FEEDBACK)
-    time, fallen = replay(arrays, OPEN_LOOP)
-    off = np.maximum.accumulate(np.abs(fallen).max(axis=1))
-    return {
-        "feedback_end_rad": float(np.abs(followed[-1]).max()),
-        "open_loop_t1_rad": float(off[time <= PAPER_TIMES[0]][-1]),
-        "open_loop_t2_rad": float(off[time <= PAPER_TIMES[1]][-1]),
-        "open_loop_lost_s": float(time[np.argmax(off > LOST_RAD)]) if off[-1] > LOST_RAD else None,
-        "open_loop_end_rad": float(np.abs(fallen[-1]).max()),
-    }
 
 
 def difference_angles(case: int, plan: Mapping[str, float]) -> dict[str, float]:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from compare.papers.stairs.stairs_motion import FEEDBACK, OPEN_LOOP, replay
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
+from tests.gaits.stairs.replay import FEEDBACK, OPEN_LOOP, replay
 
 # Optima of an independent prototype of the same formulation, cases of Table IV.
 KNOWN = {1: 43.95, 2: 42.82, 3: 46.02}
