@@ -23,7 +23,7 @@ from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.formulation.result import load_result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.certificate import proven_bound
+from nlp_gait.proofs.certificate import load_certificates
 
 FILE = Path(str(compare.study.__file__)).with_name("best_known.json")
 # A point with a violation below the tolerance may be better than the optimum by about this, relatively.
@@ -43,16 +43,14 @@ def from_gaitbench() -> Iterator[Found]:
     """Yield the instances; their points have no violation at all, so they come first."""
     for id in gaitbench.names():
         instance = gaitbench.load(id)
-        evidence, definition = instance.evidence, instance.definition
-        runs = evidence.cma_runs
+        evidence, runs = instance.evidence, instance.evidence.cma_runs
         found_by = f"{evidence.starts} start{'s' * (evidence.starts > 1)} of IPOPT"
-        fixed = load(definition.problem, **definition.options).with_values(**definition.values).fix(**definition.held)
-        proven_as = identify_problem(fixed)[HASH] if definition.held else ""
+        proof, own = load_certificates().get(id), identify_problem(instance.gait_problem)[HASH]
         yield Found(
             instance.gait_problem,
             instance.best_x.tolist(),
             found_by + f" and {runs} long runs of CMA-ES" * (runs > 0),
-            proven_as if proven_bound({HASH: proven_as}) is not None else "",
+            "" if proof is None or proof.problem[HASH] == own else proof.problem[HASH],
         )
 
 

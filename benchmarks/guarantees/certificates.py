@@ -32,9 +32,17 @@ WALK = "walk12-lambda-"
 
 
 def make_instance(id: str) -> tuple[GaitProblem, Array]:
-    """Return the problem of an instance, with its fixed variables in equal bounds, and its best known x."""
+    """Return the problem of an instance in a form that can be enclosed, and its best known x.
+
+    Fixed variables have equal bounds. Two steps of half a second have twice the Q of one, so that one step with twice the
+    ``f1max`` has the same objective; the number of steps is a jump, of which an enclosure of 1 / T contains both sides.
+    """
     definition = get_definition(id)
     problem = nlp_gait.load(definition.problem, **definition.options).with_values(**definition.values)
+    if definition.options.get("horizon") == "1s":
+        steps = round(1.0 / problem.value("step_time_s"))
+        problem = nlp_gait.load(definition.problem, **{**definition.options, "horizon": "step"})
+        problem = problem.with_values(**definition.values, f1max=steps * problem.value("f1max"))
     free = iter(load_facts()[id].best_x)
     x = np.array([definition.held[name] if name in definition.held else next(free) for name in problem.names])
     return problem.fix(**definition.held), x

@@ -57,7 +57,7 @@ class Shipped:
     objective: float  # in the problem's sense
     x: tuple[float, ...]  # (n,) its point; its total violation is at most the judge's tolerance
     found_by: str  # solvers and their number of runs, in words
-    # Hash of the problem of the certificate, where that one fixes variables that are constants of this one
+    # Hash of the certificate's problem where it is another form of this one, such as with fixed variables for constants
     proven_as: str = ""
 
 

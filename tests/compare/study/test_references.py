@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import nlp_gait
@@ -15,7 +16,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH, identify_problem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import load_facts
-from nlp_gait.proofs.certificate import CERTIFICATES
+from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates
 
 
 def of_instance(id: str) -> Reference:
@@ -28,7 +29,9 @@ def test_every_certificate_belongs_to_a_shipped_value() -> None:
         assert json.loads(path.read_text())["problem"][HASH] in known, path.name
 
 
-@pytest.mark.parametrize("id", ["ssp-v5-time10", "ssp-v5-lift24", "ssp-v5-time20", "dsp-v5", "walk12-w015"])
+@pytest.mark.parametrize(
+    "id", ["ssp-v5-time10", "ssp-v5-lift24", "ssp-v5-time20", "dsp-v5", "walk12-w015", "walk12-fast-w015"]
+)
 def test_an_instance_has_its_proof_also_where_it_holds_variables_constant(id: str) -> None:
     known = of_instance(id)
     assert known.objective is not None and known.bound is not None and known.source.startswith("shipped, proven to ")
@@ -38,6 +41,20 @@ def test_an_instance_has_its_proof_also_where_it_holds_variables_constant(id: st
     values = build_exact_model(instance.gait_problem).at(known.x, instance.gait_problem.p)
     assert abs(values.cost) == pytest.approx(known.objective, rel=1e-9)
     assert values.violation <= FEASIBILITY_TOLERANCE
+
+
+@pytest.mark.parametrize("id", ["ssp-v5-time10", "dsp-v5-time05", "walk12-fast-w015", "walk12-fast-w100"])
+def test_a_certificate_in_another_form_is_of_the_same_problem(id: str) -> None:
+    instance, stored = gaitbench.load(id), load_certificates()[id].problem
+    own = instance.gait_problem
+    form = nlp_gait.load(stored["name"], **stored["options"]).with_values(**stored["parameters"])
+    held = instance.definition.held
+    for x in np.random.default_rng(0).uniform(own.lower, own.upper, (20, len(own.names))):
+        free = iter(x)
+        z = np.array([held[name] if name in held else next(free) for name in form.names])
+        found, wanted = build_exact_model(form).at(z, form.p), build_exact_model(own).at(x, own.p)
+        assert found.cost == pytest.approx(wanted.cost, rel=1e-12)
+        assert found.violation == pytest.approx(wanted.violation, rel=1e-9, abs=1e-12)
 
 
 def test_the_suite_and_the_shipped_values_agree() -> None:
