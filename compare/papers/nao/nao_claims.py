@@ -17,6 +17,7 @@ from compare.papers.claims import (
     Check,
     Verdict,
     compare_changes,
+    compare_levels,
     decide,
     require_change,
     require_significance,
@@ -72,6 +73,15 @@ def _check_more_pairs(phase: PhaseFindings) -> Check:
         printed, lead, swarm=NAMES["pso"], printed_lead=printed, lead=lead, pairs=len(pso), p=p, wins=100 * a12(pso, ga)
     )
     return require_significance(check, RANK_SUM, p)
+
+
+def _check_statistic(phase: PhaseFindings) -> Check:
+    printed, runs = phase.paper.test, 11
+    variance = runs * runs * (2 * runs + 1) / 12
+    z = (printed.rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(variance)
+    p = math.erfc(abs(z) / math.sqrt(2))
+    both = [printed.z, printed.p_two_sided, printed.p_less]
+    return compare_levels(both, [z, p, p / 2], test=printed, z=z, p=p, p_less=p / 2)
 
 
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
@@ -370,6 +380,7 @@ CHECKS: dict[str, Callable[[NaoFindings], Check]] = {
     **GAIT_CHECKS,
 }
 for _suffix, _phase in (("ssp", SSP), ("dsp", DSP)):
+    CHECKS[f"statistic-{_suffix}"] = _in(_phase, _check_statistic)
     CHECKS[f"better-{_suffix}-more"] = _in(_phase, _check_more_pairs)
     CHECKS[f"higher-hip-{_suffix}"] = _in(_phase, _check_higher_hip)
     CHECKS[f"slower-{_suffix}"] = _in(_phase, _check_slower)

@@ -11,11 +11,12 @@ import numpy as np
 from compare.papers.claims import Check, Verdict, compare_changes, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, get_point, list_objectives
 from compare.papers.walk12.walk12_findings import Walk12Findings, compute_hip_miss, compute_stable_share
-from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow, find_row
+from compare.papers.walk12.walk12_paper import F1_CHANGES, F1MAX, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import GA, HORIZONS, PAPER, compute_f1, find_f1max, title_table_4
 from compare.papers.walk12.walk12_walks import DRIVES, ROBOT_STEP_S, STEP_TIMES_S, WalkedGait
 from compare.study.task import IPOPT
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_problem import PRINTED_STEPS
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 
 STATIC_WEIGHT = 0.2  # the paper: dynamic walking below
@@ -71,6 +72,12 @@ def _check_fastest(findings: Walk12Findings) -> Check:
     tie = max(point.at for point in findings.weighted if point.step_length_m > first.step_length_m - DIGIT_M)
     lead = 1e3 * (first.step_length_m - longest)
     return require_change(round(lead, 3), s=1e3 * first.step_length_m, weight=first.at, others=1e3 * longest, tie=tie)
+
+
+def _check_motor_mass(_: Walk12Findings) -> Check:
+    robot = load_point_mass_biped()
+    mass = 2 * (robot.knee_mass_kg + robot.foot_mass_kg + robot.hip_mass_kg) + robot.waist_mass_kg
+    return compare_levels(0.07, mass / 12, mass=mass, each=mass / 12)
 
 
 def _check_steps(findings: Walk12Findings) -> Check:
@@ -268,6 +275,13 @@ CHECKS: dict[str, Callable[[Walk12Findings], Check]] = {
     "optimal": _check_optimal,
     "steps": _check_steps,
     "fastest": _check_fastest,
+    "motor-mass": _check_motor_mass,
+    "moments": lambda _: compare_levels(
+        np.zeros(2), F1_CHANGES["rods"], rods=F1_CHANGES["rods"], spheres=F1_CHANGES["spheres"]
+    ),
+    "time-steps": lambda _: compare_levels(
+        300_000, GA.population * PRINTED_STEPS, steps=PRINTED_STEPS, population=GA.population
+    ),
     "variables": _check_variables,
     "fitness": _check_fitness,
     "inverse-kinematics": lambda _: compare_levels(0.0, 1e3 * compute_hip_miss(), miss=1e3 * compute_hip_miss()),

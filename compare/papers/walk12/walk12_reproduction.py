@@ -23,7 +23,7 @@ from compare.papers.walk12.walk12_findings import (
     compute_hip_miss,
     compute_straightest_knee,
 )
-from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
+from compare.papers.walk12.walk12_paper import F1_CHANGES, F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
 from compare.papers.walk12.walk12_walks import DRIVES, PERTURBATION_RAD, WALKED_STEPS, WalkedGait
 from compare.report.document import Rows, Table, Value
@@ -170,6 +170,7 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "up_mm": 1e3 * load_point_mass_biped().foot_com_height_m,
         "lift_mm": 1e3 * find_row(0.15).x[2],
         "stable": findings.stable[-1],
+        "f1_read": F1_CHANGES,
         "stable_intervals": ", ".join(
             f"{findings.stable[k].first_s:.2f} to {findings.stable[k].last_s:.2f} s at λ = {TABLE_3[k].weight:g}"
             for k in (0, 1, -1)

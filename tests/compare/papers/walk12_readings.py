@@ -32,7 +32,7 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
     """Return f1 [1/(m^2 s)] at T = 1 s by (14), as in the problem and with what the paper leaves open read in another way.
 
     "ground": heights of the masses from the ground, with an ankle at the height L of the foot's mass above it; "g": 9.8 m/s^2;
-    "foot": the foot's mass stays at the height L above its ankle; "moments": (13) with M of uniform rods for thighs and shanks,
+    "foot": the foot's mass stays at the height L above its ankle; "rods": (13) with M of uniform rods for thighs and shanks,
     a tenth of the actuators' mass in all; "spheres": with M of the spheres that are the legs' masses in the engine.
     """
     robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
@@ -68,7 +68,7 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
         "ground": f1(P, A, base=up),
         "g": f1(P, A, g=9.8),
         "foot": f1(P_foot, A_foot),
-        "moments": moments["rods"],
+        "rods": moments["rods"],
         "spheres": moments["spheres"],
     }
 
