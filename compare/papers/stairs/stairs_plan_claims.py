@@ -45,7 +45,7 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
     return {
         "plans": {what: _collect(findings, what) for what in ("jerk", "plan", "first", "landing")},
         "by_quanta": {what: {name: _get_peaks(findings, name, what) for name in PEAKS} for what in PLANS},
-        "between": "; ".join(", ".join(findings.best("jerk", case).verdict.violated[:1]) for case in findings.cases),
+        "between": "; ".join([*findings.best("jerk", case).verdict.violated, "none"][0] for case in findings.cases),
         "plan_effect": {name: _describe_effect(findings, name) for name in PLAN_CHOICES},
         "eq": compute_printed(findings),
         "drawn_case": DRAWN_CASE,
@@ -174,8 +174,7 @@ def _describe_hips(findings: StairsFindings) -> dict[str, str | Series]:
     """Return by case how many starts with the printed height of the hip are feasible, and the worst violation of the best."""
     best = {case: findings.best("hip", case).verdict for case in findings.cases}
     feasible = Series(sum(run.verdict.feasible for run in findings.runs[f"hip-{case}", IPOPT]) for case in best)
-    worst = "; ".join(", ".join(run.violated[:1]) or "nothing" for run in best.values())
-    return {"feasible": feasible, "worst": worst}
+    return {"feasible": feasible, "worst": "; ".join([*run.violated, "nothing"][0] for run in best.values())}
 
 
 def _check_step(what: str) -> Checker:
