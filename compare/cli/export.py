@@ -60,18 +60,27 @@ def export_solver(
     to: Annotated[Path, typer.Option("--to", help="Folder for the files.")],
     *,
     problem: NamedProblem,
+    nl: Annotated[
+        bool,
+        typer.Option("--nl", help="Write an .nl file for AMPL's solvers instead, with names and best known value."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
 
     The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
 
-    Example: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`
+    Examples: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
+    `nlp-gait export-solver nao-ssp --to DIR --nl`
     """
+    from compare.study.references import find_reference
+    from nlp_gait.backends.identity import identify_problem
+    from nlp_gait.export.nl_file import export_nl
     from nlp_gait.export.solver import export_solver as write
 
     loaded = problem.spec().load()
-    print_result(as_json, {"problem": loaded.address}, write(loaded, to), lambda: None)
+    written = export_nl(loaded, to, find_reference(identify_problem(loaded)).to_json()) if nl else write(loaded, to)
+    print_result(as_json, {"problem": loaded.address}, written, lambda: None)
 
 
 @command

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import json
 import math
 import re
 from collections.abc import Iterator
@@ -35,6 +36,13 @@ INTRODUCTION = """# Problems
 Each page is generated from the problem; figures of solvers were measured by `python -m benchmarks.difficulty` with default
 options and values. Near: within 0.1 % of the best known point. [GaitBench](../../gaitbench.md) freezes variants of them, and
 [your own](../../bring-your-own.md) is used as `FILE.py:NAME`."""
+SIZES = Path(__file__).parents[1] / "nlp_sizes.json"
+KEYS = ("variables", "lifted", "constraints", "equations", "jacobian", "hessian")  # of SIZES
+SIZES_INTRODUCTION = """## Sizes of the NLPs
+
+What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
+measured by `python -m benchmarks.nlp_sizes`. `nlp-gait export-solver PROBLEM --to DIR --nl` writes one as an `.nl` file,
+[for solver developers](../../gaitbench.md#nlps-for-solver-developers)."""
 PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 
 
@@ -51,8 +59,23 @@ def write(folder: Path) -> None:
     pages = {f"{name}.md": problem_page(problem, measured.get(name), folder) for name, problem in problems.items()}
     header = ("problem", "what", "variables", "best known", "feasible points", "IPOPT near", "searches near")
     rows = [_overview(problem, measured.get(name)) for name, problem in problems.items()]
-    pages["index.md"] = page(INTRODUCTION, table(header, rows), toctree(problems))
+    pages["index.md"] = page(INTRODUCTION, table(header, rows), SIZES_INTRODUCTION, nlp_sizes(), toctree(problems))
     write_all(folder, pages)
+
+
+def nlp_sizes() -> str:
+    """Return the table of the NLPs' sizes."""
+    measured = json.loads(SIZES.read_text(encoding="utf-8"))
+    header = (
+        "problem",
+        "variables",
+        "of these lifted",
+        "constraints",
+        "of these equations",
+        "nonzeros of the Jacobian",
+        "of the Hessian",
+    )
+    return table(header, [(f"`{name}`", *(f"{measured[name][key]:,}" for key in KEYS)) for name in names()])
 
 
 def _overview(problem: GaitProblem, found: Difficulty | None) -> tuple[str, ...]:

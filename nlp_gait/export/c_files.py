@@ -37,11 +37,16 @@ def write_c_files(
         texts[name.format(prefix=prefix)] = text
     paths = {make_writable_folder(folder) / name: text for name, text in texts.items()}
     for path in paths:
-        if path.is_file() and MARK not in path.read_bytes()[:LARGEST_MARKED]:
-            raise OutputError(f"cannot write {str(path)!r}: nlp-gait did not write this file; name another folder")
+        check_own_file(path)
     for path, text in paths.items():
         write_text(path, text)
     return list(paths)
+
+
+def check_own_file(path: Path) -> None:
+    """Raise OutputError if there is a file that this package did not write."""
+    if path.is_file() and MARK not in path.read_bytes()[:LARGEST_MARKED]:
+        raise OutputError(f"cannot write {str(path)!r}: nlp-gait did not write this file; name another folder")
 
 
 def format_comment(lines: Iterable[str]) -> str:

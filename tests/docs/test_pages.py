@@ -16,6 +16,7 @@ from docs.check import faults_of
 from docs.pages import algorithms, api, commands, problems
 from docs.pages.gallery import ORDER
 from docs.pages.markdown import literal, table
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.formulation import load, problem_names
 
 ROOT = Path(__file__).parents[2]
@@ -87,6 +88,14 @@ def test_every_problem_has_a_page() -> None:
 
 
 @pytest.mark.slow
+def test_the_sizes_of_the_nlps_are_those_of_today() -> None:
+    rows = {line.split("`")[1]: line.split(" | ") for line in problems.nlp_sizes().splitlines() if "`" in line}
+    assert set(rows) == set(problems.names())
+    for name in ("walk12", "nao-dsp"):
+        model = build_nlp(load(name))
+        assert rows[name][1:4] == [str(model.nlp["x"].numel()), str(model.lifted), str(model.nlp["g"].numel())]
+
+
 def test_the_page_of_a_problem_is_made_from_the_problem(tmp_path: Path) -> None:
     problem, found = load("nao-dsp"), problems.difficulties()["nao-dsp"]
     page = problems.problem_page(problem, found, tmp_path)
