@@ -83,6 +83,7 @@ class Start:
         evaluations: Budget of the run, a hint for algorithms that plan ahead.
         rng: The only source of randomness of the search.
         constraints: Separate constraints, for searches that use them; None where only the total violation is available.
+        names: The n names of the variables.
     """
 
     lower: Array
@@ -91,6 +92,7 @@ class Start:
     evaluations: int
     rng: np.random.Generator
     constraints: Constraints | None = None
+    names: tuple[str, ...] = ()
 
     def inequalities(self, X: Array, violation: Array) -> Array:
         """Return each constraint's value (P, c) at points (P, n); without `constraints`, the violation (P,) as the only one."""

@@ -32,6 +32,7 @@ def prepare_start(
         evaluations=evaluations,
         rng=np.random.default_rng(spawn_child(seed, 1)),
         constraints=Constraints(inequalities=values, groups=tuple(groups)) if callable(values) and groups else None,
+        names=tuple(objective.names),
     )
 
 
@@ -167,21 +168,23 @@ def name_of(algorithm: Algorithm) -> str:
     return str(getattr(algorithm, "name", type(algorithm).__name__))
 
 
-def check_points(asked: object, lower: Array, upper: Array) -> Array:
-    """Return the points (P, n) of an `ask`; SearchError for another shape, no point, NaN, or a point outside the bounds."""
+def check_points(asked: object, lower: Array, upper: Array, source: str = "ask") -> Array:
+    """Return the points (P, n) of a source; SearchError for another shape, no point, NaN, or a point outside the bounds."""
     try:
         points = real_array(asked)
     except (TypeError, ValueError) as error:
         raise SearchError(
-            f"ask must return points (P, {len(lower)}); it returned something other than numbers: {error}"
+            f"{source} must return points (P, {len(lower)}); it returned something other than numbers: {error}"
         ) from error
     if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
-        raise SearchError(f"ask must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}")
+        raise SearchError(
+            f"{source} must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}"
+        )
     outside = _find_outside(points, lower, upper)
     if outside is not None:
         row, column = outside
         raise SearchError(
-            f"ask returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
+            f"{source} returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
             f"{lower[column]}..{upper[column]}: clip the points"
         )
     return points

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from metaheuristics.array import real_array
+from metaheuristics.array import Array, real_array
+from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import Algorithm, CallingSearch, Evaluate, Start
 from metaheuristics.preparation import check_population
@@ -112,6 +113,12 @@ def takes_function_arguments(function: Callable[..., object], settings: Mapping[
     return True
 
 
+def combine(f: Array, violation: Array, rule: Rule) -> Array:
+    """Return one number (P,) for objective and constraints that orders points as the rule does; see `PlainFunction`."""
+    major, minor = rule.keys(f, violation)
+    return np.where(np.isfinite(f), np.where(major > 0.0, INFEASIBLE + major, minor), FAILED)
+
+
 class FunctionSearch(CallingSearch):
     """A run of `PlainFunction`."""
 
@@ -130,9 +137,7 @@ class FunctionSearch(CallingSearch):
                 raise SearchError(f"f was called with something other than numbers: {error}") from error
             if points.ndim not in (1, 2) or points.shape[-1] != n or not points.size:
                 raise SearchError(f"f takes one point of shape ({n},) or points of shape (P, {n}); got {points.shape}")
-            values, violation, rule = evaluate(np.array(points, ndmin=2))
-            major, minor = rule.keys(values, violation)
-            cost = np.where(np.isfinite(values), np.where(major > 0.0, INFEASIBLE + major, minor), FAILED)
+            cost = combine(*evaluate(np.array(points, ndmin=2)))
             return float(cost[0]) if points.ndim == 1 else cost
 
         start, settings = self._start, self._settings

@@ -1,4 +1,4 @@
-"""User code by name: ``file.py:name``, ``module:name``, or an entry point of an installed package.
+"""User code by name: ``file.py:name``, ``module:name``, an entry point of an installed package, or ``cmd:COMMAND``, a program.
 
 Code runs because the user named it in a call, or because it is installed. A name in a data file runs nothing: it must match code
 that was named in this process (``resolve_code``). A file runs once per content: after an edit it is another module.
@@ -11,6 +11,9 @@ import hashlib
 import importlib
 import importlib.util
 import os
+import re
+import shlex
+import shutil
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -31,7 +34,8 @@ Kind = Literal["problem", "algorithm"]
 # Groups of entry points, for ``[project.entry-points."nlp_gait.problems"]`` of another package.
 GROUPS: Mapping[Kind, str] = {"problem": "nlp_gait.problems", "algorithm": "nlp_gait.algorithms"}
 ENDING = ".py"
-LARGEST_SOURCE = 4 * 2**20  # bytes
+PROGRAM = "cmd:"
+LARGEST_SOURCE = 64 * 2**20  # bytes; a program may be compiled
 
 _allowed: dict[str, str] = {}
 
@@ -40,12 +44,12 @@ class Reference(NamedTuple):
     """Place of an object in user code."""
 
     home: str  # absolute path of a file, or dotted name of a module
-    name: str  # of the object in it
+    name: str  # of the object in it; the text itself for a program
 
     @property
     def is_file(self) -> bool:
         """Whether the home is a file."""
-        return self.home.endswith(ENDING)
+        return os.path.isabs(self.home)
 
     @property
     def short(self) -> str:
@@ -53,11 +57,16 @@ class Reference(NamedTuple):
         return f"{Path(self.home).name if self.is_file else self.home}:{self.name}"
 
 
+def is_program(text: str) -> bool:
+    """Return whether a text has the form ``cmd:COMMAND``."""
+    return text.startswith(PROGRAM)
+
+
 def is_reference(text: str) -> bool:
-    """Return whether a text has the form ``file.py:name`` or ``module:name``."""
+    """Return whether a text has the form ``file.py:name``, ``module:name`` or ``cmd:COMMAND``."""
     home, colon, name = text.rpartition(":")
     is_module = all(part.isidentifier() for part in home.split("."))
-    return bool(colon) and name.isidentifier() and (home.endswith(ENDING) or is_module)
+    return is_program(text) or (bool(colon) and name.isidentifier() and (home.endswith(ENDING) or is_module))
 
 
 def is_user_code(text: str, kind: Kind) -> bool:
@@ -73,11 +82,15 @@ def find_entry_points(kind: Kind) -> Mapping[str, str]:
 
 def shorten_name(text: str) -> str:
     """Return the name of the object alone, for tables and file names; an entry point's name is returned unchanged."""
+    if is_program(text):
+        return Path(_find_program_file(text)).stem
     return text.rpartition(":")[2] if is_reference(text) else text
 
 
 def parse_reference(text: str, kind: Kind) -> Reference:
     """Return the place of an object from a reference or the name of an entry point."""
+    if is_program(text):
+        return Reference(_find_program_file(text), text)
     home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
     return Reference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
 
@@ -106,13 +119,40 @@ def resolve_code(text: str, kind: Kind, owner: str) -> str:
     return _allowed[short] or text
 
 
+def parse_command(text: str) -> tuple[str, ...]:
+    """Return the words of ``cmd:COMMAND``.
+
+    Raises:
+        UserCodeError: there is none, a quote is not closed, or the program is not on this machine.
+    """
+    try:
+        words = tuple(shlex.split(text.removeprefix(PROGRAM)))
+    except ValueError as error:
+        raise UserCodeError(f"{text!r}: {error}; write {PROGRAM} and a command as in a shell") from error
+    if not words:
+        raise UserCodeError(f"{text!r} names no program; write for example {PROGRAM}octave-cli --quiet my_ga.m")
+    if shutil.which(words[0]) is None:
+        raise UserCodeError(f"{text!r}: no program {words[0]!r} on this machine; install it, or give its path")
+    return words
+
+
+def _find_program_file(text: str) -> str:
+    """Return the absolute path of a command's own file: the script that it names, else the program."""
+    words = parse_command(text)
+    own = [word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word))]
+    return os.path.abspath(own[0] if own else shutil.which(words[0]) or words[0])
+
+
 def hash_source(text: str, kind: Kind) -> str:
     """Return the hash of the source of an object, see ``hash_file``; nothing is run."""
     return hash_file(Path(_read_source(parse_reference(text, kind), text)[0]))
 
 
 def hash_file(path: Path) -> str:
-    """Return the hash of a source file and of the files in its folder that it imports, directly or not."""
+    """Return the hash of a source file and of the files in its folder that it imports, directly or not.
+
+    A file that is not Python's imports those of the same ending whose names occur in it.
+    """
     contents = _read_with_imports(path).values()
     return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in contents)).hexdigest()
 
@@ -125,16 +165,21 @@ def list_source_files(text: str, kind: Kind) -> list[Path]:
 def _read_with_imports(path: Path) -> dict[Path, bytes]:
     files, waiting = {path: _read(path)}, [path]
     while waiting:
-        for file in _find_imports(files[waiting.pop()], path.parent):
+        for file in _find_imports(files[waiting.pop()], path):
             if file not in files:
                 files[file] = _read(file)
                 waiting.append(file)
     return files
 
 
-def _find_imports(content: bytes, folder: Path) -> Iterator[Path]:
+def _find_imports(content: bytes, path: Path) -> Iterator[Path]:
+    """Yield the files beside the file of an object, at ``path``, that a source imports."""
+    if path.suffix != ENDING:
+        words = set(re.findall(rb"\w+", content)) if path.suffix else ()
+        yield from (file for file in sorted(path.parent.glob(f"*{path.suffix}")) if os.fsencode(file.stem) in words)
+        return
     for name in filter(None, _parse_imports(content)):
-        stem = folder.joinpath(*name.split("."))
+        stem = path.parent.joinpath(*name.split("."))
         yield from (file for file in (stem.with_suffix(ENDING), stem / "__init__.py") if file.is_file())
 
 
@@ -162,6 +207,8 @@ def check_reference(text: str, kind: Kind) -> None:
         UnknownNameError: no such name at its top level.
     """
     place = parse_reference(text, kind)
+    if is_program(text):
+        return
     try:
         tree = ast.parse(_read_source(place, text)[1])
     except (SyntaxError, ValueError):
@@ -191,6 +238,8 @@ def load_object(text: str, kind: Kind) -> object:
         UserCodeError: no such file or module, or it fails.
         UnknownNameError: no such name in it.
     """
+    if is_program(text):
+        raise UserCodeError(f"{text!r} is a program: it can be an algorithm, not a {kind}")
     place = parse_reference(text, kind)
     path, content = _read_source(place, text)
     if place.is_file:

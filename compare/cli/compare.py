@@ -84,7 +84,7 @@ def compare(
 
     Every finished run is stored: the same command, or `--resume`, continues an interrupted study. More runs, solvers, problems
     or a larger budget in the same folder extend it; runs whose algorithm, problem or robot was edited are recomputed. Your own
-    problems and algorithms are named as `FILE.py:NAME`.
+    problems and algorithms are named as `FILE.py:NAME`, and a program in any language as `cmd:COMMAND`.
     With `--engine` the report includes every solver's best gait in a physics engine, and whether it confirms the model.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,

@@ -133,7 +133,9 @@ def _overview(as_json: bool) -> None:
         if listed:
             packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
             stdout.print(f"{kind} of other installed packages: {packages}")
-    stdout.print("your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME")
+    stdout.print(
+        "your own problem or algorithm can be used by name: FILE.py:NAME or MODULE:NAME; a program: cmd:COMMAND"
+    )
 
 
 def _details(name: str, given: Mapping[str, Any], as_json: bool) -> None:

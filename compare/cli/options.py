@@ -203,7 +203,7 @@ def name_all(code: Sequence[str] | None) -> None:
     """Allow files of data to use this code of the user; raises InputError for a text that is not a reference."""
     for text in code or ():
         if not is_reference(text):
-            raise InputError(f"--code takes FILE.py:NAME or MODULE:NAME, got {text!r}")
+            raise InputError(f"--code takes FILE.py:NAME, MODULE:NAME or cmd:COMMAND, got {text!r}")
         allow_code(text, "problem")
         allow_code(text, "algorithm")
 

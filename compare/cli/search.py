@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 def search(
     *,
     algorithm: Annotated[
-        str, typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...; or your own, FILE.py:NAME.")
+        str,
+        typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...; or your own, FILE.py:NAME or cmd:COMMAND."),
     ] = "pso",
     searches: SearchOptions,
     problem: NamedProblem,

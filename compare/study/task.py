@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from compare.study.definition import hash_solver_source, select_shared
+from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, algorithm, handling
@@ -24,7 +25,16 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load
 from nlp_gait.providers import PROBLEMS
-from nlp_gait.user_code import check_reference, find_entry_points, hash_source, is_user_code, load_object, shorten_name
+from nlp_gait.user_code import (
+    check_reference,
+    find_entry_points,
+    hash_source,
+    is_program,
+    is_user_code,
+    load_object,
+    parse_command,
+    shorten_name,
+)
 
 IPOPT = "ipopt"
 GRADIENT_SOLVERS = tuple(SOLVERS)
@@ -107,8 +117,8 @@ class Task:
     """One run."""
 
     problem: ProblemSpec
-    #: name, or user code as ``file.py:name`` or ``module:name``, or a picklable search algorithm or plain function (see
-    #: ``metaheuristics.as_algorithm``)
+    #: name, or user code as ``file.py:name``, ``module:name`` or ``cmd:COMMAND``, or a picklable search algorithm or plain
+    #: function (see ``metaheuristics.as_algorithm``)
     solver: str | Algorithm | Callable[..., object]
     settings: Mapping[str, Any] = field(default_factory=dict)  #: of the named solver, that differ from its defaults
     handling: Handling = field(default_factory=Handling)  #: of constraints, in searches
@@ -184,6 +194,8 @@ class Task:
 
     def make_search(self) -> Algorithm:
         """Return the search with its settings; this first runs user code. Raises SearchError for no search, and UserCodeError."""
+        if isinstance(self.solver, str) and is_program(self.solver):
+            return ExternalProgram(command=parse_command(self.solver), name=self.title, settings=self.settings)
         own = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
         if isinstance(own, str):
             return algorithm(own, **self.settings)
