@@ -195,7 +195,8 @@ class Task:
     def make_search(self) -> Algorithm:
         """Return the search with its settings; this first runs user code. Raises SearchError for no search, and UserCodeError."""
         if isinstance(self.solver, str) and is_program(self.solver):
-            return ExternalProgram(command=parse_command(self.solver), name=self.title, settings=self.settings)
+            program = ExternalProgram(command=parse_command(self.solver), name=self.title, settings=self.settings)
+            return as_algorithm(program, self.title)
         own = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
         if isinstance(own, str):
             return algorithm(own, **self.settings)
