@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.ndimage import uniform_filter1d
 
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.drive import Drive
@@ -138,6 +136,8 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
 
 def predict_power(plan: Plan) -> Power:
     """Compute the power of the planned motion by the rigid model."""
+    from scipy.integrate import trapezoid
+
     arrays = plan.signals.arrays
 
     def mean(samples: Array) -> float:
@@ -148,6 +148,8 @@ def predict_power(plan: Plan) -> Power:
 
 def average_pressure(simulation: Simulation, period_s: float) -> Array:
     """Return the centre of pressure (T, 2), averaged over a moving period with the loads as weights [m]; NaN in flight."""
+    from scipy.ndimage import uniform_filter1d  # long to import, for a function that few commands call
+
     width = max(1, round(period_s / TIME_STEP))
     load = simulation.loads.sum(axis=1)
     moment = np.nan_to_num(simulation.pressure) * load[:, None]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, sample_finely
@@ -93,7 +93,9 @@ class Plan:
         return np.asarray(2 * (w * rate[1:] - rate[0] * np.array(vector) - np.cross(vector, rate[1:])))
 
     @cached_property
-    def _splines(self) -> dict[str, CubicSpline]:
+    def _splines(self) -> dict[str, Any]:
+        from scipy.interpolate import CubicSpline  # takes as long to import as all else that a command needs
+
         arrays = self.signals.arrays
         names = ("q", "zmp", "hip", *(f"{side}_foot" for side in SIDES))
         return {name: CubicSpline(arrays["t"], arrays[name]) for name in names}

@@ -28,8 +28,8 @@ def test_random_gaits_are_feasible_and_seeded():
 def test_too_few_feasible_gaits_are_an_error(monkeypatch):
     monkeypatch.setattr(gaits, "DRAWS", 1)
     monkeypatch.setattr(gaits, "BATCH", 10)
-    with pytest.raises(InputError, match=r"of 10 random gaits of 'nao-cycle' are feasible, of 30 required"):
-        gaits.random_gaits(nlp_gait.load("nao-cycle"), 30)
+    with pytest.raises(InputError, match=r"of 10 random gaits of 'nao-dsp' are feasible, of 30 required"):
+        gaits.random_gaits(nlp_gait.load("nao-dsp"), 30)
 
 
 @pytest.mark.slow

@@ -115,7 +115,9 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
 
 
 @pytest.mark.slow
-def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sweep_writes_the_points_that_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
+) -> None:
     press_after(monkeypatch, IterationWatch, "eval", 60)
     over = ["--over", "step_length_m=0.05:0.12:30", "--starts", "1"]
     done = run("sweep", "walk12", *over, "--out", str(tmp_path))
@@ -126,7 +128,9 @@ def test_sweep_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.slow
-def test_sweep_by_a_search_writes_the_points_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sweep_by_a_search_writes_the_points_that_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
+) -> None:
     press_after(monkeypatch, CompiledObjective, "__call__", 30)
     over = ["--over", "step_length_m=0.05:0.12:30", "--algorithm", "pso", "--evaluations", "500"]
     done = run("sweep", "walk12", *over, "--out", str(tmp_path))
@@ -234,8 +238,7 @@ def a_gait(folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", ["gif", "png"])
-@pytest.mark.parametrize("calls", [1, 7, 40])
+@pytest.mark.parametrize(("calls", "ending"), [(1, "png"), (7, "gif"), (40, "png")])
 def test_animate_while_a_picture_is_drawn(
     calls: int, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

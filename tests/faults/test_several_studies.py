@@ -13,7 +13,7 @@ from compare.study.record import RunRecord
 from compare.study.record_files import find_record, read_records, write_record
 from compare.study.task import ProblemSpec, Stop, Task
 
-STUDIES, RUNS, ROUNDS = 6, 8, 3
+STUDIES, RUNS, ROUNDS = 6, 8, 2
 SPEC = ProblemSpec(name="walk12")
 
 

@@ -28,16 +28,16 @@ EXAMPLE = ROOT / "examples" / "bring_your_own.py"
 
 
 @pytest.mark.slow
-def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
+def test_four_threads_solve_one_problem_and_build_it_once() -> None:
     problem = nlp_gait.load("walk12")
-    points = [problem.start_point(np.random.default_rng(k)) for k in range(8)]
+    points = [problem.start_point(np.random.default_rng(k)) for k in range(4)]
     builds: list[str] = []
 
     def build(problem: GaitProblem) -> object:
         builds.append("built")
         return object()
 
-    together_at = threading.Barrier(8)
+    together_at = threading.Barrier(4)
 
     def solved(k: int) -> tuple[bool, float, bytes, float]:
         together_at.wait()
@@ -47,11 +47,11 @@ def test_eight_threads_solve_one_problem_and_build_it_once() -> None:
         judged = float(evaluate(problem, solution.x).objective["value"])
         return solution.converged, solution.objective, history.arrays["q"].tobytes(), judged
 
-    with ThreadPoolExecutor(8) as pool:
-        shared = list(pool.map(solved, range(8)))
+    with ThreadPoolExecutor(4) as pool:
+        shared = list(pool.map(solved, range(4)))
     assert builds == ["built"]
     together_at = threading.Barrier(1)
-    assert shared == [solved(k) for k in range(8)]
+    assert shared == [solved(k) for k in range(4)]
     assert all(success for success, *_ in shared)
 
 
@@ -117,7 +117,7 @@ def test_a_fork_waits_until_no_other_thread_is_inside_casadi() -> None:
 import os, threading, nlp_gait
 problem = nlp_gait.load("walk12")
 nlp_gait.solve(problem)
-busy = threading.Thread(target=lambda: nlp_gait.solve(problem, starts=30))
+busy = threading.Thread(target=lambda: nlp_gait.solve(problem, starts=12))
 busy.start()
 child = os.fork()
 if child == 0:

@@ -138,7 +138,7 @@ def test_a12_by_hand() -> None:
 
 
 @pytest.mark.slow
-@settings(derandomize=True, deadline=None)
+@settings(derandomize=True, deadline=None, max_examples=40)
 @given(a=costs, b=costs)
 def test_effect_size_and_tests_are_symmetric(a: list[float], b: list[float]) -> None:
     assert a12(a, b) == pytest.approx(1.0 - a12(b, a))

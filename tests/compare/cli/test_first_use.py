@@ -103,7 +103,7 @@ def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):
 
 def test_a_broken_pipe_does_not_lose_the_solution_file(tmp_path):
     target = tmp_path / "best.json"
-    command = f"{sys.executable} -P -m nlp_gait solve nao-dsp --starts 1 --out {target} | true"
+    command = f"{sys.executable} -P -m nlp_gait solve walk12 --starts 1 --out {target} | true"
     subprocess.run(command, shell=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)
     assert '"claimed": true' in target.read_text()
 

@@ -13,12 +13,14 @@ from compare.cli.compare import choose_solvers
 from compare.cli.options import SearchOptions
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
+pytestmark = pytest.mark.usefixtures("coarse_pages")
+
 STUDY = """
 runs = 1
 starts = 1
 evaluations = 300
 [[problem]]
-name = "nao-ssp"
+name = "walk12"
 [[solver]]
 name = "ipopt"
 [[solver]]
@@ -29,18 +31,16 @@ settings = {population = 20}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(coarse_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("study")
     (out / "study.toml").write_text(STUDY)
     done = as_json("compare", "--config", out / "study.toml", "--out", out / "out", "--jobs", "1")
-    assert [s["solver"] for s in done["problems"]["nao-ssp"]] == ["ipopt", "little-pso"]
+    assert [s["solver"] for s in done["problems"]["walk12"]] == ["ipopt", "little-pso"]
     assert all(Path(file).stat().st_size for file in done["files"])
     return out / "out"
 
 
-def test_resume_needs_no_other_option_and_keeps_everything(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
-) -> None:
+def test_resume_needs_no_other_option_and_keeps_everything(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = {path: path.stat().st_mtime_ns for path in folder.glob("records/*/*.json")}
     assert len(before) == 2
     arguments = ["compare", "--resume", "--out", str(folder), "--jobs", "1"]
@@ -51,7 +51,7 @@ def test_resume_needs_no_other_option_and_keeps_everything(
     assert len(sessions) >= 2 and "--resume" in sessions[-1]["command"] and sessions[-1]["machine"]["processor"]
 
 
-def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path, coarse_pictures: None) -> None:
+def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder / "records", tmp_path / "records")
     files = as_json("report", str(tmp_path), "--gradient-weight", "0", "--hessian-weight", "0")["files"]
     assert (tmp_path / "report.html").as_posix() in files

@@ -17,12 +17,12 @@ from compare.questions.motions import motion as module
 from compare.questions.motions.motion import Motion, extrapolate, find_start, load_phase, make_tasks
 from compare.questions.motions.motions import Motions, describe_motions
 from compare.questions.question import Work, find
-from compare.report import writing
 from compare.study.store import Store
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
-from tests.compare.pictures import save_coarsely
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 RUN = CliRunner()
 ORDERS = ["cubic", "quintic"]
@@ -66,7 +66,7 @@ def test_a_question_continues_from_its_files(
         find(replace(question, seed=1), Work(store=Store(folder)))
 
 
-def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...]) -> None:
     command = [
         "motions",
         "nao-dsp",
@@ -88,8 +88,7 @@ def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...], mon
     lines = list(csv.DictReader(written["nao-dsp-motions.csv"].read_text().splitlines()))
     assert [float(line["power_W"]) for line in lines] == [motion.power_W for motion in found]
     pictures = [path for path in written.values() if path.suffix in (".png", ".svg")]
-    assert len(pictures) == 4 and all(picture.stat().st_size > 10_000 for picture in pictures)
-    monkeypatch.setattr(writing, "save", save_coarsely)
+    assert len(pictures) == 4 and all(picture.stat().st_size > 0 for picture in pictures)
     printed = RUN.invoke(app, command).stdout
     assert all(words in printed for words in ("3 samples: quintic", "never rises", "and violates torque_change"))
 

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.questions.prices.price import AGREEMENT
 from compare.questions.prices.prices import Prices
-from compare.questions.question import find
+from compare.questions.question import Work, find
+from compare.study.store import Store
 from nlp_gait import load, make_solver
 from nlp_gait.errors import InputError
 
@@ -21,8 +22,14 @@ pytestmark = pytest.mark.usefixtures("coarse_pictures")
 RUN = CliRunner()
 
 
-def test_the_command_prices_every_limit_and_writes_table_and_picture(tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(tmp_path), "--json"])
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the stored solves of the question that the tests have in common."""
+    return tmp_path_factory.mktemp("prices")
+
+
+def test_the_command_prices_every_limit_and_writes_table_and_picture(folder: Path) -> None:
+    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(folder), "--json"])
     assert done.exit_code == 0, done.output
     answer = json.loads(done.stdout)
     assert answer["robot"] == [] and answer["weak"] == [] and answer["reason"] is None
@@ -31,20 +38,20 @@ def test_the_command_prices_every_limit_and_writes_table_and_picture(tmp_path: P
     # f holds (1 - lambda) s / f2max, so that its slope is -(1 - 0.15) 0.13 / 0.13^2.
     assert dearest["slope"] == pytest.approx(-0.85 / 0.13, rel=1e-6)
     written = [Path(name) for name in answer["files"]]
-    rows = list(csv.DictReader((tmp_path / "walk12-prices.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((folder / "walk12-prices.csv").read_text().splitlines()))
     assert [row["quantity"] for row in rows] == [price["name"] for price in answer["limits"]]
     assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
     assert all(path.stat().st_size > 0 for path in written)
 
 
-def test_the_table_says_units_and_steps(tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(tmp_path)])
+def test_the_table_says_units_and_steps(folder: Path) -> None:
+    done = RUN.invoke(app, ["prices", "walk12", "--starts", "2", "--out", str(folder)])
     assert done.exit_code == 0, done.output
     assert "step_length_m.upper" in done.stdout and "1 mm" in done.stdout and "1 degree" in done.stdout
 
 
-def test_slopes_agree_with_solving_again_where_it_can_be_done() -> None:
-    found = find(Prices(problem=load("walk12"), starts=2))
+def test_slopes_agree_with_solving_again_where_it_can_be_done(folder: Path) -> None:
+    found = find(Prices(problem=load("walk12"), starts=2), Work(store=Store(folder)))
     errors = [error for price in found.limits for error in (price.error, price.x_error) if error is not None]
     assert len(errors) > 6
     assert max(errors) < AGREEMENT
@@ -60,7 +67,7 @@ def test_a_solver_without_multipliers_has_no_prices() -> None:
 
 
 def test_a_fixed_variable_has_one_price() -> None:
-    found = find(Prices(problem=load("walk12").fix(step_length_m=0.1), starts=2))
+    found = find(Prices(problem=load("walk12").fix(step_length_m=0.1), starts=1))
     price = next(price for price in found.limits if price.name == "step_length_m")
     assert price.x is not None and price.x["step_length_m"] == pytest.approx(1.0)
     assert price.error is not None and price.error < AGREEMENT

@@ -51,7 +51,8 @@ def test_the_command_judges_simulates_and_compares_with_the_optimum(gait: Path, 
     assert set(planned.names) == set(found["optimum"]["x"])
 
 
-def test_tighter_limits_are_named(gait: Path) -> None:
+def test_tighter_limits_are_named(gait: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_optimum", lambda *_: None)
     shown = nlp_gait("evaluate", "--motion", gait, "--no-engine", "--set", "torque_change_limit_Nm=0.01").stdout
     assert "Infeasible on the samples" in shown and "torque_change[" in shown and "In the engine" not in shown
 
@@ -72,7 +73,7 @@ def test_wrong_use_is_one_sentence(arguments: list[str], words: str, gait: Path)
     assert words in one_sentence(*(a.replace("{gait}", str(gait)) for a in arguments))
 
 
-def test_missing_results_are_explained(gait: Path) -> None:
+def test_missing_results_are_explained(gait: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step on the spot has no optimum; a torso that leans at the beginning is not played."""
     angles = read_joint_angles(gait, load_robot("nao-v5"))
     q = np.array(angles.q)
@@ -80,7 +81,9 @@ def test_missing_results_are_explained(gait: Path) -> None:
         0.1  # the torso leans over straight legs
     )
     leaning = make_recorded_gait(JointAngles(owner="leaning", joints=angles.joints, t=angles.t, q=q), gait="nao-ssp")
-    judged = judge_gait(leaning)
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "_optimum", lambda *_: None)
+        judged = judge_gait(leaning)
     assert any("the torso leans by" in note for note in judged.notes) and judged.engine is None
     still = JointAngles(owner="still", joints=angles.joints, t=angles.t, q=np.tile(angles.q[0], (len(angles.t), 1)))
     standing = judge_gait(make_recorded_gait(still, gait="nao-ssp"), in_engine=False)

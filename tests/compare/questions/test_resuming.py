@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from compare.questions import local_optima, real_motors
+from compare.questions.prices import prices
 from compare.study.store import Store
 from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
@@ -53,6 +54,8 @@ class Killed(BaseException):
 @pytest.fixture(autouse=True)
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_optima, "BATCH", 2)
+    price_parameters = prices.price_parameters
+    monkeypatch.setattr(prices, "price_parameters", lambda optimum: price_parameters(optimum)[:4])
     monkeypatch.setattr(real_motors, "VARIANTS", dict(list(real_motors.VARIANTS.items())[:2]))
 
 

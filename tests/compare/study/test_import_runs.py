@@ -22,6 +22,8 @@ from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import GaitError
 from tests.compare.cli.calls import as_json, nlp_gait
 
+pytestmark = pytest.mark.usefixtures("coarse_pages")
+
 WALK = ProblemSpec(name="walk12")
 PROBLEM = WALK.load()
 POINTS = np.random.default_rng(0).uniform(PROBLEM.lower, PROBLEM.upper, (3, 4))

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -108,21 +109,20 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_killed_at_random_moments_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
+def test_killed_at_a_random_moment_and_resumed_it_ends_as_undisturbed(undisturbed: Path, tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from tests.compare.study.test_study import SMALL, Study, run_study\n"
         "if __name__ == '__main__': run_study(Study(tasks=SMALL.tasks(), folder=Path(sys.argv[1]), jobs=2))"
     )
-    moments = random.Random(4)
-    for _ in range(2):
-        process = subprocess.Popen(
-            [sys.executable, "-c", program, str(tmp_path)], cwd=Path(__file__).parents[3], start_new_session=True
-        )
-        try:
-            process.wait(moments.uniform(2.0, 6.0))
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path)], cwd=Path(__file__).parents[3], start_new_session=True
+    )
+    while process.poll() is None and len(list(tmp_path.glob("records/*/*.json"))) < 2:
+        time.sleep(0.01)
+    time.sleep(random.Random(4).uniform(0.0, 0.05))
+    with suppress(ProcessLookupError):  # it may have ended
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
     assert all(read_record(path) for path in tmp_path.glob("records/*/*.json"))  # whole or absent
     run_study(Study(tasks=SMALL.tasks(), folder=tmp_path))
     assert contents(tmp_path) == contents(undisturbed)
@@ -168,10 +168,11 @@ def test_polishing_a_failed_run_is_a_failure_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path) -> None:
-    light = ProblemSpec(name="walk12")  # six workers build it
+def test_workers_that_keep_dying_end_the_study_with_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compare.study.workers, "DEATHS_WITHOUT_PROGRESS", 2)
+    light = ProblemSpec(name="walk12")  # four workers build it
     tasks = tuple(Task(problem=light, solver=Broken(deadly=True), run=run) for run in range(2))
-    with pytest.raises(GaitError, match="worker process died 3 times in a row"):
+    with pytest.raises(GaitError, match="worker process died 2 times in a row"):
         run_study(Study(tasks=tasks, folder=tmp_path, jobs=2))
 
 
