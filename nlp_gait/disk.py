@@ -68,8 +68,9 @@ def _fsync(descriptor: int) -> None:
 
 
 def make_folder(path: Path, mode: int = 0o777) -> None:
-    """Make a folder and its parents, durably; an existing folder is left alone; raises OSError."""
-    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
-    path.mkdir(mode=mode, parents=True, exist_ok=True)
-    for folder in reversed(missing):
-        flush(folder.parent)
+    """Make a folder and its parents, all with a mode, durably; existing ones are left alone; raises OSError."""
+    for folder in reversed([path, *(parent for parent in path.parents if not parent.exists())]):
+        is_new = not folder.exists()
+        folder.mkdir(mode=mode, exist_ok=True)
+        if is_new:
+            flush(folder.parent)

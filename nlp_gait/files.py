@@ -142,20 +142,33 @@ def write_json(path: Path, data: Any) -> None:
     write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
 
 
-_inputs: set[Path] = set()
+_inputs: set[Path] | None = None  # of this command; None: none is protected
+_forced = False
 
 
-def protect_inputs(paths: Iterable[Path]) -> None:
-    """Let no function write to these files, the inputs of a command, any more; those of an earlier command are released."""
-    _inputs.clear()
+def protect_inputs(paths: Iterable[Path], force: bool = False) -> None:
+    """Let no function write to the inputs of a command, these and later ones, unless ``force``; release those of earlier ones."""
+    global _inputs, _forced
+    _inputs, _forced = None if force else set(), force
     for path in paths:
+        protect_input(path)
+
+
+def protect_input(path: Path) -> None:
+    """Protect one more file that this command reads."""
+    if _inputs is not None:
         _inputs.update((_find_place(path), path.resolve()))
+
+
+def is_forced() -> bool:
+    """Return whether this command may replace any file."""
+    return _forced
 
 
 def check_output(path: Path) -> None:
     """Check that a path is no input of this command; raises OutputError."""
     if _inputs and _find_place(path) in _inputs:
-        raise OutputError(f"cannot write {str(path)!r}: this command reads it; name another file")
+        raise OutputError(f"cannot write {str(path)!r}: this command reads it; name another file, or give --force")
 
 
 def _find_place(path: Path) -> Path:

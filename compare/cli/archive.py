@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import end_if_excluded, fail, output_file, print_json, print_written, progress_bar, stdout
+from compare.cli.common import end_if_excluded, fail, print_json, print_written, progress_bar, stdout
 from compare.cli.options import AsJson, Code, name_all
+from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
 
 

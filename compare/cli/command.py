@@ -19,11 +19,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
 from compare.cli.common import end_interrupted, fail, say_error
+from compare.cli.outputs import register_written
 from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError
 from nlp_gait.files import protect_inputs
@@ -34,6 +35,12 @@ R = TypeVar("R")
 PLAIN = "nlp-gait-plain"  # error handler for characters that an output cannot encode
 # Parameters that name what a command writes.
 OUTPUTS = ("out", "to", "table", "signals", "video")
+FORCE = inspect.Parameter(
+    "force",
+    inspect.Parameter.KEYWORD_ONLY,
+    default=False,
+    annotation=Annotated[bool, typer.Option("--force", help="Replace inputs and files of other programs, too.")],
+)
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
@@ -47,10 +54,11 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     def run(**given: Any) -> R:
         try:
             with raise_interrupts():
-                protect_inputs(_find_inputs(given))
+                protect_inputs(_find_inputs(given), given.pop("force", False))
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-                result = function(**given)
+                with register_written():
+                    result = function(**given)
                 sys.stdout.flush()  # report a failed write here, not at the interpreter's exit
             return result
         except (GaitError, SearchError) as error:
@@ -65,6 +73,8 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     for parameter in parameters:
         alone = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
         options += _options(groups[parameter.name]) if parameter.name in groups else alone
+    if any(option.name in OUTPUTS for option in options):
+        options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     return run

@@ -19,8 +19,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import check_name, check_output, make_writable_folder, replace_nan
+from nlp_gait.files import replace_nan
 from nlp_gait.interrupts import Interrupted
 
 if TYPE_CHECKING:
@@ -211,19 +210,6 @@ class _Log:
             stderr.print(
                 f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {note}", soft_wrap=True
             )
-
-
-def output_file(path: Path) -> Path:
-    """Check before the work that a path can be written to, and return it."""
-    check_name(path)
-    check_output(path)
-    make_writable_folder(path.parent)
-    try:
-        if path.is_dir():
-            raise InputError(f"{str(path)!r} is a folder; name a file")
-    except OSError as error:  # its name is too long
-        raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
-    return path
 
 
 def until_interrupted(work: Callable[[], T], nothing: str = "nothing was written") -> tuple[T, str]:

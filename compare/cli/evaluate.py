@@ -14,7 +14,6 @@ from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
 from compare.cli.common import (
     fail,
-    output_file,
     print_json,
     print_result,
     print_rows,
@@ -23,6 +22,7 @@ from compare.cli.common import (
     stdout,
 )
 from compare.cli.options import AnyProblem, AsJson, parse_values, parse_x
+from compare.cli.outputs import output_file
 from compare.judge import Evaluation
 from nlp_gait.errors import InputError
 from nlp_gait.files import format_csv, write_text

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import interruptible, output_file, print_result, print_written
+from compare.cli.common import interruptible, print_result, print_written
 from compare.cli.options import AsJson, NamedProblem, StoredGait
+from compare.cli.outputs import output_file
 from nlp_gait.export.set_points import PERIOD_MS
 
 SHEET = ".png"  # suffix of a contact sheet

@@ -11,8 +11,9 @@ from typing import Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import output_file, print_json, print_table, print_written, stdout
+from compare.cli.common import print_json, print_table, print_written, stdout
 from compare.cli.options import AsJson
+from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load, problem_names
 

@@ -15,7 +15,6 @@ from compare.cli.command import command
 from compare.cli.common import (
     end_interrupted,
     fail,
-    output_file,
     print_json,
     print_table,
     print_written,
@@ -23,6 +22,7 @@ from compare.cli.common import (
     stdout,
 )
 from compare.cli.options import AsJson, StoredGait
+from compare.cli.outputs import output_file
 from compare.cli.simulation_options import ConditionOptions, DriveOptions, FilmOptions
 
 if TYPE_CHECKING:

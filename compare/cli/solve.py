@@ -14,7 +14,6 @@ from compare.cli.command import command
 from compare.cli.common import (
     end_interrupted,
     fail,
-    output_file,
     print_json,
     print_rows,
     print_table,
@@ -24,6 +23,7 @@ from compare.cli.common import (
     until_interrupted,
 )
 from compare.cli.options import AsJson, Jobs, NamedProblem, Seed, parse_x
+from compare.cli.outputs import output_file
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.solution import Solution
 

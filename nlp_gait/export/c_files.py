@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from nlp_gait.errors import OutputError
-from nlp_gait.files import make_writable_folder, write_text
+from nlp_gait.files import is_forced, make_writable_folder, write_text
 
 MARK = b"nlp-gait"  # in the first lines of every file that is written
 LARGEST_MARKED = 4096  # bytes
@@ -44,9 +44,11 @@ def write_c_files(
 
 
 def check_own_file(path: Path) -> None:
-    """Raise OutputError if there is a file that this package did not write."""
-    if path.is_file() and MARK not in path.read_bytes()[:LARGEST_MARKED]:
-        raise OutputError(f"cannot write {str(path)!r}: nlp-gait did not write this file; name another folder")
+    """Raise OutputError if there is a file that this package did not write, unless --force is given."""
+    if path.is_file() and MARK not in path.read_bytes()[:LARGEST_MARKED] and not is_forced():
+        raise OutputError(
+            f"cannot write {str(path)!r}: nlp-gait did not write this file; name another folder, or give --force"
+        )
 
 
 def format_comment(lines: Iterable[str]) -> str:

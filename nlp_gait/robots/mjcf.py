@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
-from nlp_gait.files import read_bytes
+from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.inertia import Array, Mass, combine_masses
 from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import box_points, cylinder_points
+from nlp_gait.robots.mjcf_counts import check_counts
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 
 LOG = logging.getLogger("nlp_gait")
@@ -115,8 +116,11 @@ def _compile(path: str) -> Any:
 def _read(place: str, path: str) -> Any:
     mujoco = import_module("mujoco")  # before the fork, which would import it in vain
     told, _, data = read_in_child(f"robot file {path!r}", partial(_compile_binary, mujoco, path)).partition(b"\n")
-    for text in json.loads(told):
+    warnings, files = json.loads(told)
+    for text in warnings:
         LOG.warning("robot file %r: %s", path, text)
+    for file in files:
+        protect_input(Path(file))
     try:
         with log_warnings(mujoco, path):
             model = mujoco.MjModel.from_binary_path("robot.mjb", {"robot.mjb": data})
@@ -129,8 +133,9 @@ def _read(place: str, path: str) -> Any:
 
 
 def _compile_binary(mujoco: Any, path: str) -> bytes:
-    """Return MuJoCo's warnings as a line of JSON, and the compiled model in its binary format; for a process of its own."""
+    """Return MuJoCo's warnings and the files read as a line of JSON, and the model in binary form; for a child process."""
     warnings: list[str] = []
+    files = [str(file) for file in check_counts(Path(path))]
     mujoco.set_mju_user_warning(warnings.append)
     try:
         model = mujoco.MjModel.from_xml_path(path)
@@ -142,7 +147,7 @@ def _compile_binary(mujoco: Any, path: str) -> bytes:
         if "unknown exception" in str(error):  # of C++: no memory
             raise MemoryError from error
         raise _convert(path, error) from error
-    return json.dumps(warnings).encode() + b"\n" + data.tobytes()
+    return json.dumps([warnings, files]).encode() + b"\n" + data.tobytes()
 
 
 def _convert(path: str, error: Exception) -> RobotDataError:

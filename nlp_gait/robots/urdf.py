@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
-from nlp_gait.files import read_bytes
+from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.inertia import Array, Mass, combine_masses, point_inertia
 from nlp_gait.robots.meshes import box_points, cylinder_points, find_mesh, make_pose, mesh_points, parse_xml
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
@@ -136,6 +136,8 @@ def _read_xml(path: str) -> Any:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {error}") from error
     if root.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
         raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
+    for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in root.iter("mesh"))):
+        protect_input(mesh)
     return root
 
 

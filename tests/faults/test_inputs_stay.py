@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,13 @@ CALLS = [
     ("export w.json --format json --out w.json", "w.json"),
     ("animate w.json --out w.json", "w.json"),
 ]
+# Written files, before and after a change, for commands that write one.
+WRITERS = [
+    ("evaluate walk12 --x p.csv --csv {file}", ".csv"),
+    ("export w.json --format json --out {file}", ".json"),
+    ("solve byo.py:two_link --starts 1 --out {file}", ".json"),
+]
+MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
 
 
 @pytest.mark.parametrize(("call", "name"), CALLS)
@@ -55,11 +63,53 @@ def test_no_command_writes_over_its_input(call: str, name: str, folder: Path) ->
     assert done.stderr.count("\n") == 1 and Path(name).read_bytes() == before
 
 
+@pytest.mark.parametrize(("call", "suffix"), WRITERS)
+def test_a_file_of_another_program_is_replaced_only_by_force(call: str, suffix: str, folder: Path) -> None:
+    file = Path(f"notes{suffix}")
+    words = call.format(file=file).split()
+    for content in (b"", b"notes of the user", bytes(range(256))):
+        file.write_bytes(content)
+        done = RUN.invoke(app, words)
+        assert done.exit_code == 1 and "it exists, and is not as nlp-gait wrote it" in done.stderr, done.output
+        assert done.stderr.count("\n") == 1 and file.read_bytes() == content
+    assert RUN.invoke(app, [*words, "--force"]).exit_code == 0
+    assert RUN.invoke(app, words).exit_code == 0  # written by a command, and unchanged since
+    file.write_bytes(file.read_bytes() + b" ")
+    assert RUN.invoke(app, words).exit_code == 1
+
+
+def test_a_command_that_fails_does_not_make_a_file_its_own(folder: Path) -> None:
+    Path("notes.csv").write_text("mine")
+    words = "evaluate walk12 --x missing.csv --csv notes.csv".split()
+    assert RUN.invoke(app, [*words, "--force"]).exit_code == 1
+    assert "it exists" in RUN.invoke(app, words).stderr and Path("notes.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("ending", [".urdf", ".xml"])
+def test_files_that_a_robot_refers_to_stay(ending: str, folder: Path) -> None:
+    """Also where the output is not named but made, as in a folder."""
+    pytest.importorskip("mujoco" if ending == ".xml" else "urdf_parser_py")
+    triangles = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    for name in ("foot.obj", "more.xml"):
+        Path(name).write_text(triangles if name == "foot.obj" else "<mujocoinclude><asset/></mujocoinclude>")
+    robot = {
+        ".urdf": f'<robot name="r"><link name="a">{MESH.format("foot.obj")}</link></robot>',
+        ".xml": '<mujoco><include file="more.xml"/><asset><mesh file="foot.obj"/></asset><worldbody><body><freejoint/>'
+        '<geom type="mesh" mesh="foot"/></body></worldbody></mujoco>',
+    }[ending]
+    Path(f"r{ending}").write_text(robot)
+    for force in ([], ["--force"]):
+        RUN.invoke(app, ["list", "--robot", f"r{ending}", "--out", "r.png", *force])
+        for name in ("foot.obj", "more.xml")[: 1 + (ending == ".xml")]:
+            with nullcontext() if force else pytest.raises(OutputError, match="this command reads it"):
+                write_text(folder / name, triangles)
+
+
 def test_the_next_command_may_write_the_file(folder: Path) -> None:
     protect_inputs([folder / "w.json"])
     with pytest.raises(OutputError, match="this command reads it"):
         write_text(folder / "w.json", "")
-    assert RUN.invoke(app, ["evaluate", "walk12", "--x", "p.csv", "--csv", "w.json"]).exit_code == 0
+    assert RUN.invoke(app, ["evaluate", "walk12", "--x", "p.csv", "--csv", "w.json", "--force"]).exit_code == 0
     protect_inputs([])
     write_text(folder / "w.json", "")
 

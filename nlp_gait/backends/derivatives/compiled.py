@@ -45,15 +45,16 @@ class CompiledNlp:
         names = [*VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
         graph = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]]).serialize()
         # The library is found without generating its source, by what the source depends on.
-        _, library = load_library(
+        loaded, _ = load_library(
             "\0".join([graph, version("casadi"), _hash_generator(), str(second)]),
             find_compiler(),
             (*FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"),
             names,
             lambda: write_casadi_source(make_nlp_plan(split_nlp(nlp), second=second)),
         )
-        self.functions = {name: ca.external(name, str(library)) for name in names}
-        self._check(nlp, p, str(library))
+        library = loaded._name  # noqa: SLF001 (documented; what was checked, whatever the path names now)
+        self.functions = {name: ca.external(name, library) for name in names}
+        self._check(nlp, p, library)
         x, symbols = nlp["x"], nlp["p"]
         self.nlp = {"x": x, "p": symbols, **{key: self.functions[f"nlp_{key}"](x, symbols) for key in ("f", "g")}}
         derivatives = {key: self.functions[name] for key, name in DERIVATIVES.items() if name in self.functions}

@@ -2,6 +2,7 @@
 
 The name of a library consists of a hash of everything that it depends on and the checksum of the file. It is written under
 another name and renamed, so that several processes may build it at once. A file that does not match its checksum is rebuilt.
+A library is hashed and loaded through one descriptor of its folder, so that no other user can exchange it in between.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from nlp_gait.errors import CompilerError, warn_once
 from nlp_gait.files import convert_errors, make_temporary_folder
 
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
+OPEN_FILES = Path("/proc/self/fd")  # of Linux: each open file and folder under its number
+NOBODY = 65534  # owner of the system's files in a container that does not know them
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
@@ -95,16 +98,19 @@ def store_library(built: Path, key: str) -> Path:
 def find_cache_folder() -> Path:
     """Return the folder of cached libraries: ``$NLP_GAIT_CACHE``, else nlp-gait in ``$XDG_CACHE_HOME`` or ~/.cache.
 
-    It is created if necessary. If it is a link, belongs to another user, or cannot be created, a temporary folder of this
-    process is used instead.
+    It is created if necessary, with its parents. If it is a link, belongs to another user, cannot be created, forbids to load
+    code, or if another user may exchange it, a temporary folder of this process is used instead.
     """
     named = os.environ.get(FOLDER_VARIABLE)
     base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "nlp-gait"
     try:
         if base.parts[0] == "~":
             base = Path.home().joinpath(*base.parts[1:])  # RuntimeError in a container whose user has no home
+        base = base.parent.resolve() / base.name
         make_folder(base, mode=0o700)
-        reason = _find_danger(base, stat.S_ISDIR)
+        reason = _find_danger(base.lstat(), stat.S_ISDIR) or _find_danger_above(base)
+        if reason is None and _forbids_code(base):
+            reason = "its mount has the option noexec"
     except (OSError, RuntimeError) as error:
         reason = str(error)
     if reason is None:
@@ -114,9 +120,8 @@ def find_cache_folder() -> Path:
     return folder
 
 
-def _find_danger(path: Path, has_type: Callable[[int], bool]) -> str | None:
+def _find_danger(status: os.stat_result, has_type: Callable[[int], bool]) -> str | None:
     """Return why code from a folder or file must not be run, or None; ``has_type`` checks its mode."""
-    status = path.lstat()
     if stat.S_ISLNK(status.st_mode):
         return "it is a link"
     if not has_type(status.st_mode):
@@ -129,11 +134,35 @@ def _find_danger(path: Path, has_type: Callable[[int], bool]) -> str | None:
     return None
 
 
+def _find_danger_above(folder: Path) -> str | None:
+    """Return which parent lets another user exchange the folder, or None; in sticky ones only owners rename."""
+    if not hasattr(os, "getuid"):
+        return None
+    owners = {0, os.getuid()}
+    with contextlib.suppress(OSError):
+        if Path("/proc/self/uid_map").read_text(encoding="ascii").split() != ["0", "0", "4294967295"]:
+            owners.add(NOBODY)
+    for parent in folder.parents:
+        status = parent.stat()
+        is_open = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX
+        if is_open or status.st_uid not in owners:
+            return f"other users may rename it: they may write to {parent}; fix this with chmod go-w, or choose another"
+    return None
+
+
+def _forbids_code(folder: Path) -> bool:
+    return hasattr(os, "statvfs") and bool(os.statvfs(folder).f_flag & getattr(os, "ST_NOEXEC", 0))
+
+
 @cache
 def private_folder() -> Path:
     """Return a folder that only this process uses, created when it is first needed and removed at the end."""
     with convert_errors("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
-        folder = Path(tempfile.mkdtemp(prefix="nlp-gait-"))
+        places = [tempfile.gettempdir(), "/var/tmp", "/dev/shm"]
+        place = next((p for p in places if os.access(p, os.W_OK) and not _forbids_code(Path(p))), None)
+        if place is None:
+            raise OSError(f"no code may be loaded from {', '.join(places)}: their mounts have the option noexec")
+        folder = Path(tempfile.mkdtemp(prefix="nlp-gait-", dir=place)).resolve()
     atexit.register(_remove_folder, folder, os.getpid())
     return folder
 
@@ -146,8 +175,8 @@ def _remove_folder(folder: Path, owner: int) -> None:
 def load_if_valid(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
     """Load a library if it matches its checksum and has the functions; else remove it and return None."""
     try:
-        if _find_danger(library, stat.S_ISREG) is None and library.stem.endswith(_hash_file(library)):
-            loaded = ctypes.CDLL(str(library))
+        if (name := _check_library(library)) is not None:
+            loaded = ctypes.CDLL(name)
             for symbol in symbols:
                 getattr(loaded, symbol)
             return loaded
@@ -158,5 +187,39 @@ def load_if_valid(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
     return None
 
 
+def _check_library(library: Path) -> str | None:
+    """Return a name that loads exactly the file that was checked; None for a file that must not be loaded."""
+    if not OPEN_FILES.is_dir():
+        copy = private_folder() / library.name
+        if copy != library:
+            shutil.copyfile(library, copy, follow_symlinks=False)
+        is_safe = _find_danger(library.lstat(), stat.S_ISREG) is None
+        return str(copy) if is_safe and library.stem.endswith(_hash_file(copy)) else None
+    folder = _open_folder(library.parent)
+    descriptor = os.open(library.name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
+    with open(descriptor, "rb") as file:
+        danger = _find_danger(os.fstat(descriptor), stat.S_ISREG) or _find_danger(os.fstat(folder), stat.S_ISDIR)
+        if danger is not None or not library.stem.endswith(_hash(file.read())):
+            return None
+    # Not the file's own number: the loader takes a name that it knows for the library that it has loaded under it.
+    return str(OPEN_FILES / str(folder) / library.name)
+
+
+_folders: dict[Path, int] = {}  # descriptors that stay open: CasADi loads by name
+
+
+def _open_folder(folder: Path) -> int:
+    known = _folders.get(folder)
+    with contextlib.suppress(OSError):  # closed by user code
+        if known is not None and os.path.samestat(os.fstat(known), folder.lstat()):
+            return known
+    _folders[folder] = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    return _folders[folder]
+
+
 def _hash_file(library: Path) -> str:
-    return hashlib.sha256(library.read_bytes()).hexdigest()[:32]
+    return _hash(library.read_bytes())
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:32]
