@@ -1,8 +1,11 @@
 """Entry point of the console script, which handles Ctrl-C before it imports the command line."""
 
 import os
+import sys
 
+from nlp_gait.errors import describe_shortage
 from nlp_gait.interrupts import exit_on_interrupt
+from nlp_gait.processes import kill_children
 from nlp_gait.working_folder import hide_working_folder
 
 
@@ -19,9 +22,17 @@ def main() -> None:
     exit_on_interrupt()
     hide_working_folder()
     fix_environment()
-    from compare.cli import main as run
+    try:
+        from compare.cli import main as run
 
-    run()
+        run()
+    except Exception as error:
+        shortage = describe_shortage(error)
+        if shortage is None:
+            raise
+        kill_children()
+        sys.stderr.write(f"nlp-gait: {shortage}; finished results are stored, see ulimit -a or use fewer --jobs\n")
+        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import logging
 from collections.abc import Iterable
 from functools import cache
@@ -57,6 +58,10 @@ class WorkerError(GaitError):
     """Worker processes die or do not start."""
 
 
+class NoWorkersError(WorkerError):
+    """Worker processes cannot begin: to try again would not help."""
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
     """Return the error for an unknown name of a kind, for example ``"problem"``, with the nearest of all known names."""
     if not isinstance(name, str):
@@ -106,3 +111,17 @@ def describe_type(kind: type) -> str:
         list: "a list",
     }
     return names.get(kind, kind.__name__)
+
+
+def describe_shortage(error: BaseException | None) -> str | None:
+    """Return which resource of the system is used up, by an error or its causes; None for any other error."""
+    while error is not None:
+        number, text = getattr(error, "errno", None), str(error)
+        if isinstance(error, MemoryError) or number == errno.ENOMEM or "failed to map segment" in text:
+            return "there is not enough memory"
+        if number in (errno.EMFILE, errno.ENFILE):
+            return "too many files are open"
+        if number == errno.EAGAIN or "can't start new thread" in text:
+            return "there are too many processes or threads"
+        error = error.__cause__ or error.__context__
+    return None

@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
-from nlp_gait.errors import WorkerError
+from nlp_gait.errors import NoWorkersError, WorkerError, describe_shortage
 from nlp_gait.interrupts import block_interrupts_in_children, never
 from nlp_gait.working_folder import show_working_folder
 
@@ -32,6 +32,7 @@ PARENT_CHECKED_EVERY_S = 0.5
 STOP_CHECKED_EVERY_S = 0.05
 END_WITHIN_S = 5.0  # a child that is to end is killed after this time
 COUNTER_BYTES = 8
+SPARE_DESCRIPTORS = 12  # that joblib needs beside one for each worker
 PR_SET_PDEATHSIG = 1
 
 
@@ -216,11 +217,14 @@ def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterat
         with block_interrupts_in_children():
             folder = _find_working_folder() if workers > 0 else None  # another machine has other folders
             try:
+                _check_descriptors(workers + SPARE_DESCRIPTORS)
                 results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
-            except OSError as error:  # no descriptors, processes or memory are left
-                raise WorkerError(
-                    f"worker processes cannot begin: {error.strerror or error}; use fewer --jobs"
-                ) from error
+            except Exception as error:
+                shortage = describe_shortage(error) or (isinstance(error, OSError) and (error.strerror or error))
+                if not shortage:
+                    raise
+                kill_children()
+                raise NoWorkersError(f"worker processes cannot begin: {shortage}; use fewer --jobs") from error
         for result in results:  # noqa: UP028  `yield from` would close them before the lines below
             yield result
     except (TerminatedWorkerError, BrokenPipeError) as error:  # the pipe is joblib's own, to its processes
@@ -261,11 +265,30 @@ def exit_with_parent(parent: int) -> None:
     threading.Thread(target=watch, name="nlp-gait-parent", daemon=True).start()
 
 
+def kill_children() -> None:
+    """Kill workers that have begun; else each would print a traceback when it finds that this process has ended."""
+    for child in multiprocessing.active_children():
+        if child.pid is not None:
+            with suppress(ProcessLookupError):
+                os.kill(child.pid, signal.SIGKILL)  # joblib's processes have no method for it
+
+
+def _check_descriptors(count: int) -> None:
+    """Raise OSError unless this process can open so many more files."""
+    opened = []
+    try:
+        for _ in range(count):
+            opened.append(os.open(os.devnull, os.O_RDONLY))
+    finally:
+        for descriptor in opened:
+            os.close(descriptor)
+
+
 def _find_working_folder() -> str:
     try:
         return os.getcwd()
     except OSError as error:
-        raise WorkerError(
+        raise NoWorkersError(
             f"worker processes cannot begin: the working folder is gone ({error.strerror}); use another"
         ) from error
 

@@ -33,7 +33,7 @@ def output_file(path: Path) -> Path:
             )
     except OSError as error:  # its name is too long
         raise OutputError(f"cannot write {str(path)!r}: {error.strerror}") from error
-    _named[path] = _hash(path) if path.is_file() else ""
+    _named[path] = _hash(path)
     return path
 
 
@@ -46,7 +46,7 @@ def register_written() -> Iterator[None]:
     finally:
         for path, before in _named.items():
             with suppress(OSError, CompilerError):  # then --force is needed the next time
-                if (now := _hash(path)) != before:
+                if (now := _hash(path)) not in ("", before):
                     make_folder(_find_entry(path).parent, mode=0o700)
                     _find_entry(path).write_text(now, encoding="ascii")
 
@@ -64,5 +64,8 @@ def _find_entry(path: Path) -> Path:
 
 
 def _hash(path: Path) -> str:
+    """Return the SHA-256 of a regular file, "" for others: a pipe would be waited for."""
+    if not path.is_file():
+        return ""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

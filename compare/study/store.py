@@ -69,6 +69,7 @@ class Store:
     def __init__(self, out: Path | None = None, report: Progress | None = None) -> None:
         self.folder = None if out is None else make_writable_folder(out / FOLDER)
         self._report = report
+        self._counted: set[Path | None] = set()  # one run may need a result several times
         self._counts = tempfile.TemporaryFile("w+b", buffering=0)  # noqa: SIM115  one byte for each result, shared with forks
         weakref.finalize(self, self._counts.close)
         if self.folder is not None:
@@ -116,7 +117,7 @@ class Store:
         for computation in computations:
             name = computation.name
             result, notes[name] = self._find(name, inputs[name])
-            self._count(COMPUTED if result is None else STORED)
+            self._count(COMPUTED if result is None else STORED, self._path(name, inputs[name], ".json"))
             if result is None:
                 waiting[name] = computation.function
             else:
@@ -223,9 +224,11 @@ class Store:
             self.folder = None
             self._report(f"{error}; continuing without storing results")
 
-    def _count(self, kind: bytes) -> None:
-        with suppress(OSError):
-            self._counts.write(kind)
+    def _count(self, kind: bytes, path: Path | None) -> None:
+        if path is None or path not in self._counted:
+            self._counted.add(path)
+            with suppress(OSError):
+                self._counts.write(kind)
 
 
 def _identify_arrays(inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:

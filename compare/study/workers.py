@@ -9,7 +9,7 @@ from functools import partial
 from compare.study.record import RunRecord
 from compare.study.run_task import Run, run_task, try_task
 from compare.study.task import Task
-from nlp_gait.errors import InputError, WorkerError
+from nlp_gait.errors import InputError, NoWorkersError, WorkerError
 from nlp_gait.files import convert_errors
 from nlp_gait.interrupts import remember_interrupts
 from nlp_gait.processes import run_in_processes
@@ -57,6 +57,8 @@ def run_jobs(
                     yield position, record
             except WorkerError as error:
                 deaths += 1
+                if isinstance(error, NoWorkersError):
+                    raise
                 if deaths == DEATHS_WITHOUT_PROGRESS:
                     raise WorkerError(
                         f"a worker process died {deaths} times in a row, perhaps out of memory; finished runs are stored: "

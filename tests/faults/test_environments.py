@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 from compare.__main__ import fix_environment
 from metaheuristics.errors import SearchError
 from metaheuristics.settings import check_installed
-from nlp_gait.errors import WorkerError
+from nlp_gait.errors import NoWorkersError, WorkerError
 from nlp_gait.processes import run_in_processes
+from tests.faults.processes import ROOT
 
 
 @pytest.mark.parametrize("width", ["0", "-5", "", "wide", "1e3", "٣", "0000", "80"])
@@ -40,3 +44,49 @@ def test_workers_do_not_begin_in_a_folder_that_is_gone(tmp_path: Path, monkeypat
     gone.rmdir()
     with pytest.raises(WorkerError, match="the working folder is gone"):
         list(run_in_processes({k: partial(abs, k) for k in range(2)}, 2))
+
+
+SHORTAGES = [
+    (OSError(errno.EMFILE, "Too many open files"), "too many files are open"),
+    (OSError(errno.ENFILE, "Too many open files in system"), "too many files are open"),
+    (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), "there are too many processes or threads"),
+    (RuntimeError("can't start new thread"), "there are too many processes or threads"),
+    (OSError(errno.ENOMEM, "Cannot allocate memory"), "there is not enough memory"),
+    (MemoryError("std::bad_alloc"), "there is not enough memory"),
+    (ImportError("x.so: failed to map segment from shared object"), "there is not enough memory"),
+]
+
+
+@pytest.mark.parametrize(("error", "sentence"), SHORTAGES, ids=lambda value: str(value)[:40])
+def test_a_shortage_at_the_start_of_workers_is_one_sentence(
+    error: Exception, sentence: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """joblib hides it behind an error of its own."""
+
+    def start(self: object) -> None:
+        try:
+            raise error
+        finally:
+            raise UnboundLocalError
+
+    monkeypatch.setattr("joblib.externals.loky.backend.process.LokyProcess.start", start)
+    get_reusable_executor().shutdown(wait=True, kill_workers=True)  # else its workers would do
+    with pytest.raises(NoWorkersError, match=f"cannot begin: {sentence}; use fewer --jobs"):
+        list(run_in_processes({k: partial(abs, k) for k in range(2)}, 2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limit", ["-n 24", "-v 300000"])
+def test_a_limit_of_the_shell_is_one_sentence_and_keeps_runs(limit: str, tmp_path: Path) -> None:
+    line = "compare walk12 --algorithms random --starts 0 --evaluations 60 --out study --jobs"
+    program = [sys.executable, "-m", "nlp_gait"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    if limit.startswith("-n"):
+        subprocess.run([*program, *line.split(), "1", "--runs", "2"], cwd=tmp_path, env=environment, check=True)
+    done = subprocess.run(
+        ["sh", "-c", f'ulimit {limit}; exec "$@"', "sh", *program, *line.split(), "20", "--runs", "22"],
+        cwd=tmp_path, env=environment, capture_output=True, text=True,
+    )  # fmt: skip
+    reason = "too many files are open" if limit.startswith("-n") else "there is not enough memory"
+    assert done.returncode == 1 and done.stdout == "" and done.stderr.count("\n") == 1 and reason in done.stderr
+    assert len(list(tmp_path.glob("study/records/*/*.json"))) == (2 if limit.startswith("-n") else 0)

@@ -139,6 +139,17 @@ def test_progress_counts_a_recomputed_result_once(tmp_path: Path) -> None:
     assert told == ["one", "one: recomputed: starts 5 -> 10"]
 
 
+def test_a_result_that_a_run_needs_twice_is_not_of_an_earlier_run(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    for _ in range(3):
+        store.compute("one", {}, lambda: 1)
+    assert store.summary == ""
+    later = Store(tmp_path)
+    for name in ("one", "two", "one", "two"):
+        later.compute(name, {}, lambda: 1)
+    assert later.summary == "1 of 2 results were stored by an earlier run"
+
+
 def test_results_of_different_inputs_lie_next_to_each_other(tmp_path: Path) -> None:
     calls: list[int] = []
     for seed in (1, 2, 1):
