@@ -30,6 +30,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors
 from nlp_gait.formulation import Objective
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
 DEFAULT_WEIGHTING = Weighting()
 # An edition's name is a label, so that files can be named after it.
@@ -113,9 +114,9 @@ class Comparison:
         return tie([solver.costs for solver in self.solvers], self.reference)
 
     def format_gap(self, gap: float | None) -> str:
-        """Format a gap in percent, or in the objective's unit where the best known value is near zero."""
+        """Format a gap in percent, 0 within the judge's tolerance, or in the objective's unit from a value near zero."""
         if gap is None or not math.isfinite(gap) or not is_zero(self.reference):
-            return percent(gap)
+            return percent(0.0 if gap is not None and abs(gap) <= FEASIBILITY_TOLERANCE else gap)
         return f"below {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
 
     def gap(self, cost: float) -> float:

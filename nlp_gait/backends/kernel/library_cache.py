@@ -28,7 +28,7 @@ from nlp_gait.files import convert_errors, make_temporary_folder
 
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
 OPEN_FILES = Path("/proc/self/fd")  # of Linux: each open file and folder under its number
-NOBODY = 65534  # owner of the system's files in a container that does not know them
+UNKNOWN_OWNER = 65534  # owner of the system's files in a container that does not know them
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
@@ -141,7 +141,7 @@ def _find_danger_above(folder: Path) -> str | None:
     owners = {0, os.getuid()}
     with contextlib.suppress(OSError):
         if Path("/proc/self/uid_map").read_text(encoding="ascii").split() != ["0", "0", "4294967295"]:
-            owners.add(NOBODY)
+            owners.add(UNKNOWN_OWNER)
     for parent in folder.parents:
         status = parent.stat()
         is_open = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX

@@ -60,6 +60,14 @@ def test_near_zero_the_verdict_has_absolute_gaps(best: float) -> None:
     assert relative_gap(best + 0.5, best, POWER) == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("gap", [3.6e-12, 2e-11, 9.9e-7, -4e-7, 1.1e-6, 3e-4])
+def test_gaps_within_the_tolerance_are_no_gaps_in_text(gap: float) -> None:
+    (comparison,) = compare_problems(study({"a": [0.9, 0.9], "b": [0.9 * (1 + gap)] * 2}))
+    shown = comparison.format_gap(comparison.gap(comparison.reference * (1 + gap)))
+    assert shown == {1.1e-6: "0.0001 %", 3e-4: "0.0300 %"}.get(gap, "0.0000 %")
+    assert f"b {shown}" in write_verdict([comparison])[1] or gap < 0
+
+
 def test_relative_gaps_begin_at_the_floor() -> None:
     assert relative_gap(3 * ZERO, 2 * ZERO, POWER) == pytest.approx(0.5)
     assert relative_gap(1.5 * ZERO, 0.5 * ZERO, POWER) == pytest.approx(ZERO)
