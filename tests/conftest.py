@@ -83,6 +83,13 @@ def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.report.writing.save", save_coarsely)
 
 
+@pytest.fixture
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no compiler be found, where a kernel would take longer to compile than its few calls when they are interpreted."""
+    for name in ("CXX", "CC", "PATH"):
+        monkeypatch.setenv(name, "")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def built_once() -> Iterator[None]:
     """Every problem of the package is loaded once for all tests, with all that is built from it.

@@ -1,6 +1,7 @@
 """Every example runs from another folder, prints what it promises, draws its figure and stays short.
 
-Long ones run here with fewer points, runs, intervals or workers; the documentation's gallery runs all as they are.
+The documentation's gallery runs all as they are, and ends at an error. Here those run whose printed numbers it cannot check,
+long ones with fewer points, runs or starts.
 """
 
 from __future__ import annotations
@@ -23,39 +24,32 @@ EXPECTED = {
     "first_solve.py": "limited by dbm_y_mean",
     "evaluate_your_own_x.py": "power 0.866844 W, feasible: True",
     "price_of_a_constraint.py": "0.845869 W, and 0.02373 W per millimetre",
-    "sweep.py": "15.0 mm: 0.84587 W, converged",
-    "front.py": "the next millimetre for",
     "your_own_objective.py": "0.0 W/s: 0.845869 W",
     "your_own_problem.py": "5 of 5 starts of ipopt converged",
     "your_own_algorithm.py": "| shrinking-box | 2 |",
     "results_from_matlab.py": "paper (MATLAB): 2 of 2 feasible, claims 1.0682 W, judged 0.6265 W at best",
     "custom_robot.py": "nao-with-a-load: 0 kg, 0.845869 W",
-    "physics_engine.py": "it stayed up",
     "export_motion.py": "gait.motion: 102 lines",
     "compile_function.py": "cost 3.60 without a push",
-    "notebook.py": "Nm",
-    "cluster.py": "ipopt: 4 of 4 feasible, median 0.531886 W",
 }
 FEWER = {
     "first_solve.py": ("starts=3", "starts=1"),
     "price_of_a_constraint.py": ("np.linspace(0.016, 0.024, 9)", "np.linspace(0.016, 0.024, 2)"),
-    "front.py": ('load("nao-dsp")', 'load("nao-dsp", intervals=4)'),
-    "your_own_objective.py": ("(0.0, 0.1, 0.3, 1.0)", "(0.0, 1.0)"),
+    "your_own_objective.py": ("(0.0, 0.1, 0.3, 1.0)", "(0.0,)"),
     "your_own_algorithm.py": ("range(5)", "range(2)"),
     "compile_function.py": ("range(300)", "range(3)"),
     "custom_robot.py": ("(0.0, 0.5, 1.0)", "(0.0,)"),
-    "physics_engine.py": ("starts=2", "starts=1"),
-    "cluster.py": ("n_workers=2", "n_workers=1"),
 }
-NEEDS = {"physics_engine.py": "mujoco", "notebook.py": "pandas", "cluster.py": "distributed"}
+# Run by the gallery alone: they print no number, or those of a sweep, a study and a simulation, which tests of these check.
+GALLERY_ALONE = ("sweep.py", "front.py", "physics_engine.py", "notebook.py", "cluster.py")
 WITHOUT_FIGURE = {"bring_your_own.py"}  # three kinds at once, for the page of that name; not in the gallery
 
 
 def test_no_example_is_forgotten() -> None:
-    assert {path.name for path in (ROOT / "examples").glob("*.py")} == {*EXPECTED, *WITHOUT_FIGURE}
+    assert {path.name for path in (ROOT / "examples").glob("*.py")} == {*EXPECTED, *GALLERY_ALONE, *WITHOUT_FIGURE}
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+@pytest.mark.parametrize("name", [*EXPECTED, *GALLERY_ALONE])
 def test_an_example_is_short(name: str) -> None:
     text = (ROOT / "examples" / name).read_text(encoding="utf-8")
     title = ast.parse(text).body[0]
@@ -69,8 +63,6 @@ def test_example(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """In this process, which has loaded the packages already."""
-    if name in NEEDS:
-        pytest.importorskip(NEEDS[name])
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [name])
     text, (many, few) = (ROOT / "examples" / name).read_text(encoding="utf-8"), FEWER.get(name, ("", ""))

@@ -24,8 +24,8 @@ PUBLISHED = 1e-12
 STEP, DIFFERENCES = 1e-6, 1e-5
 QUICK = ("walk12-w015", "ssp-v5", "ssp-v5-time10")
 # The others' exact functions are interpreted, which takes less time than to compile them; a compiled kernel is itself checked
-# against the interpreted one when it is built. Objectives of the last one reach 1e25, where rounding is amplified to 2e-9.
-COMPILED = (*QUICK, "dsp-v5", "cycle-v5", "stairs-energy", "dsp-v5-free-spline4")
+# against the interpreted one when it is built. Objectives of this one reach 1e25, where rounding is amplified so much.
+AMPLIFIED = {"dsp-v5-free-spline4": 1e-7}
 
 
 def points(instance: gaitbench.Instance, count: int = 6) -> Array:
@@ -33,10 +33,9 @@ def points(instance: gaitbench.Instance, count: int = 6) -> Array:
 
 
 @pytest.fixture
-def published(id: str, monkeypatch: pytest.MonkeyPatch) -> gaitbench.Instance:
-    if id not in COMPILED:
-        for name in ("CXX", "CC", "PATH"):
-            monkeypatch.setenv(name, "")  # no compiler is found
+def published(id: str, request: pytest.FixtureRequest) -> gaitbench.Instance:
+    if id not in QUICK:
+        request.getfixturevalue("interpreted")
     return gaitbench.load(id)
 
 
@@ -50,7 +49,8 @@ def check_probes(id: str) -> None:
     weighted = G @ (1.0 + np.arange(G.shape[1]) % 7)
     for found, name in ((f, "objective"), (violation, "violation"), (weighted, "rows")):
         expected = np.array([getattr(probe, name) for probe in probes])
-        np.testing.assert_allclose(found, expected, rtol=PUBLISHED, atol=PUBLISHED, err_msg=f"{id}: {name}")
+        rounding = AMPLIFIED.get(id, PUBLISHED)
+        np.testing.assert_allclose(found, expected, rtol=rounding, atol=PUBLISHED, err_msg=f"{id}: {name}")
 
 
 @pytest.mark.parametrize("id", QUICK)
@@ -75,7 +75,7 @@ def test_the_best_known_point_is_feasible_and_has_its_value(published: gaitbench
     assert f[0] == pytest.approx(instance.best_known, rel=PUBLISHED, abs=PUBLISHED)
     width = 1e-4 * (instance.upper - instance.lower)
     near = instance.best_x + np.random.default_rng(0).uniform(
-        -width, width, (2000 if instance.id in COMPILED else 128, len(width))
+        -width, width, (2000 if instance.id in QUICK else 128, len(width))
     )
     f, violation = instance(np.clip(near, instance.lower, instance.upper))
     better = f[violation == 0.0] - instance.best_known

@@ -116,7 +116,7 @@ def least_power(rng: np.random.Generator) -> tuple[ca.Function, PowerRows]:
 @pytest.mark.slow
 def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() -> None:
     rng, tight = np.random.default_rng(SEED), 0
-    for _ in range(250):
+    for _ in range(80):
         function, rows = least_power(rng)
         centre, half = rng.uniform(-0.5, 0.5, 4) + [0, 0, 0, 2.0], 10.0 ** rng.uniform(-2.0, -0.2, 4)
         box = np.stack([centre - half, centre + half], axis=-1)
@@ -135,7 +135,7 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
                 assert found.lowest.item() <= least * (1.0 + ROUNDING)
                 assert ((found.boxes[0, :, 0] <= kept) & (kept <= found.boxes[0, :, 1])).all()
         tight += not len(found.origin) or found.lowest.item() > 0.7 * least
-    assert tight > 20  # bounds that are far off would hide an error
+    assert tight > 6  # bounds that are far off would hide an error
 
 
 def test_boxes_that_contain_the_best_gait_keep_it_and_have_bounds_that_converge_to_its_cost() -> None:

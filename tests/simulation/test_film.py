@@ -25,7 +25,7 @@ from nlp_gait.simulation.plan import make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
-# Two gaits side by side, drawn in a separate process: the graphics driver is chosen when the engine is imported.
+# A gait, and two side by side, drawn in a separate process: the graphics driver is chosen when the engine is imported.
 DRAW = """
 import sys
 import numpy as np
@@ -41,12 +41,9 @@ from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import simulate_plan
 
 problem = nlp_gait.load("nao-dsp")
-shots = []
-for time_s in (0.4, 0.6):
-    x = problem.check_x((0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, time_s))
-    plan = make_plan(Result(problem=problem, x=x))
-    shots.append(record_film("dsp", plan, partial(simulate_plan, plan), 0.8))
-np.savez(sys.argv[1], one=list(draw_pictures(shots[:1], (480, 360))), two=[next(draw_pictures(shots, (640, 360), "slow"))])
+plan = make_plan(Result(problem=problem, x=problem.check_x((0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 0.4))))
+shot = record_film("dsp", plan, partial(simulate_plan, plan), 0.8)
+np.savez(sys.argv[1], one=list(draw_pictures([shot], (480, 360))), two=[next(draw_pictures([shot, shot], (640, 360), "slow"))])
 """
 
 

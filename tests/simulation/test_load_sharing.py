@@ -100,7 +100,7 @@ def test_no_instant_costs_more_than_by_the_lever_rule(plan: Plan, support: Suppo
 
 @pytest.mark.slow
 def test_it_is_scipys_optimum_at_single_instants(plan: Plan, support: Support, shared: Plan) -> None:
-    for sample in np.linspace(support.first, support.last, 3).astype(int).tolist():
+    for sample in np.linspace(support.first, support.last, 2).astype(int).tolist():
         one = slice(sample, sample + 1)
         torque, gain, left, carried = (part[0] for part in compute_instants(plan, one))
         rate, rows = plan.signals.arrays["qd"][sample], make_sole_rows(plan.robot, Sharing().friction)
@@ -204,15 +204,17 @@ def test_the_command_shares_load(tmp_path: Path) -> None:
     """Power that the model predicts falls, more so where load may jump."""
     pytest.importorskip("mujoco")
     problem = load("nao-dsp", torso_share="lever")
-    x = np.array([0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 2.0])
+    x = np.array([0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.02170, 1.0])
     file = tmp_path / "best.json"
     options = {"torso_share": "lever"}
     file.write_text(json.dumps({"problem": "nao-dsp", "options": options, "x": problem.by_name(x)}))
     found = []
-    for more in ([], ["--share-loads", "--load-rate", "0.5"], ["--share-loads"]):
+    for more in ([], ["--share-loads", "--load-rate", "0.5"]):
         done = CliRunner().invoke(app, ["simulate", str(file), "--json", *more])
         assert done.exit_code == 0, done.output
         found.append(json.loads(done.stdout))
     predicted = [sum(report["predicted"][part] for part in ("mechanical_W", "heat_W")) for report in found]
-    assert predicted[0] > predicted[1] > predicted[2]
+    plan = make_plan(Result(problem=problem, x=x))
+    slow, jumping = (power(share_loads(plan, sharing)).mean() for sharing in (Sharing(load_rate_1_s=0.5), Sharing()))
+    assert predicted[0] > predicted[1] == pytest.approx(slow, rel=1e-2) and slow > jumping
     assert not any(report["fallen"] for report in found)

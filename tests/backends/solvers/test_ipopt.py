@@ -26,13 +26,13 @@ TOY_TOLERANCE = 1e-6  # IPOPT's tolerance of 1e-8 times slopes of order ten
 
 @pytest.fixture(scope="module")
 def single_support() -> tuple[GaitProblem, Solution]:
-    problem = load("nao-ssp")
+    problem = load("nao-ssp", intervals=5)
     return problem, solve(problem, starts=2, seed=0)
 
 
 @pytest.fixture(scope="module")
 def double_support() -> tuple[GaitProblem, Solution]:
-    problem = load("nao-dsp")
+    problem = load("nao-dsp", intervals=5)
     return problem, solve(problem, starts=2, seed=0)
 
 
@@ -121,7 +121,7 @@ def test_a_fixed_variable_stays_and_costs(double_support: tuple[GaitProblem, Sol
 @pytest.mark.slow
 def test_an_infeasible_gait_is_reported_with_what_stands_in_the_way() -> None:
     problem = load("nao-dsp").with_values(dbm_y_mean_limit_m=0.2)  # the box of both soles is 0.18 m wide
-    solution = solve(problem, starts=1, solver=IpoptSettings(iterations=60))
+    solution = solve(problem, starts=1, solver=IpoptSettings(iterations=20, few_rows=False))
     assert not solution.converged
     assert solution.status.startswith("no start converged to a feasible point; the least infeasible one ")
     assert "violated: " in solution.status

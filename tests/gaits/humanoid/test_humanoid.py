@@ -11,6 +11,7 @@ import pytest
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import Solution
@@ -38,7 +39,7 @@ def problem(path: str) -> GaitProblem:
 
 @pytest.fixture(scope="module")
 def solution(problem: GaitProblem) -> Solution:
-    return solve(problem, starts=1, seed=0)
+    return solve(problem, starts=1, seed=0, solver=IpoptSettings(few_rows=False, hessian="limited-memory"))
 
 
 def reachable(problem: GaitProblem, count: int) -> Array:
@@ -120,7 +121,7 @@ def test_sizes_follow_the_robot_and_nao_keeps_its_own(path: str, name: str) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_problem_has_finite_values_a_skeleton_and_a_mirror_image(path: str, name: str) -> None:
-    problem = load(name, robot=path, intervals=3)
+    problem = load(name, robot=path, intervals=2)
     x = (problem.lower + problem.upper) / 2
     values = build_exact_model(problem).at(x, problem.p)
     assert math.isfinite(values.cost) and math.isfinite(values.violation)

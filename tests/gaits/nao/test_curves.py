@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.biped.curves import SPANS
@@ -25,6 +26,7 @@ CURVES = {"nao-ssp": 9, "nao-dsp": 7}
 ROUNDING = 1e-12
 # Central differences on a grid of 4,000 intervals.
 DIFFERENCE_TOLERANCE = 1e-5
+SOLVER = IpoptSettings(few_rows=False, compiled=False, hessian="limited-memory")
 RICH = [order for order in SPANS if order != "cubic"]
 
 
@@ -122,8 +124,8 @@ def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
     cubic, quintic = (
         load("nao-dsp", trajectory=order, intervals=5, samples_per_interval=2) for order in ("cubic", "quintic")
     )
-    first = solve(cubic, starts=1, seed=1)
-    second = solve(quintic, starts=1, x0=np.array([*first.x.values(), *np.zeros(14)]))
+    first = solve(cubic, starts=1, seed=1, solver=SOLVER)
+    second = solve(quintic, starts=1, solver=SOLVER, x0=np.array([*first.x.values(), *np.zeros(14)]))
     assert first.converged and second.converged
     assert second.objective < 0.9 * first.objective
 
@@ -132,7 +134,7 @@ def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
 def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     power, jerk = (load("nao-dsp", objective=name, intervals=5) for name in ("power", "jerk"))
     assert (jerk.objective.name, jerk.objective.unit) == ("joint_jerk", "rad^2/s^6")
-    cheap, smooth = (np.array(list(solve(problem, starts=1, seed=1).x.values())) for problem in (power, jerk))
+    cheap, smooth = (np.array(list(solve(problem, starts=1, seed=1, solver=SOLVER).x.values())) for problem in (power, jerk))
     at = [evaluated(jerk, x).indexes for x in (cheap, smooth)]
     assert at[1]["joint_jerk"] < 0.9 * at[0]["joint_jerk"]
     assert at[1]["power_W"] > 1.01 * at[0]["power_W"]

@@ -22,7 +22,7 @@ BEST_ENERGY_J = 110.880
 # Best known governing parameters rounded: a start from which the optimum is found in a second or two, without the run that
 # finds the rows that matter.
 NEAR_BEST = (0.69, 0.09, 0.24, 0.09, 0.7, 1.45, 0.58, 0.8, 1.3, 0.32, 0.12)
-SOLVER = nlp_gait.IpoptSettings(few_rows=False, compiled=False)
+SOLVER = nlp_gait.IpoptSettings(few_rows=False, compiled=False, hessian="limited-memory")
 
 # Lower and upper limit of each link's angle and of both knees' [rad], and what counts as a violation of 1.
 LIMITS = {
@@ -75,8 +75,9 @@ def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, s
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("interpreted")
 def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
-    found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=2_000, seed=0)
+    found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=1_000, seed=0)
     assert found.feasible
     assert found.objective >= solution.objective - 1e-6
 
@@ -84,7 +85,7 @@ def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait
 @pytest.mark.slow
 def test_an_impossible_stair_names_what_forbids_it(problem: GaitProblem) -> None:
     steep = problem.with_values(stair_length_m=0.508, rise_run_ratio=0.5 / 0.254)
-    refused = nlp_gait.solve(steep, x0=NEAR_BEST, solver=replace(SOLVER, iterations=40))
+    refused = nlp_gait.solve(steep, x0=NEAR_BEST, solver=replace(SOLVER, iterations=15))
     assert not refused.converged
     assert "violated: " in refused.status
     assert refused.worst_violations[0].name.startswith(("reach", "link_", "knee_angle"))
