@@ -134,7 +134,9 @@ def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
 def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     power, jerk = (load("nao-dsp", objective=name, intervals=5) for name in ("power", "jerk"))
     assert (jerk.objective.name, jerk.objective.unit) == ("joint_jerk", "rad^2/s^6")
-    cheap, smooth = (np.array(list(solve(problem, starts=1, seed=1, solver=SOLVER).x.values())) for problem in (power, jerk))
+    cheap, smooth = (
+        np.array(list(solve(problem, starts=1, seed=1, solver=SOLVER).x.values())) for problem in (power, jerk)
+    )
     at = [evaluated(jerk, x).indexes for x in (cheap, smooth)]
     assert at[1]["joint_jerk"] < 0.9 * at[0]["joint_jerk"]
     assert at[1]["power_W"] > 1.01 * at[0]["power_W"]
