@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +50,8 @@ def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> l
     results = ca.cse(nlp.call([w, ca.SX(np.append(problem.p, width))]))
     bounds = model.bounds(problem)
     start = model.start(problem, (problem.lower + problem.upper) / 2, width)
-    ties = len(model.tie_upper)
     columns = [*problem.names, *(f"lifted[{k}]" for k in range(model.lifted))]
-    rows = [*model.row_names, *(f"lift[{k}]" for k in range(ties))]
+    rows = [*model.row_names, *(f"lift[{k}]" for k in range(len(model.tie_upper)))]
     texts = {
         "nl": write_nl(ca.Function("nlp", [w], results), bounds, start, f"nlp-gait {problem.address}"),
         "col": "\n".join([*columns, ""]),
@@ -62,13 +62,8 @@ def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> l
     for ending, text in texts.items():
         write_text(paths[ending], text)
     facts = {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
-    sense = {
-        "objective": problem.objective.name,
-        "unit": problem.objective.unit,
-        "sign": problem.objective.sign,
-        **known,
-    }
-    write_json(paths["json"], {**facts, **sense, "offset": model.offset.tolist(), "scale": model.scale.tolist()})
+    scales = {"offset": model.offset.tolist(), "scale": model.scale.tolist()}
+    write_json(paths["json"], {**facts, "objective": asdict(problem.objective), **known, **scales})
     return list(paths.values())
 
 
@@ -92,16 +87,8 @@ def write_nl(nlp: ca.Function, bounds: Mapping[str, Array], start: Array, title:
     defined, outputs = _write_expressions(list(read_tape(nlp)), n)
     equal = int(np.sum(bounds["lbg"] == bounds["ubg"]))
     ranges = int(np.sum(np.isfinite(bounds["lbg"]) & np.isfinite(bounds["ubg"]))) - equal
-    lines = [
-        f"g3 1 1 0\t# {title}",
-        f" {n} {m} 1 {ranges} {equal}",
-        f" {m} 1",
-        " 0 0",
-        f" {n} {n} {n}",
-        " 0 0 0 1",
-        " 0 0 0 0 0",
-    ]
-    lines += [f" {pattern.nnz()} {n}", " 0 0", f" {len(defined)} 0 0 0 0", *defined]
+    sizes = f" {n} {m} 1 {ranges} {equal}\n {m} 1\n 0 0\n {n} {n} {n}\n 0 0 0 1\n 0 0 0 0 0\n {pattern.nnz()} {n}\n 0 0"
+    lines = [f"g3 1 1 0\t# {title}", sizes, f" {len(defined)} 0 0 0 0", *defined]
     lines += [f"C{i}\n{outputs.get(i + 1, 'n0')}" for i in range(m)] + [f"O0 0\n{outputs.get(0, 'n0')}"]
     lines += [f"x{n}", *(f"{i} {value!r}" for i, value in enumerate(start.tolist()))]
     for kind in "gx":
@@ -119,10 +106,8 @@ def write_nl(nlp: ca.Function, bounds: Mapping[str, Array], start: Array, title:
 
 def _write_expressions(tape: list[Instruction], n: int) -> tuple[list[str], dict[int, str]]:
     """Return the definitions of values used more than once, and the expression of each output by its place."""
-    uses = Counter(argument for each in tape for argument in each.arguments)
-    uses += Counter(
-        argument for each in tape if each.operation in (ca.OP_FMIN, ca.OP_FMAX) for argument in each.arguments
-    )
+    twice = (ca.OP_FMIN, ca.OP_FMAX)  # use their arguments twice
+    uses = Counter(place for each in tape for place in each.arguments * (1 + (each.operation in twice)))
     texts: dict[int, str] = {}
     defined, outputs = list[str](), dict[int, str]()
     for k, each in enumerate(tape):
@@ -134,9 +119,7 @@ def _write_expressions(tape: list[Instruction], n: int) -> tuple[list[str], dict
         elif each.operation == ca.OP_CONST:
             texts[k] = f"n{each.constant!r}"
         elif each.operation not in OPERATIONS:
-            raise InputError(
-                f"an .nl file cannot express operation {each.operation} of CasADi; use export-solver without --nl"
-            )
+            raise InputError(f"an .nl file cannot express operation {each.operation} of CasADi; leave out --nl")
         else:
             texts[k] = OPERATIONS[each.operation].format(*arguments)
             if uses[k] > 1:

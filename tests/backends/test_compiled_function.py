@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
+from nlp_gait.backends.functions import function_source
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.errors import GaitError, InputError, UnknownNameError
 from nlp_gait.formulation import Array
@@ -33,7 +34,7 @@ def make_matrices() -> ca.Function:
     x, A, s = ca.MX.sym("x", 2), ca.MX.sym("A", 3, 2), ca.MX.sym("s")
     z = ca.SX.sym("z", 2)
     wave = ca.Function("wave", [z], [ca.sin(z) * z[0]]).map(3)
-    B = wave(ca.horzcat(x, 2 * x, 3 * x)) @ A * s
+    B = wave(ca.horzcat(x, 2 * x, 3 * x)) @ ca.if_else(A > 0, A, ca.if_else(s > 0, 2 * A, A)) * s
     return ca.Function("matrices", [x, A, s], [B, ca.norm_2(A @ x), ca.diag(x), ca.if_else(s > 0, x, -x, True)])
 
 
@@ -55,7 +56,9 @@ def test_scalar_operations_agree_with_casadi_also_for_nan(lanes: int) -> None:
         np.testing.assert_allclose(found, expected, rtol=TOLERANCE, atol=TOLERANCE)
 
 
-def test_matrices_and_loops_and_arguments_for_all_rows() -> None:
+@pytest.mark.parametrize("most_expanded", [0, 5000])
+def test_matrices_and_loops_and_arguments_for_all_rows(most_expanded: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(function_source, "MOST_EXPANDED", most_expanded)
     function, rng = make_matrices(), np.random.default_rng(1)
     compiled = nlp_gait.compile_function(function, threads=1)
     x, A, s = rng.normal(size=(11, 2)), rng.normal(size=(3, 2)), rng.normal(size=11)

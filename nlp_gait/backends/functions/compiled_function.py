@@ -14,6 +14,7 @@ import numpy as np
 from nlp_gait.backends.functions.function_source import SYMBOLS, apply_to_symbols, make_kernel, write_rows_source
 from nlp_gait.backends.kernel.compiled import CHECK_POINTS, check_agreement, check_parallelism
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags
+from nlp_gait.backends.kernel.evaluators import get_address
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.backends.kernel.threads import RowThreads
 from nlp_gait.errors import InputError, format_value, unknown
@@ -114,9 +115,9 @@ class CompiledFunction:
     def _evaluate(self, pieces: Sequence[tuple[Array, bool]], results: Sequence[Array], cut: slice) -> None:
         if not hasattr(self._local, "memory"):  # scratch memory of the calling thread
             self._local.memory = np.empty(-(-self._memory_size // 8))
-            self._local.address = ctypes.c_void_p(_address(self._local.memory))
-        inputs = [_address(values if shared else values[cut]) for values, shared in pieces]
-        outputs = [_address(result[cut]) for result in results]
+            self._local.address = ctypes.c_void_p(get_address(self._local.memory))
+        inputs = [get_address(values if shared else values[cut]) for values, shared in pieces]
+        outputs = [get_address(result[cut]) for result in results]
         failed = self._native(
             (ctypes.c_void_p * len(inputs))(*inputs),
             bytes(shared for _, shared in pieces),
@@ -182,8 +183,3 @@ def _find(kind: str, which: int | str, names: Sequence[str]) -> int:
     if isinstance(which, int) and 0 <= which < len(names):
         return which
     raise unknown(kind, str(which), [*names, *map(str, range(len(names)))])
-
-
-def _address(array: Array) -> int:
-    address: int = array.__array_interface__["data"][0]
-    return address

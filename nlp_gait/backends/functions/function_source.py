@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import casadi as ca
@@ -60,12 +61,9 @@ def apply_to_symbols(function: ca.Function) -> tuple[list[Any], list[Any]]:
 def _expand(function: ca.Function) -> ca.Function:
     unsupported = set(_find_unsupported(function))
     if not unsupported & NOT_EXPANDED:
-        try:
+        with suppress(RuntimeError):  # an operation has no form of scalar operations
             scalar = function.expand()
             unsupported = set(_find_unsupported(scalar))
-        except RuntimeError:  # the operation has no form of scalar operations
-            pass
-        else:
             if not unsupported:
                 return scalar
     raise InputError(
@@ -80,10 +78,7 @@ def _count_operations(function: ca.Function) -> int:
         return function.n_instructions()
     parts = function.find_functions(0)
     if function.class_name() in LOOPS:
-        sizes = (("numel_in", function.n_in()), ("numel_out", function.n_out()))
-        counts = [
-            getattr(function, size)(i) // max(1, getattr(parts[0], size)(i)) for size, n in sizes for i in range(n)
-        ]
+        counts = [function.numel_in(i) // max(1, parts[0].numel_in(i)) for i in range(function.n_in())]
         return _count_operations(parts[0]) * max(counts)
     total = 0
     for k in range(function.n_instructions()):
@@ -112,7 +107,8 @@ def write_rows_source(kernel: ca.Function) -> str:
     """Return the C++ source of a kernel from ``make_kernel``; the lane count is the macro LANES."""
     inputs = [str(kernel.numel_in(i)) for i in range(kernel.n_in())]
     outputs = [str(kernel.numel_out(i)) for i in range(kernel.n_out())]
-    code = generate_lane_code(kernel)
+    entry = r"(\(\*\w+\+\+\)|\w+(?:\[i\])?)"  # of a vector, in a loop
+    code = re.sub(rf"\({entry}\?{entry}:0\)", r"if_else_zero(\1,\2)", generate_lane_code(kernel))
     if kernel.is_a("SXFunction"):  # no argument or result is left out
         code = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", code))
     return "\n".join(

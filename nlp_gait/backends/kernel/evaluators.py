@@ -46,22 +46,23 @@ class NativeKernel:
         if not hasattr(self._local, "memory"):  # scratch memory of the calling thread
             self._local.memory = np.empty(-(-self._workspace_bytes // 8))
         failed = self._evaluate(
-            _address(X),
+            get_address(X),
             len(X),
-            _address(p),
-            _address(lower),
-            _address(upper),
-            _address(self._weights),
-            _address(f),
-            _address(violation),
-            None if g is None else _address(g),
-            _address(self._local.memory),
+            get_address(p),
+            get_address(lower),
+            get_address(upper),
+            get_address(self._weights),
+            get_address(f),
+            get_address(violation),
+            None if g is None else get_address(g),
+            get_address(self._local.memory),
         )
         if failed:
             raise RuntimeError("the compiled kernel reported a failure")
 
 
-def _address(array: Array) -> int:
+def get_address(array: Array) -> int:
+    """Return the address of an array's first number."""
     address: int = array.__array_interface__["data"][0]
     return address
 
