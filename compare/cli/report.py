@@ -54,6 +54,9 @@ def report(
         bool,
         typer.Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored."),
     ] = False,
+    latex: Annotated[
+        bool, typer.Option("--latex", help="Also write a table of each problem for papers (LaTeX, package booktabs).")
+    ] = False,
     code: Code = None,
     drive_options: DriveOptions,
     as_csv: AsCsv = False,
@@ -86,7 +89,9 @@ def report(
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
     simulated = simulate_best(folder, records, drive_options.make()) if engine else []
-    written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, as_csv=as_csv)
+    written = write_report(
+        folder, records, manifest, weighting, excluded=evidence.excluded, as_csv=as_csv, as_latex=latex
+    )
     data = {**plain_simulations(simulated), "excluded": [exclusion.sentence for exclusion in evidence.excluded]}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
     end_if_excluded(evidence.excluded)

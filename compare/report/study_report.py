@@ -12,6 +12,7 @@ from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.document import Document, Figure, Section, text_table
+from compare.report.latex_table import write_latex_tables
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import (
     TERMS,
@@ -42,11 +43,15 @@ def write_report(
     *,
     excluded: Sequence[Exclusion] = (),
     as_csv: bool = False,
+    as_latex: bool = False,
 ) -> list[Path]:
-    """Write the report with stored simulations, the figures as PNG and SVG, and optionally CSV files; return all paths."""
+    """Write the report with stored simulations, the figures as PNG and SVG, optionally CSV and LaTeX files; return all paths."""
     simulated = load_simulations(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, simulated, excluded))
-    written += write_better_points(folder, compare_problems(records))
+    comparisons = compare_problems(records, weighting)
+    written += write_better_points(folder, comparisons)
+    if as_latex:
+        written += write_latex_tables(folder, comparisons)
     if as_csv:
         written += _write_csv_files(folder, records)
     return written

@@ -1,0 +1,54 @@
+"""Tables for papers: their numbers are those of the runs, and LaTeX reads them."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from statistics import mean, stdev
+
+import pytest
+
+from compare.analysis.comparison import compare_problems
+from compare.report.latex_table import format_latex_table
+from compare.study.record import RunRecord
+from compare.study.run_study import Study, run_study
+from compare.study.task import ProblemSpec, Stop, Task
+
+
+@pytest.fixture(scope="module")
+def records() -> list[RunRecord]:
+    problem, stop = ProblemSpec(name="walk12"), Stop(evaluations=1000)
+    labels = {"pso": "pso", "random": "RD_1 50"}
+    tasks = [
+        Task(problem=problem, solver=solver, stop=stop, run=run, label=labels[solver])
+        for solver in labels
+        for run in range(6)
+    ]
+    return run_study(Study(tasks=tuple(tasks)))
+
+
+def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
+    text = format_latex_table(compare_problems(records)[0])
+    rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines() if line.startswith(("pso", "RD"))]
+    assert [row[0] for row in rows] == ["pso", r"RD\_1 50"] and rows[0][2].startswith("0.")
+    for row, solver in zip(rows, ("pso", "RD_1 50"), strict=True):
+        values = [r.verdict.objective for r in records if r.solver == solver and r.verdict.feasible]
+        assert row[1] == f"{len(values)}/6"
+        assert row[2] == f"{max(values):.4f}" and row[6] == f"{min(values):.4f}"  # maximised
+        assert (row[4], row[5]) == (f"{mean(values):.4f}", f"{stdev(values):.4f}")
+    assert rows[0][3].startswith(r"\textbf{") and not rows[1][3].startswith(r"\textbf{") and float(rows[1][8]) < 0.05
+    assert "n = 6 runs" in text and "at most 1,000 evaluations" in text and "rank-sum" in text
+    assert not re.search(r"(?<!\\)[%&_#](?! )", text.split(r"\begin{tabular}")[0].replace(r"\label{tab:walk12}", ""))
+
+
+def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
+    if shutil.which("pdflatex") is None:
+        pytest.skip("pdflatex is not installed")
+    table = format_latex_table(compare_problems(records)[0])
+    page = "\\documentclass{article}\n\\usepackage{booktabs}\n\\begin{document}\n" + table + "\\end{document}\n"
+    (tmp_path / "page.tex").write_text(page)
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "page.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "LaTeX Warning" not in done.stdout
