@@ -21,6 +21,7 @@ from nlp_gait.gaits.stairs.robot import toe_foot_biped
 INERTIAS = (0.0, 1.0, 2.0)  # as multiples of those of slender rods
 SETBACKS = (0.0, 0.03, 0.09)  # of edges behind the ankle that stands on the step [m]
 NOT_COMPUTED = "not computed with this effort"
+NAMES = {"jerk": "plan of least jerk", "plan": "plan of least energy"}
 LEARNED = ("closed-form cost", "network cost", "largest_angle_error_rad")
 
 
@@ -52,7 +53,10 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
 def _describe_plans(findings: StairsFindings, name: str) -> str:
     if name and name not in findings.effort.plan_choices:
         return NOT_COMPUTED
-    return ", ".join(f"{describe_plan(findings, what, name)} {PLANS[what]}" for what in list_choice_plans(name))
+    found = {what: describe_plan(findings, what, name) for what in list_choice_plans(name)}
+    return ", ".join(
+        f"no {NAMES[what]} found" if "(" in text else f"{text} {PLANS[what]}" for what, text in found.items()
+    )
 
 
 def _describe_step(findings: StairsFindings, name: str) -> str:
