@@ -57,13 +57,13 @@ def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> l
         "col": "\n".join([*columns, ""]),
         "row": "\n".join([*rows, problem.objective.name, ""]),
     }
-    paths = {ending: make_writable_folder(folder) / f"{prefix}.{ending}" for ending in (*texts, "json")}
+    paths = {ending: make_writable_folder(folder) / f"{prefix}.{ending}" for ending in (*texts, "facts.json")}
     check_own_file(paths["nl"])
     for ending, text in texts.items():
         write_text(paths[ending], text)
     facts = {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
     scales = {"offset": model.offset.tolist(), "scale": model.scale.tolist()}
-    write_json(paths["json"], {**facts, "objective": asdict(problem.objective), **known, **scales})
+    write_json(paths["facts.json"], {**facts, "objective": asdict(problem.objective), **known, **scales})
     return list(paths.values())
 
 
