@@ -179,8 +179,10 @@ def _describe_hips(findings: StairsFindings) -> dict[str, str | Series]:
 
 def _check_step(what: str) -> Checker:
     def check(findings: StairsFindings) -> Check:
-        held = decide(min(_collect(findings, what)["zmp_margin_min_m"]) >= 0)
-        return _require_plans(findings, held, what, dense=True)
+        runs = [findings.best(what, case) for case in findings.cases]
+        margins = [(run.verdict.dense or run.verdict.indexes)["zmp_margin_min_m"] for run in runs]
+        between = "; ".join(list_infeasible(runs, dense=True)) or "nothing"
+        return _require_plans(findings, decide(min(margins) >= 0, between=between), what)
 
     return check
 
@@ -205,8 +207,10 @@ def _measure_shanks(findings: StairsFindings) -> dict[str, Series]:
 
 
 def _check_easier(findings: StairsFindings) -> Check:
-    first, following = (np.array(_collect(findings, what)["zmp_margin_min_m"]) for what in ("first", "landing"))
-    return _require_plans(findings, require_change(1e3 * (first - following)), "first", "landing")
+    first, following = (_collect(findings, what) for what in ("first", "landing"))
+    signs = {"zmp_margin_min_m": 1, "peak_torque_Nm": -1, "energy_J": -1, "peak_jerk_rad_s3": -1}
+    changes = [100 * sign * (np.divide(first[name], following[name]) - 1) for name, sign in signs.items()]
+    return _require_plans(findings, require_change(changes), "first", "landing")
 
 
 def _check_adaptation(findings: StairsFindings) -> Check:
