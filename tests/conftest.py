@@ -5,13 +5,13 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache, wraps
-from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import settings
 
 from nlp_gait.backends.kernel.compiled import available_cores
+from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
@@ -29,7 +29,7 @@ sys.dont_write_bytecode = False
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Folders of tests that start whole commands, studies and papers; other slow tests are marked where they stand.
-SLOW_FOLDERS = tuple(Path(__file__).parent / "compare" / name for name in ("cli", "papers", "questions"))
+SLOW_FOLDERS = tuple(f"tests/compare/{name}/" for name in ("cli", "papers", "questions"))
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -41,7 +41,7 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what lies in these folders."""
     for item in items:
-        if any(folder in item.path.parents for folder in SLOW_FOLDERS):
+        if item.nodeid.startswith(SLOW_FOLDERS):
             item.add_marker(pytest.mark.slow)
 
 
@@ -73,6 +73,16 @@ def coarse_pages() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("compare.report.writing.save", save_coarsely)
         yield
+
+
+@pytest.fixture
+def interpreted_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Find no compiler, for tests whose few evaluations take less time than it."""
+
+    def find_none() -> None:
+        raise CompilerError("not in this test")
+
+    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.find_compiler", find_none)
 
 
 @pytest.fixture

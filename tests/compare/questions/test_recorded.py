@@ -63,7 +63,7 @@ def test_tighter_limits_are_named(gait: Path, monkeypatch: pytest.MonkeyPatch) -
         (["evaluate", "nao-ssp"], "give a point with --x, or a motion with --motion"),
         (
             ["evaluate", "--x", "1,2"],
-            "name the problem, for example nao-ssp; it may be left out only with --motion and --check",
+            "name the problem, for example nao-ssp; it may be left out only where a file names it",
         ),
         (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no effect on a given motion"),
         (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),

@@ -77,7 +77,9 @@ def test_a_polished_run_is_of_the_settings_of_its_search(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_a_robot_is_its_content_wherever_its_file_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_is_its_content_wherever_its_file_lies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interpreted_kernels: None
+) -> None:
     """Made heavier, it is another problem; moved, it is the same."""
 
     def study(robot: str) -> StudySettings:
