@@ -23,7 +23,7 @@ T = np.array([0.0, 0.5, 1.0])
 
 @pytest.fixture(scope="module")
 def solution() -> nlp_gait.Solution:
-    return nlp_gait.solve("nao-dsp", starts=1, solver=nlp_gait.IpoptSettings(few_rows=False))
+    return nlp_gait.solve("nao-dsp", starts=1)
 
 
 @pytest.fixture
