@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from compare.papers.claims import Verdict
-from compare.papers.walk12 import walk12_walks
+from compare.papers.walk12 import walk12_runs, walk12_walks
 from compare.papers.walk12.walk12_paper import F1_CHANGES, F1MAX, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
@@ -26,7 +27,14 @@ from tests.compare.papers.walk12_readings import (
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
     """The least of the quick reproduction: one start, one step in the engine, few of the paper's time steps."""
+    simulate_walks, walked = walk12_runs.simulate_walks, list[dict[str, Any]]()
+
+    def simulate_once(gait: tuple[float, str, Sequence[float]], starts: int) -> list[dict[str, Any]]:
+        walked[:] = walked or simulate_walks(gait, starts)
+        return [{**walk, "weight": gait[0], "by": gait[1]} for walk in walked]
+
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(walk12_runs, "simulate_walks", simulate_once)
         patch.setitem(vars(REPRODUCTION), "quick", replace(REPRODUCTION.quick, starts=1, runs=1))
         patch.setattr(walk12_walks, "WALKED_STEPS", 1)
         patch.setattr(walk12_walks, "STEP_TIMES_S", (1.0,))
