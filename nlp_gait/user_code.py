@@ -35,7 +35,8 @@ Kind = Literal["problem", "algorithm"]
 GROUPS: Mapping[Kind, str] = {"problem": "nlp_gait.problems", "algorithm": "nlp_gait.algorithms"}
 ENDING = ".py"
 PROGRAM = "cmd:"
-LARGEST_SOURCE = 64 * 2**20  # bytes; a program may be compiled
+LARGEST_SOURCE = 4 * 2**20  # bytes
+LARGEST_PROGRAM = 64 * 2**20  # it may be compiled
 
 _allowed: dict[str, str] = {}
 
@@ -334,4 +335,5 @@ def _read_source(place: Reference, text: str) -> tuple[str, bytes]:
 
 
 def _read(path: Path, what: str = "code") -> bytes:
-    return read_bytes(path, what, error=UserCodeError, at_most=LARGEST_SOURCE)
+    at_most = LARGEST_SOURCE if path.suffix == ENDING else LARGEST_PROGRAM
+    return read_bytes(path, what, error=UserCodeError, at_most=at_most)
