@@ -24,6 +24,7 @@ from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 # Elements that are read; shapes, transmissions and plugins are removed before parsing.
 READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}
 TURNING = ("revolute", "continuous")
+MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
 # The parser's message for an unknown attribute of an element without numbers.
 OWNER = re.compile(r"^Unknown attribute .* in (/robot[^/]*)?/?(robot|link|joint)(\[[^\]]*\])?$")
 
@@ -136,6 +137,9 @@ def _read_xml(path: str) -> Any:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {error}") from error
     if root.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
         raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
+    parts = len(root.findall("link")) + len(root.findall("joint"))
+    if parts > MOST_PARTS:
+        raise ValueError(f"it has {parts} links and joints, more than {MOST_PARTS}; simplify the file")
     for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in root.iter("mesh"))):
         protect_input(mesh)
     return root

@@ -14,6 +14,7 @@ from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import limits, mjcf_counts
 from nlp_gait.robots.meshes import mesh_points
 from nlp_gait.robots.mjcf import mjcf_record
+from nlp_gait.robots.urdf import urdf_record
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory exist on Linux")
 
@@ -102,3 +103,12 @@ def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
     )
     with pytest.raises(RobotDataError, match="more than 4000000 points; simplify it"):
         mesh_points(file)
+
+
+def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
+    pytest.importorskip("urdf_parser_py")
+    file = tmp_path / "chain.urdf"
+    links = "".join(f'<link name="a{k}"/><joint name="j{k}" type="fixed"/>' for k in range(20_000))
+    file.write_text(f'<robot name="r">{links}</robot>')
+    with pytest.raises(ValueError, match="it has 40000 links and joints, more than 2000; simplify the file"):
+        urdf_record(str(file))
