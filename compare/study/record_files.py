@@ -62,10 +62,12 @@ def read_records(folder: Path) -> list[RunRecord]:
 def read_each(folder: Path) -> list[tuple[Path, RunRecord | InputError]]:
     """Return files and records in the order of ``read_records``, damaged ones as their error; InputError if there are none."""
     with convert_errors(f"folder {str(folder)!r} cannot be read", InputError):
-        paths = sorted((folder / RECORDS).glob("*/*.json"))
-    if not paths:
+        found: list[tuple[Path, RunRecord | InputError]] = []
+        for place in sorted({path.parent for path in (folder / RECORDS).glob("*/*.json")}):
+            with lock_folder(place):  # another study may rename them
+                found += [(path, _read_or_error(path)) for path in sorted(place.glob("*.json"))]
+    if not found:
         raise InputError(f"{str(folder)!r} contains no records ({RECORDS}/<problem>/<solver>-<run>.json)")
-    found = [(path, _read_or_error(path)) for path in paths]
     found.sort(key=lambda item: isinstance(item[1], RunRecord) and item[0] != _locate(folder / RECORDS, item[1]))
     return found
 

@@ -27,6 +27,7 @@ from nlp_gait.robots.urdf import collision_points, list_meshes, urdf_record
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
 LONGEST_CHAIN = 8  # of robots that extend each other
+MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
 REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2", "unphysical")
 
@@ -250,6 +251,10 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
     if not models:
         return file, []
     model, notes = min(models), list[str]()
+    if len(file.joints) > MOST_JOINTS:
+        raise RobotDataError(
+            f"robot file {model!r} has {len(file.joints)} turning joints, more than {MOST_JOINTS}; remove what no gait needs"
+        )
 
     def find_fault_in(records: Mapping[str, _Record], decode: Callable[[str, _Record], object]) -> FindFault:
         # Faults of a robot file are errors; those of a URDF or MJCF may not matter.

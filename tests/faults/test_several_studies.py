@@ -30,6 +30,7 @@ def write_study(folder: Path, study: int, start: float, seed: int) -> None:
         write_record(record, folder)
         found, _ = find_record(folder, make_task(study, draw.randrange(run + 1)))
         assert found is not None and found.definition["stop"]["evaluations"] == 50 + study
+        assert len(read_records(folder)) > run  # as for the report, while others rename
 
 
 @pytest.mark.slow

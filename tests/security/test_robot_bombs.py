@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots import limits, mjcf_counts
+from nlp_gait.robots import limits, load_robot, mjcf_counts
 from nlp_gait.robots.meshes import mesh_points
 from nlp_gait.robots.mjcf import mjcf_record
 from nlp_gait.robots.urdf import urdf_record
@@ -112,3 +112,12 @@ def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
     file.write_text(f'<robot name="r">{links}</robot>')
     with pytest.raises(ValueError, match="it has 40000 links and joints, more than 2000; simplify the file"):
         urdf_record(str(file))
+
+
+@pytest.mark.parametrize("joints", [401, 900])
+def test_a_robot_with_many_joints_is_rejected(tmp_path: Path, joints: int) -> None:
+    pytest.importorskip("mujoco")
+    file = tmp_path / "joints.xml"
+    file.write_text(_write_model(body='<body><joint/><geom size="1"/></body>' * joints))
+    with pytest.raises(RobotDataError, match=f"has {joints} turning joints, more than 400; remove"):
+        load_robot(str(file))
