@@ -113,11 +113,14 @@ def describe_type(kind: type) -> str:
     return names.get(kind, kind.__name__)
 
 
+NO_MEMORY = ("failed to map segment", "std::bad_alloc")  # in errors of the dynamic loader and of C++
+
+
 def describe_shortage(error: BaseException | None) -> str | None:
     """Return which resource of the system is used up, by an error or its causes; None for any other error."""
     while error is not None:
         number, text = getattr(error, "errno", None), str(error)
-        if isinstance(error, MemoryError) or number == errno.ENOMEM or "failed to map segment" in text:
+        if isinstance(error, MemoryError) or number == errno.ENOMEM or any(words in text for words in NO_MEMORY):
             return "there is not enough memory"
         if number in (errno.EMFILE, errno.ENFILE):
             return "too many files are open"

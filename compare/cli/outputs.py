@@ -12,7 +12,7 @@ from pathlib import Path
 
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import CompilerError, InputError, OutputError
-from nlp_gait.files import check_name, check_output, is_forced, make_writable_folder
+from nlp_gait.files import check_name, check_output, is_forced, make_writable_folder, write_text
 
 REGISTER = "written"  # folder in the cache folder
 
@@ -45,10 +45,10 @@ def register_written() -> Iterator[None]:
         yield
     finally:
         for path, before in _named.items():
-            with suppress(OSError, CompilerError):  # then --force is needed the next time
+            with suppress(OSError, CompilerError, OutputError):  # then --force is needed the next time
                 if (now := _hash(path)) not in ("", before):
                     make_folder(_find_entry(path).parent, mode=0o700)
-                    _find_entry(path).write_text(now, encoding="ascii")
+                    write_text(_find_entry(path), now)
 
 
 def _is_registered(path: Path) -> bool:

@@ -42,7 +42,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
         for module in (mjcf, measurements, simulate):
             patch.setattr(module, "TIME_STEP", 0.002)
         patch.setattr(walk12_problem, "PRINTED_STEPS", 100)
-        patch.setattr(walk12_problem, "GAUSS_NODES", 80)
         drawn = ("tradeoff", "fig08", "fig12-13")
         yield reproduce("walk12", tmp_path_factory.mktemp("walk12"), coarse=True, drawn=drawn)
 
