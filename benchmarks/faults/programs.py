@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import chdir
 from pathlib import Path
 
 from compare.study.record import RunRecord
@@ -91,7 +92,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     rng, kinds = random.Random(arguments.seed), list(FAULTS)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
         programs = {}
         for k in range(arguments.count):
             kind = kinds[k % len(kinds)]
