@@ -76,20 +76,15 @@ def test_a_shortage_at_the_start_of_workers_is_one_sentence(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("limit", ["-n 24", "-v 300000"])
-def test_a_limit_of_the_shell_is_one_sentence_and_keeps_runs(limit: str, tmp_path: Path) -> None:
+def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path) -> None:
     line = "compare walk12 --algorithms random --starts 0 --evaluations 60 --out study --jobs"
     program = [sys.executable, "-m", "nlp_gait"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    if limit.startswith("-n"):
-        subprocess.run([*program, *line.split(), "1", "--runs", "2"], cwd=tmp_path, env=environment, check=True)
+    subprocess.run([*program, *line.split(), "1", "--runs", "2"], cwd=tmp_path, env=environment, check=True)
     done = subprocess.run(
-        ["sh", "-c", f'ulimit {limit}; exec "$@"', "sh", *program, *line.split(), "20", "--runs", "22"],
-        cwd=tmp_path, env=environment, capture_output=True, text=True,
+        ["sh", "-c", 'ulimit -n 24; exec "$@"', "sh", *program, *line.split(), "20", "--runs", "22"],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120,
     )  # fmt: skip
-    reason = "too many files are open" if limit.startswith("-n") else "there is not enough memory"
-    sentences = [line for line in done.stderr.splitlines() if line.startswith("nlp-gait: ")]
-    assert done.returncode == 1 and len(sentences) == 1 and reason in sentences[0], done.stderr[-2000:]
-    if limit.startswith("-n"):  # joblib's workers that have no memory to begin print what they lack
-        assert done.stdout == "" and done.stderr.count("\n") == 1
-    assert len(list(tmp_path.glob("study/records/*/*.json"))) == (2 if limit.startswith("-n") else 0)
+    assert done.returncode == 1 and done.stdout == "" and done.stderr.count("\n") == 1
+    assert "too many files are open" in done.stderr
+    assert len(list(tmp_path.glob("study/records/*/*.json"))) == 2
