@@ -13,7 +13,6 @@ from compare.papers.walk12 import walk12_runs, walk12_walks
 from compare.papers.walk12.walk12_paper import F1_CHANGES, F1MAX, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
-from nlp_gait.gaits.walk12 import walk12_problem
 from nlp_gait.simulation import measurements, mjcf, simulate
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 from tests.compare.papers.walk12_readings import (
@@ -41,7 +40,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
         patch.setattr(simulate, "SETTLE_TIME", 0.0)
         for module in (mjcf, measurements, simulate):
             patch.setattr(module, "TIME_STEP", 0.002)
-        patch.setattr(walk12_problem, "PRINTED_STEPS", 100)
         drawn = ("tradeoff", "fig08", "fig12-13")
         yield reproduce("walk12", tmp_path_factory.mktemp("walk12"), coarse=True, drawn=drawn)
 
