@@ -7,10 +7,10 @@ same margins.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
+from unittest.mock import patch
 
 import casadi as ca
 import numpy as np
@@ -82,17 +82,6 @@ def keep_velocities(X: Array, V: Array, lower: Array, upper: Array) -> tuple[Arr
     return np.clip(X, lower, upper), V
 
 
-@contextmanager
-def replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
-    """Replace an attribute for a while."""
-    before = getattr(owner, name)
-    setattr(owner, name, value)
-    try:
-        yield
-    finally:
-        setattr(owner, name, before)
-
-
 def load_with_zero_margins(phase: str) -> nlp_gait.GaitProblem:
     """Return a phase whose margins are zero outside the sole and must be positive, (21) and (22) as printed."""
     usual = BalanceMargins.__init__
@@ -100,7 +89,7 @@ def load_with_zero_margins(phase: str) -> nlp_gait.GaitProblem:
     def clip(self: BalanceMargins, margins: Callable[..., Any], means: tuple[float, float]) -> None:
         usual(self, lambda *at: tuple(ca.fmax(margin, 0.0) for margin in margins(*at)), means)
 
-    with replaced(BalanceMargins, "__init__", clip):
+    with patch.object(BalanceMargins, "__init__", clip):
         problem = nlp_gait.load(phase)
         problem.signals(np.array([problem.lower, problem.upper]).mean(axis=0))  # builds it
         nlp_gait.compile_objective(problem)
@@ -129,7 +118,7 @@ def main() -> None:
             found = {"ours": ours, "margins zero outside the sole": run(zero, algorithm)}
             if damping is not None:
                 found["best updated after every particle"] = run(problem, AsynchronousSwarm(inertia_damping=damping))
-                with replaced(particle_swarm, "reflect", keep_velocities):
+                with patch.object(particle_swarm, "reflect", keep_velocities):
                     found["velocities kept at a bound"] = run(problem, algorithm)
             for rules, powers in found.items():
                 p = [rank_sum_normal(powers, other).p_two_sided for other in (ours, ga.get(rules, ga["ours"]))]

@@ -128,15 +128,17 @@ class ProgramSearch(CallingSearch):
         """Return the program's next line, or None after the last one."""
         latest = monotonic() + self._settings.answer_s
         while True:
-            ended = program.poll() is not None  # then what it has started may still hold its output
+            ended = program.poll() is not None
+            if ended:  # what it has started may hold its output for ever
+                latest = min(latest, monotonic() + END_WITHIN_S)
             try:
                 line = self._lines.get(timeout=CHECKED_EVERY_S)
             except queue.Empty:
+                if monotonic() <= latest:
+                    continue
                 if ended:
                     return None
-                if monotonic() > latest:
-                    raise SearchError(f"the program sent nothing for {self._settings.answer_s:g} s") from None
-                continue
+                raise SearchError(f"the program sent nothing for {self._settings.answer_s:g} s") from None
             if line is not None and len(line) == LONGEST_LINE:
                 raise SearchError(f"the program sent a line of {LONGEST_LINE} bytes or more")
             return line

@@ -124,7 +124,7 @@ def parse_command(text: str) -> tuple[str, ...]:
     """Return the words of ``cmd:COMMAND``.
 
     Raises:
-        UserCodeError: there is none, a quote is not closed, or the program is not on this machine.
+        UserCodeError: the command is empty, has an open quote, or names a program that is not found.
     """
     try:
         words = tuple(shlex.split(text.removeprefix(PROGRAM)))

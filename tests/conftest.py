@@ -11,7 +11,6 @@ import pytest
 from hypothesis import settings
 
 from nlp_gait.backends.kernel.compiled import available_cores
-from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
@@ -76,16 +75,6 @@ def coarse_pages() -> Iterator[None]:
 
 
 @pytest.fixture
-def interpreted_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Find no compiler, for tests whose few evaluations take less time than it."""
-
-    def find_none() -> None:
-        raise CompilerError("not in this test")
-
-    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.find_compiler", find_none)
-
-
-@pytest.fixture
 def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Do so for a test."""
     from tests.compare.pictures import save_coarsely
@@ -94,7 +83,7 @@ def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no compiler be found, where a kernel would take longer to compile than its few calls when they are interpreted."""
     for name in ("CXX", "CC", "PATH"):
         monkeypatch.setenv(name, "")

@@ -24,7 +24,7 @@ def is_zero(reference: float) -> bool:
 
 
 def describe_value(known: Reference, value: float | None, objective: Objective, what: str = "this point") -> str:
-    """Return the shipped best known value, or that there is none, and how far a feasible objective is from it."""
+    """Describe the shipped best known value, and the distance of a feasible objective from it; say so if none is shipped."""
     if known.objective is None:
         return f"Best known value: {known.source.removeprefix(OWN)[2:]}"
     best = f"{with_unit(known.objective, objective.unit)} ({known.source})"

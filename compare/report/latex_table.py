@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean, stdev
 
-from compare.analysis.comparison import Comparison, SolverRuns
+from compare.analysis.comparison import Comparison
+from compare.analysis.solver_table import summarise
 from compare.analysis.units import heading, join_words, with_unit
 from compare.analysis.verdict import SIGNIFICANT, compare_pairs
 from nlp_gait.files import make_file_name, write_text
 
-HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", r"gap [\%]", "$p$")
+HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "gap", "$p$")
 SPECIAL = str.maketrans(
     {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}"}
 )
@@ -28,11 +29,22 @@ def write_latex_tables(folder: Path, comparisons: Sequence[Comparison]) -> list[
 
 
 def format_latex_table(comparison: Comparison) -> str:
-    """Return the table of one problem: a row for each solver, the best median first."""
-    leader = comparison.solvers[0]
-    differences = {pair.second: pair.rank_sum for pair in compare_pairs(comparison) if pair.first == leader.name}
-    rows = [_format_row(comparison, solver, leader, differences) for solver in comparison.solvers]
-    lines = [" & ".join(row) + r" \\" for row in (HEADER, *rows)]
+    """Return the table of one problem: a row for each solver, the best median over all runs first."""
+    leader = comparison.solvers[0].name
+    p_values = {pair.second: pair.rank_sum for pair in compare_pairs(comparison) if pair.first == leader}
+    best = {leader, *(name for name, p in p_values.items() if p >= SIGNIFICANT)} if p_values else set()
+    lines = [" & ".join(HEADER) + r" \\"]
+    for solver, summary in zip(comparison.solvers, summarise(comparison), strict=True):
+        values = [comparison.value(cost) for cost in solver.feasible]
+        deviation = stdev(values) if len(values) > 1 else None
+        numbers = (summary.best, summary.median, mean(values) if values else None, deviation, summary.worst)
+        cells = [_format_number(number) for number in numbers]
+        if solver.name in best and values:
+            cells[1] = rf"\textbf{{{cells[1]}}}"
+        p, gap = p_values.get(solver.name), comparison.format_gap(summary.gap).translate(SPECIAL)
+        shown_p = UNKNOWN if p is None else "$<$0.001" if p < 0.001 else f"{p:.3f}"
+        row = (solver.name.translate(SPECIAL), f"{summary.feasible}/{summary.runs}", *cells, gap, shown_p)
+        lines.append(" & ".join(row) + r" \\")
     return "\n".join(
         [
             r"\begin{table}",
@@ -52,38 +64,6 @@ def format_latex_table(comparison: Comparison) -> str:
     )
 
 
-def _format_row(
-    comparison: Comparison, solver: SolverRuns, leader: SolverRuns, differences: dict[str, float]
-) -> tuple[str, ...]:
-    values = [comparison.value(cost) for cost in solver.feasible]
-    known = bool(values)
-    p = differences.get(solver.name)
-    median = comparison.value(solver.median_cost)
-    numbers = [
-        values[0] if known else math.nan,
-        median,
-        mean(values) if known else math.nan,
-        stdev(values) if len(values) > 1 else math.nan,
-        values[-1] if known else math.nan,
-    ]
-    cells = [_format_number(number) for number in numbers]
-    is_best = solver is leader or (p is not None and p >= SIGNIFICANT)
-    if differences and is_best and math.isfinite(median):
-        cells[1] = rf"\textbf{{{cells[1]}}}"
-    gap = (
-        comparison.gap(solver.median_cost)
-        if math.isfinite(median) and math.isfinite(comparison.reference)
-        else math.nan
-    )
-    return (
-        solver.name.translate(SPECIAL),
-        f"{len(values)}/{len(solver.records)}",
-        *cells,
-        _format_number(100.0 * gap, ".2f"),
-        UNKNOWN if p is None else "$<$0.001" if p < 0.001 else f"{p:.3f}",
-    )
-
-
 def _write_caption(comparison: Comparison) -> str:
     objective, records = comparison.objective, comparison.records
     runs = sorted({len(solver.records) for solver in comparison.solvers})
@@ -98,17 +78,17 @@ def _write_caption(comparison: Comparison) -> str:
     sentences = [
         f"{heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: n = {count} runs of each "
         f"solver{budget}",
-        "The median is over all runs, a dash if half of them are infeasible; the other columns are over the feasible ones",
+        "Best to gap are over the feasible runs",
         gap,
-        "p: two-sided rank-sum test against the best median, Holm-corrected over all pairs of solvers",
-        f"Bold: the best median and those that do not differ from it at {SIGNIFICANT:g}",
+        "p: two-sided rank-sum test over all runs against the first solver, Holm-corrected over all pairs",
+        f"Bold: the first solver and those that do not differ from it at {SIGNIFICANT:g}",
     ]
     return ". ".join(sentence.translate(SPECIAL) for sentence in sentences) + "."
 
 
-def _format_number(value: float, digits: str = ".4f") -> str:
+def _format_number(value: float | None) -> str:
     """Format a number with a true minus sign."""
-    if not math.isfinite(value):
+    if value is None:
         return UNKNOWN
-    text = f"{value:{digits}}" if abs(value) < 1e6 else f"{value:.4e}"
+    text = f"{value:.4f}" if abs(value) < 1e6 else f"{value:.4e}"
     return text.replace("-", "$-$", 1) if text.startswith("-") else text

@@ -56,9 +56,9 @@ def run_jobs(
                     deaths = 0
                     yield position, record
             except WorkerError as error:
-                deaths += 1
                 if isinstance(error, NoWorkersError):
                     raise
+                deaths += 1
                 if deaths == DEATHS_WITHOUT_PROGRESS:
                     raise WorkerError(
                         f"a worker process died {deaths} times in a row, perhaps out of memory; finished runs are stored: "

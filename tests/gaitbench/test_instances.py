@@ -35,7 +35,7 @@ def points(instance: gaitbench.Instance, count: int = 6) -> Array:
 @pytest.fixture
 def published(id: str, request: pytest.FixtureRequest) -> gaitbench.Instance:
     if id not in QUICK:
-        request.getfixturevalue("interpreted")
+        request.getfixturevalue("without_compiler")
     return gaitbench.load(id)
 
 

@@ -179,7 +179,7 @@ def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, coarse_p
 
 @pytest.mark.slow
 def test_user_code_and_robots_travel_with_the_archive(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interpreted_kernels: None
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without_compiler: None
 ) -> None:
     from tests.robots.custom import humanoid
 

@@ -78,7 +78,7 @@ def test_a_polished_run_is_of_the_settings_of_its_search(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_a_robot_is_its_content_wherever_its_file_lies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interpreted_kernels: None
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without_compiler: None
 ) -> None:
     """Made heavier, it is another problem; moved, it is the same."""
 

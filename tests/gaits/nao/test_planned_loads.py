@@ -257,7 +257,7 @@ def test_nothing_breaks_between_samples() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("interpreted")
+@pytest.mark.usefixtures("without_compiler")
 def test_the_kernel_of_searches_has_the_same_values() -> None:
     problem = load("nao-dsp", torso_share="free")
     points = np.array([CHEAPEST, problem.start_point(np.random.default_rng(1))])

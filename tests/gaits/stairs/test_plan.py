@@ -75,7 +75,7 @@ def test_optimum_is_known_and_feasible_on_the_dense_grid(problem: GaitProblem, s
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("interpreted")
+@pytest.mark.usefixtures("without_compiler")
 def test_a_search_comes_near_from_above(problem: GaitProblem, solution: nlp_gait.Solution) -> None:
     found = minimize(nlp_gait.compile_objective(problem), ParticleSwarm(), evaluations=1_000, seed=0)
     assert found.feasible

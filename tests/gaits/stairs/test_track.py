@@ -152,7 +152,7 @@ def test_the_printed_zmp_has_no_spin_and_one_slope(problem: GaitProblem) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("interpreted")
+@pytest.mark.usefixtures("without_compiler")
 def test_multiple_shooting_meets_the_ants() -> None:
     """On the first 0.04 s, which solve in a second."""
     short = nlp_gait.load("stairs-track", duration_s=0.04)
