@@ -114,7 +114,7 @@ def resolve_code(text: str, kind: Kind, owner: str) -> str:
     short = parse_reference(text, kind).short
     if short not in _allowed:
         raise UserCodeError(
-            f"{owner} needs your code {text!r}, which runs only if you name it: add --code {text} (in Python, "
+            f"{owner} needs your code {text!r}, which runs only if you name it: add --code {shlex.quote(text)} (in Python, "
             f"call nlp_gait.load({text!r}) first)"
         )
     return _allowed[short] or text

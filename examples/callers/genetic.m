@@ -1,14 +1,14 @@
 % A genetic algorithm: nlp-gait compare nao-ssp --algorithms 'cmd:octave-cli --quiet genetic.m' (MATLAB: see docs/bring-your-own.md)
 1;
 function cost = evaluate(X)  % one number for each row of X, less is better; ends the program when the run is over
-  printf('{"x": [%s]}\n', strjoin(cellfun(@(x) ['[' strjoin(arrayfun(@(v) sprintf('%.17g', v), x, 'UniformOutput', false), ',') ']'], ...
-    num2cell(X, 2)', 'UniformOutput', false), ','));
+  rows = sprintf(['[' strjoin(repmat({'%.17g'}, 1, columns(X)), ',') '],'], X');
+  printf('{"x": [%s]}\n', rows(1:end-1));
   fflush(stdout);
-  answer = jsondecode(fgetl(stdin));
+  answer = jsondecode(input('', 's'));
   if isfield(answer, 'stop'), exit(0); end
   cost = answer.cost(:);
 end
-problem = jsondecode(fgetl(stdin));
+problem = jsondecode(input('', 's'));
 lower = problem.lower(:)'; upper = problem.upper(:)'; n = numel(lower); P = 40;
 rand('twister', problem.seed); randn('twister', problem.seed);
 X = lower + rand(P, n) .* (upper - lower);
