@@ -114,7 +114,10 @@ def test_callers_in_other_languages(caller: str) -> None:
     program, *arguments = caller.split()
     if shutil.which(program) is None:
         pytest.skip(f"{program} is not installed")
-    if program == "Rscript" and subprocess.run([program, "-e", "library(jsonlite)"], stderr=subprocess.DEVNULL).returncode:
+    if (
+        program == "Rscript"
+        and subprocess.run([program, "-e", "library(jsonlite)"], stderr=subprocess.DEVNULL).returncode
+    ):
         pytest.skip("R's package jsonlite is not installed")
     first, again = (run(program, *arguments[:-1], str(CALLERS / arguments[-1])) for _ in range(2))
     assert first.evaluations == 50 and np.array_equal(first.x, again.x), json.dumps(first.reasons)
