@@ -6,10 +6,8 @@ Independent of any problem and of CasADi: an objective is anything that follows 
     result = minimize(objective, algorithm("ga", survival="generational"), handling=EpsilonLevel())
 """
 
-from metaheuristics.algorithms.ant_colony import AntColony
-from metaheuristics.algorithms.ant_colony_grid import AntColonyGrid
-from metaheuristics.algorithms.genetic import GeneticAlgorithm
-from metaheuristics.algorithms.genetic_operators import Flip, Polynomial, SimulatedBinary, SinglePoint
+from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
+from metaheuristics.algorithms.genetic import Flip, GeneticAlgorithm, Polynomial, SimulatedBinary, SinglePoint
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, Rule, StaticPenalty

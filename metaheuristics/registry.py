@@ -45,9 +45,9 @@ ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = _Factories(
         "pso-constant": "algorithms.particle_swarm:ConstantInertiaSwarm",
         "ga": "algorithms.genetic:GeneticAlgorithm",
         "aco": "algorithms.ant_colony:AntColony",
-        "aco-grid": "algorithms.ant_colony_grid:AntColonyGrid",
+        "aco-grid": "algorithms.ant_colony:AntColonyGrid",
         "de": "algorithms.differential_evolution:DifferentialEvolution",
-        "lshade": "algorithms.lshade:LShade",
+        "lshade": "algorithms.differential_evolution:LShade",
         "random": "algorithms.random_search:RandomSearch",
         "sobol": "algorithms.random_search:SobolPoints",
     }

@@ -42,7 +42,6 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/gaits/biped/cycle.py": ("tests/gaits/nao/test_cycle.py",),
     "nlp_gait/gaits/biped/cycle_motion.py": ("tests/gaits/nao/test_cycle.py",),
     "nlp_gait/gaits/biped/cart_table.py": ("tests/gaits/nao/test_cart_table.py",),
-    "nlp_gait/gaits/biped/preview_control.py": ("tests/gaits/nao/test_cart_table.py",),
     "nlp_gait/symbolic/general_leg.py": ("tests/symbolic/test_general_leg.py",),
     "nlp_gait/proofs/affine.py": ("tests/proofs/test_affine.py",),
     "nlp_gait/proofs/guarantee.py": ("tests/proofs/test_guarantee.py",),

@@ -11,23 +11,20 @@ from typing import Annotated
 import typer
 
 import nlp_gait
-from compare.cli.archive import archive, verify
+from compare.cli.archive import archive, cite, verify
 from compare.cli.bench import bench
-from compare.cli.cite import cite
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
 from compare.cli.exchange import import_results, logs
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
-from compare.cli.questions.certainty import certainty
-from compare.cli.questions.changed_optima import motions, motors, prices, robust, sweep
+from compare.cli.questions.optima import certainty, motions, motors, prices, robust, sweep
 from compare.cli.questions.pareto import pareto
 from compare.cli.questions.walk import walk
 from compare.cli.report import report, reproduce
-from compare.cli.search import search
 from compare.cli.simulate import simulate
-from compare.cli.solve import solve
+from compare.cli.solve import search, solve
 
 PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, search),

@@ -1,4 +1,4 @@
-"""``nlp-gait archive`` and ``nlp-gait verify``."""
+"""``nlp-gait archive``, ``nlp-gait verify`` and ``nlp-gait cite``."""
 
 from __future__ import annotations
 
@@ -84,3 +84,28 @@ def _parse_share(text: str) -> float:
     if not 0.0 <= share <= 1.0:
         raise InputError(f"--rerun takes a share from 0% to 100%, got {text!r}")
     return share
+
+
+@command
+def cite(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[PROBLEM|PAPER|INSTANCE]",
+            help="What you used: a problem (`nlp-gait list`), a paper (nao, walk12, stairs) or an instance of GaitBench; "
+            "everything without it.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print BibTeX for the software, and for the papers and the suite that a problem comes from.
+
+    Examples: `nlp-gait cite`, `nlp-gait cite nao-ssp`, `nlp-gait cite ssp-v5`
+    """
+    from compare.study.citations import find_citations
+
+    found = find_citations(name)
+    if as_json:
+        print_json({"entries": found})
+    else:
+        stdout.print("\n\n".join(found), soft_wrap=True)

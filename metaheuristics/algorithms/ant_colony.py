@@ -1,4 +1,4 @@
-"""Ant colony optimisation on continuous variables, with an archive of good points as pheromone."""
+"""Ant colony optimisation: on continuous variables, with an archive of good points as pheromone, and on a grid of levels."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
@@ -94,3 +95,90 @@ class AntColonySearch(PopulationSearch[AntColony]):
     def stop(self) -> tuple[str, ...]:
         known = self._archive.X
         return ("archive collapsed to one point",) if len(known) and bool((known == known[0]).all()) else ()
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class AntColonyGrid:
+    """Discrete ant colony: each ant picks a level of each variable in proportion to its pheromone.
+
+    Pheromone evaporates, then the best point so far and the best ants of the generation deposit by rank. The amounts
+    are scaled so that the pheromone of a variable stays a probability. A small share of all choices is uniform, which
+    bounds pheromone from below and keeps the search alive at high evaporation. The answer is no finer than the grid.
+
+    Attributes:
+        population: Number of ants, and of starting points (which lie anywhere and deposit on the nearest level).
+        levels: Number of levels of each variable, bounds included.
+        evaporation: Share of pheromone lost in a generation. 0.7 is the value of Bhardwaj et al., Table IV.
+        depositors: Points that deposit: the best so far and the best ants of the generation.
+        exploration: Share of choices made regardless of pheromone.
+
+    Source:
+        Bullnheimer, Hartl, Strauss (1999), A new rank based version of the ant system (deposits); Blum, Dorigo (2004),
+        The hyper-cube framework (scaling); Stuetzle, Hoos (2000), MAX-MIN ant system (lower bound).
+    """
+
+    population: int = 30
+    levels: int = 101
+    evaporation: float = 0.7
+    depositors: int = 6
+    exploration: float = 0.1
+    name: ClassVar[str] = "aco-grid"
+
+    def __post_init__(self) -> None:
+        check_count(self, "population", at_least=1)
+        check_count(self, "levels", at_least=2)
+        check_number(self, "evaporation", above=0.0, at_most=1.0)
+        check_count(self, "depositors", at_least=1, at_most=self.population + 1)
+        check_number(self, "exploration", at_least=0.0, at_most=1.0)
+
+    def start(self, start: Start) -> AntColonyGridSearch:
+        return AntColonyGridSearch(self, start)
+
+
+def renew(pheromone: Array, chosen: NDArray[np.intp], weights: Array, evaporation: float) -> Array:
+    """Return pheromone (n, L) after evaporation and deposits; each row remains a probability over L levels.
+
+    Deposits on the levels (D, n) that some points chose, by weights (D,) >= 0 that are not all zero, replace the share that
+    evaporates.
+
+    Source:
+        Blum, Dorigo (2004), update rule of the hyper-cube framework.
+    """
+    renewed = (1.0 - evaporation) * pheromone
+    share = evaporation * weights / weights.sum()
+    np.add.at(renewed, (np.arange(len(pheromone)), chosen), share[:, None])
+    return renewed
+
+
+def pick(probability: Array, u: Array) -> NDArray[np.intp]:
+    """Return the levels (P, n), 0..L-1, that random numbers u (P, n) in [0, 1) pick by weights (n, L)."""
+    cumulative = np.cumsum(probability, axis=1)
+    passed = cumulative <= (u * cumulative[:, -1])[:, :, None]
+    last = probability.shape[1] - 1  # the limit, as rounding may let u times the total reach the total
+    levels: NDArray[np.intp] = np.minimum(passed.sum(axis=2), last)
+    return levels
+
+
+class AntColonyGridSearch(PopulationSearch[AntColonyGrid]):
+    """A run of `AntColonyGrid`; see `Search`."""
+
+    def __init__(self, settings: AntColonyGrid, start: Start) -> None:
+        super().__init__(settings, start)
+        self._best = Points.none(start.initial.shape[1])
+        self._pheromone = np.full((start.initial.shape[1], settings.levels), 1.0 / settings.levels)
+        self._spacing = (start.upper - start.lower) / (settings.levels - 1)
+
+    def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
+        settings, start = self._settings, self._start
+        ants = Points(X, f, violation).best(settings.depositors, rule)
+        self._best = self._best.join(ants).best(1, rule)
+        depositors = self._best.join(ants.take(slice(settings.depositors - 1)))
+        ranks = settings.depositors - np.arange(len(depositors.f))
+        weights = np.where(np.isfinite(depositors.f), ranks, 0.0)  # failed evaluations leave no trace
+        if weights.any():
+            spacing = np.where(self._spacing > 0.0, self._spacing, 1.0)
+            chosen = np.rint((depositors.X - start.lower) / spacing).astype(np.intp)
+            self._pheromone = renew(self._pheromone, chosen, weights, settings.evaporation)
+        probability = (1.0 - settings.exploration) * self._pheromone + settings.exploration / settings.levels
+        levels = pick(probability, start.rng.random((settings.population, X.shape[1])))
+        self._X = np.clip(start.lower + levels * self._spacing, start.lower, start.upper)

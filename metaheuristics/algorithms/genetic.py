@@ -1,26 +1,171 @@
-"""Real-coded genetic algorithm."""
+"""Real-coded genetic algorithm, with its crossovers and mutations.
+
+An operator is a frozen dataclass of settings that draws random numbers; its formula is a pure function of them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.algorithms.genetic_operators import (
-    Crossover,
-    Flip,
-    Mutation,
-    Polynomial,
-    SimulatedBinary,
-    SinglePoint,
-)
 from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.settings import bad_setting, check_count
+from metaheuristics.settings import bad_setting, check_count, check_number
+
+_CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code
+
+
+class Crossover(Protocol):
+    """Makes two children of two parents."""
+
+    def __call__(
+        self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator, /
+    ) -> tuple[Array, Array]:
+        """Return children (M, n) and (M, n) within the bounds (n,) of each row of A and the same row of B, (M, n) each."""
+
+
+class Mutation(Protocol):
+    """Changes points at random."""
+
+    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator, /) -> Array:
+        """Return mutated points (P, n) within the bounds (n,) as a new array."""
+
+
+def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array) -> tuple[Array, Array]:
+    """Return the lower and the upper child (M, n) in each variable of parents A and B (M, n), within the bounds (n,).
+
+    Where the parents are equal, so are the children. A larger distribution index keeps children nearer to the parents. Random
+    numbers u (M, n) are in [0, 1).
+
+    Source:
+        Deb, Agrawal (1995), Simulated binary crossover; bounded form as in Deb's NSGA-II code (crossover.c).
+    """
+    low, high = np.minimum(A, B), np.maximum(A, B)
+    gap = high - low
+    apart = gap > _CLOSE * (upper - lower)
+    safe_gap = np.where(apart, gap, 1.0)
+
+    def spread(room: Array) -> Array:
+        alpha = 2.0 - (1.0 + 2.0 * room / safe_gap) ** -(index + 1.0)
+        inner = u * alpha
+        return np.where(inner <= 1.0, inner, 1.0 / (2.0 - inner)) ** (1.0 / (index + 1.0))
+
+    middle = 0.5 * (low + high)
+    first = np.clip(middle - 0.5 * spread(low - lower) * gap, lower, upper)
+    second = np.clip(middle + 0.5 * spread(upper - high) * gap, lower, upper)
+    return np.where(apart, first, low), np.where(apart, second, high)
+
+
+def polynomial(X: Array, lower: Array, upper: Array, index: float, u: Array) -> Array:
+    """Return points X (P, n) shifted by polynomially distributed steps within the bounds (n,).
+
+    A larger distribution index makes smaller steps. Random numbers u (P, n) are in [0, 1); 0.5 makes no step.
+
+    Source:
+        Deb, Goyal (1996), A combined genetic adaptive search; bounded form as in Deb's NSGA-II code (mutation.c).
+    """
+    width = upper - lower
+    power = index + 1.0
+    down = u <= 0.5
+    room = np.where(down, X - lower, upper - X) / np.where(width > 0.0, width, 1.0)
+    half = np.where(down, u, 1.0 - u)
+    step = 1.0 - (2.0 * half + (1.0 - 2.0 * half) * (1.0 - room) ** power) ** (1.0 / power)
+    return np.clip(X + np.where(down, -step, step) * width, lower, upper)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SimulatedBinary:
+    """Simulated binary crossover (SBX).
+
+    Attributes:
+        index: Distribution index.
+        probability: Chance that a pair is crossed at all.
+        variable_probability: Chance that a variable of a crossed pair is; it also exchanges sides with chance 0.5.
+    """
+
+    index: float = 2.0
+    probability: float = 0.9
+    variable_probability: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_number(self, "index", at_least=0.0)
+        check_number(self, "probability", "variable_probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        u, choice, side = rng.random((3, *A.shape))
+        low, high = simulated_binary(A, B, lower, upper, self.index, u)
+        crossed = (rng.random((len(A), 1)) < self.probability) & (choice < self.variable_probability)
+        swap = side < 0.5
+        return np.where(crossed, np.where(swap, low, high), A), np.where(crossed, np.where(swap, high, low), B)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SinglePoint:
+    """Single-point crossover: from a random position on, two parents exchange their variables.
+
+    Attributes:
+        probability: Chance that a pair is crossed. With one variable there is nothing to exchange.
+    """
+
+    probability: float = 0.8
+
+    def __post_init__(self) -> None:
+        check_number(self, "probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        pairs, n = A.shape
+        cut = 1 + np.floor(rng.random((pairs, 1)) * (n - 1))  # 1..n-1
+        tail = (rng.random((pairs, 1)) < self.probability) & (np.arange(n) >= cut)
+        return np.where(tail, B, A), np.where(tail, A, B)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Polynomial:
+    """Polynomial mutation.
+
+    Attributes:
+        index: Distribution index.
+        probability: Chance that a variable mutates; None for 1 / n.
+    """
+
+    index: float = 20.0
+    probability: float | None = None
+
+    def __post_init__(self) -> None:
+        check_number(self, "index", at_least=0.0)
+        if self.probability is not None:
+            check_number(self, "probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+        u, choice = rng.random((2, *X.shape))
+        probability = 1.0 / X.shape[1] if self.probability is None else self.probability
+        return np.where(choice < probability, polynomial(X, lower, upper, self.index, u), X)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Flip:
+    """Mutation that mirrors a variable at the middle of its range.
+
+    Attributes:
+        probability: Chance that a variable mutates.
+
+    Source:
+        Goswami, Vadakkepat, Phung (2008), section 5.4: s -> (0.05 + 0.13) - s.
+    """
+
+    probability: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_number(self, "probability", at_least=0.0, at_most=1.0)
+
+    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+        flipped = np.clip(lower + upper - X, lower, upper)  # the clip only removes rounding
+        return np.where(rng.random(X.shape) < self.probability, flipped, X)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -59,7 +204,7 @@ class GeneticAlgorithm:
             raise bad_setting(self, "survival", "'plus' or 'generational'")
         for name in ("crossover", "mutation"):
             if not callable(getattr(self, name)):
-                raise bad_setting(self, name, "an operator of metaheuristics.algorithms.genetic_operators or alike")
+                raise bad_setting(self, name, "an operator of metaheuristics.algorithms.genetic or alike")
 
     @classmethod
     def goswami2008(cls) -> GeneticAlgorithm:

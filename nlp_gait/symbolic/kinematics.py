@@ -1,4 +1,4 @@
-"""Forward kinematics of a tree of bodies."""
+"""Kinematics of a tree of bodies, and in closed form of a leg with two axes at the hip, a knee, and two axes at the ankle."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import casadi as ca
 from casadi import DM, SX
 
 from nlp_gait.robots.tree import Body
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, stack
 
 
 class Pose(NamedTuple):
@@ -59,3 +61,77 @@ def centre_of_mass(tree: Sequence[Body], poses: Sequence[Pose]) -> SX:
     """
     total = sum(body.link.mass_kg for body in tree)
     return sum((body.link.mass_kg * pose.com for body, pose in zip(tree, poses, strict=True)), SX(3, 1)) / total
+
+
+# A leg folded onto its own hip axis has no roll angle; closer than 0.1 mm its rates are damped, so that they stay finite.
+LEAST_LEG_LENGTH = 1e-4
+
+
+class LegAngles(NamedTuple):
+    """Angles of a leg whose pelvis is upright and whose sole is flat."""
+
+    #: (5,) hip roll, hip pitch, knee pitch, ankle pitch, ankle roll [rad] with velocities and accelerations
+    joints: Motion
+    reach: SX  #: cosine of the knee angle by the law of cosines: above 1 the ankle is out of reach, 1 a stretched leg
+
+
+def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:
+    """Return the cosine of the knee angle (0 if stretched) from the squared distance of hip and ankle [m^2]."""
+    return (distance_squared - thigh**2 - tibia**2) / (2 * thigh * tibia)
+
+
+def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops: Nonsmooth) -> LegAngles:
+    """Return the angles, velocities and accelerations of a leg, defined for every finite input.
+
+    Args:
+        hip_to_ankle: (3,) vector from the hip joint to the ankle in world axes [m], with its time derivatives.
+        thigh: hip to knee [m].
+        tibia: knee to ankle [m].
+        margin: reach margin on the cosine of the knee angle (see ``Nonsmooth.acos``).
+        ops: interpretation of acos.
+
+    Source:
+        Gupta, Pratihar, Deb (2023), eqs. (5)-(14) with the hip yaw-pitch angle at zero; the arcsine of eq. (9) replaced by
+        the two-argument arctangent, velocities and accelerations by differentiating in closed form.
+    """
+    (x, y, z), (xd, yd, zd), (xdd, ydd, zdd) = (ca.vertsplit(part) for part in hip_to_ankle)
+
+    # Roll: the leg's plane, from y and z. Length is that of the leg seen along the roll axis.
+    length_squared = ca.fmax(y * y + z * z, LEAST_LEG_LENGTH**2)
+    length = ca.sqrt(length_squared)
+    half_square_rate = y * yd + z * zd
+    lengthd = half_square_rate / length
+    lengthdd = (yd * yd + zd * zd + y * ydd + z * zdd - lengthd * lengthd) / length
+    roll = ca.atan2(y, -z)
+    rolld = (y * zd - z * yd) / length_squared
+    rolldd = (y * zdd - z * ydd - 2 * rolld * half_square_rate) / length_squared
+
+    # Knee: law of cosines (eq. 6).
+    distance_squared = x * x + length_squared
+    cosine = knee_cosine(distance_squared, thigh, tibia)
+    cosined = (x * xd + half_square_rate) / (thigh * tibia)
+    cosinedd = (xd * xd + yd * yd + zd * zd + x * xdd + y * ydd + z * zdd) / (thigh * tibia)
+    knee, slope, bend = ops.acos(cosine, margin)
+    kneed = slope * cosined
+    kneedd = slope * cosinedd + bend * cosined**2
+
+    # Hip pitch: direction of the ankle less the angle between thigh and that direction.
+    direction = ca.atan2(-x, length)
+    directiond = (x * lengthd - length * xd) / distance_squared
+    directiondd = (x * lengthdd - length * xdd - 2 * directiond * (x * xd + half_square_rate)) / distance_squared
+    sin_knee, cos_knee = ca.sin(knee), ca.cos(knee)
+    span_squared = ca.fmax(thigh**2 + tibia**2 + 2 * thigh * tibia * cos_knee, LEAST_LEG_LENGTH**2)
+    share = tibia * (tibia + thigh * cos_knee) / span_squared
+    sharek = thigh * tibia * sin_knee * (tibia**2 - thigh**2) / span_squared**2
+    pitch = direction - ca.atan2(tibia * sin_knee, thigh + tibia * cos_knee)
+    pitchd = directiond - share * kneed
+    pitchdd = directiondd - share * kneedd - sharek * kneed**2
+
+    joints = stack(
+        Motion(roll, rolld, rolldd),
+        Motion(pitch, pitchd, pitchdd),
+        Motion(knee, kneed, kneedd),
+        Motion(-(pitch + knee), -(pitchd + kneed), -(pitchdd + kneedd)),
+        Motion(-roll, -rolld, -rolldd),
+    )
+    return LegAngles(joints, cosine)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.functions import function_source
+from nlp_gait.backends.functions import compiled_function
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.errors import GaitError, InputError, UnknownNameError
 from nlp_gait.formulation import Array
@@ -58,7 +58,7 @@ def test_scalar_operations_agree_with_casadi_also_for_nan(lanes: int) -> None:
 
 @pytest.mark.parametrize("most_expanded", [0, 5000])
 def test_matrices_and_loops_and_arguments_for_all_rows(most_expanded: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(function_source, "MOST_EXPANDED", most_expanded)
+    monkeypatch.setattr(compiled_function, "MOST_EXPANDED", most_expanded)
     function, rng = make_matrices(), np.random.default_rng(1)
     compiled = nlp_gait.compile_function(function, threads=1)
     x, A, s = rng.normal(size=(11, 2)), rng.normal(size=(3, 2)), rng.normal(size=11)

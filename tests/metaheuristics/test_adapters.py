@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metaheuristics import SearchError, algorithm, installed_algorithms, minimize
-from metaheuristics.algorithms.lshade import gains, lehmer_mean
+from metaheuristics.algorithms.differential_evolution import gains, lehmer_mean
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import FEASIBILITY
 from metaheuristics.interface import Start

@@ -9,10 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from metaheuristics.algorithms.ant_colony import AntColony, deviations, kernel_probabilities
-from metaheuristics.algorithms.ant_colony_grid import pick, renew
-from metaheuristics.algorithms.genetic import GeneticAlgorithm, tournaments
-from metaheuristics.algorithms.genetic_operators import Flip, SinglePoint, polynomial, simulated_binary
+from metaheuristics.algorithms.ant_colony import AntColony, deviations, kernel_probabilities, pick, renew
+from metaheuristics.algorithms.genetic import (
+    Flip,
+    GeneticAlgorithm,
+    SinglePoint,
+    polynomial,
+    simulated_binary,
+    tournaments,
+)
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm, move, reflect
 from metaheuristics.algorithms.points import Points
 from metaheuristics.constraint_handling import FEASIBILITY

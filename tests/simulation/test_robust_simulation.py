@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from compare.questions.question import Work
-from compare.questions.robust.robot_box import Worst
-from compare.questions.robust.robust_gait import RobustGait, simulate_robots
+from compare.questions.robust.robust_gait import RobustGait, Worst, simulate_robots
 from nlp_gait import load
 
 # Optimum of nao-dsp, and the one that keeps its limits with soles off by 2 mm and masses by 5 %.

@@ -13,8 +13,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.nao.joints import LEG_JOINTS
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.inverse_kinematics import leg_angles
-from nlp_gait.symbolic.kinematics import forward_kinematics
+from nlp_gait.symbolic.kinematics import forward_kinematics, leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact, Lifted, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 

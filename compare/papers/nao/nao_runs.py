@@ -16,8 +16,7 @@ from compare.study.record import RunRecord
 from compare.study.run_task import run_task
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, Handling, ProblemSpec, Stop, Task
-from metaheuristics.algorithms.genetic import GeneticAlgorithm
-from metaheuristics.algorithms.genetic_operators import Polynomial, SimulatedBinary
+from metaheuristics.algorithms.genetic import GeneticAlgorithm, Polynomial, SimulatedBinary
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.formulation import Array, GaitProblem, Result

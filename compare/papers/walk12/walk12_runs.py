@@ -25,7 +25,7 @@ from compare.papers.walk12.walk12_walks import simulate_walks
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
-from metaheuristics.algorithms.genetic_operators import Flip
+from metaheuristics.algorithms.genetic import Flip
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.optima.continuation import Continuation
 from nlp_gait.backends.solve import solve

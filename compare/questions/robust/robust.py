@@ -13,8 +13,15 @@ from compare.analysis.units import millimetres
 from compare.drawing.figures import add_legend_below, new_figure, style
 from compare.questions.perturbed_problem import is_mass
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_optima_table, make_table
-from compare.questions.robust.robot_box import Box, Worst
-from compare.questions.robust.robust_gait import RobustGait, SimulatedGait, make_boxes, simulate_robots, solve_robust
+from compare.questions.robust.robust_gait import (
+    Box,
+    RobustGait,
+    SimulatedGait,
+    Worst,
+    make_boxes,
+    simulate_robots,
+    solve_robust,
+)
 from compare.report.document import Figure, Table, Value
 from nlp_gait.simulation.engine import load_mujoco
 

@@ -7,16 +7,126 @@ than it has inputs, directions are the columns of D; else they are its inputs, a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from nlp_gait.backends.derivatives.first_order import Samples
-from nlp_gait.backends.derivatives.glue import Assembler
-from nlp_gait.backends.derivatives.plan import FIRST, Integers, Plan
-from nlp_gait.backends.derivatives.second_order import Hessian
-from nlp_gait.backends.derivatives.structure import Structure
+from nlp_gait.backends.derivatives.glue import Assembler, Glue, union
+from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Block, Call, Integers, Plan, Row
+from nlp_gait.backends.derivatives.structure import Structure, nonzeros
+
+# Columns d and c, the entries for c, and places of the entry for d and of a factor.
+Products: TypeAlias = "list[tuple[Integers, Integers, Row, int, int]]"
+
+
+class Hessian:
+    """Second derivatives of the Lagrangian: sparsity and place of the upper triangle."""
+
+    def __init__(self, assembler: Assembler, stages: Sequence[Samples], last: Glue, weights: int) -> None:
+        self.assembler, self.plan = assembler, assembler.plan
+        plan = self.plan
+        bars = []
+        self.bar_places = np.full(assembler.y.shape[0], -1)
+        for samples in stages:
+            size = samples.count * len(samples.used)
+            bars.append(plan.allocate(size))
+            plan.reset(SECOND, bars[-1], size)
+            samples.place_outputs(self.bar_places, bars[-1])
+        marker = len(plan.steps[SECOND])
+        contributions: Products = []
+        self._add_glue(last, weights + np.arange(last.rows.shape[0]), contributions)
+        for samples, bar in zip(reversed(stages), reversed(bars), strict=True):
+            if len(samples.active) and len(samples.used):
+                self._add_samples(samples, bar, contributions)
+        keys = union(d * assembler.n + c for d, c, *_ in contributions)
+        self.place = plan.allocate(len(keys))
+        plan.reset(SECOND, self.place, len(keys), marker)
+        for d, c, row, first, second in contributions:
+            plan.add_product(SECOND, row, self.place + np.searchsorted(keys, d * assembler.n + c), first, second)
+        self.sparsity = ca.Sparsity.triplet(
+            assembler.n, assembler.n, (keys % assembler.n).tolist(), (keys // assembler.n).tolist()
+        )
+
+    def _add_glue(self, glue: Glue, weights: Integers, contributions: Products) -> None:
+        """Add the weights of the outputs that glue reads, and its own second derivatives."""
+        assembler, plan = self.assembler, self.plan
+        symbols = SX.sym("weights", glue.rows.shape[0])
+        for weight, entries in zip(weights.tolist(), glue.entries, strict=True):
+            for j, factor in entries:
+                if j >= assembler.n:
+                    plan.add_product(
+                        SECOND, Row(np.zeros(1, int), np.array([weight])), self.bar_places[[j]], factor, ONE
+                    )
+        curved = [i for i, entries in enumerate(glue.entries) if any(f not in plan.initial for _, f in entries)]
+        if not curved:
+            return
+        total = ca.dot(symbols[curved], glue.rows[curved])
+        H = ca.triu(ca.hessian(total, assembler.y)[0])
+        first, second = H.sparsity().get_triplet()
+        values = nonzeros(H)
+        places = plan.allocate(len(first)) + np.arange(len(first))
+        assembler.evaluate(SECOND, values, places, (symbols, weights))
+        for i, j, place in zip(first, second, places.tolist(), strict=True):
+            rows = assembler.derivatives[i], assembler.derivatives[j]
+            for row, other in [rows] if i == j else [rows, rows[::-1]]:
+                _add_outer(row, other, place, contributions)
+
+    def _add_samples(self, samples: Samples, bar: int, contributions: Products) -> None:
+        plan, found, count = self.plan, samples.derivatives, samples.count
+        ma, nv = len(samples.active), len(samples.used)
+        number = plan.add_function(found.second)
+        weights = Block(bar, nv, nv, 1, 0)
+        gradient = plan.allocate(count * ma)
+        write = Block(gradient, ma, ma, 1, 0)
+        pattern = np.zeros((ma, ma), bool)
+        pattern[tuple(found.hessian.get_triplet())] = True
+        if found.directional:
+            place = plan.allocate(count * ma * samples.width)
+            change = Block(place, ma * samples.width, ma, samples.width, 1)
+            given = (samples.read, weights, samples.place_directions(plan))
+            plan.add_call(SECOND, Call(number, count, samples.count_directions(), given, (write, change)))
+        else:
+            upper = ca.triu(found.hessian)
+            place = plan.allocate(count * upper.nnz())
+            change = Block(place, upper.nnz(), upper.nnz(), 1, 0)
+            plan.add_call(SECOND, Call(number, count, None, (samples.read, weights), (write, change)))
+            at = np.full((ma, ma), -1)
+            i, j = upper.get_triplet()
+            at[i, j] = at[j, i] = np.arange(upper.nnz())
+        for e in range(count):
+            for a in range(ma):
+                row = samples.rows[e][a]
+                if samples.by_column:
+                    parts = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
+                    columns = union(parts)
+                    base = place + (e * ma + a) * samples.width
+                    _add_outer(
+                        row, Row(columns, base + np.searchsorted(samples.columns[e], columns)), ONE, contributions
+                    )
+                    continue
+                for b in np.flatnonzero(pattern[a]):
+                    factor = place + ((e * ma + a) * ma + b if found.directional else e * upper.nnz() + at[a, b])
+                    _add_outer(row, samples.rows[e][b], int(factor), contributions)
+        places = np.full(len(samples.glue.entries), -1)
+        for a, i in enumerate(samples.active):
+            places[i + samples.m * np.arange(count)] = gradient + a + ma * np.arange(count)
+        rows = [i for i, entries in enumerate(samples.glue.entries) if entries]
+        glue = samples.glue._replace(rows=samples.glue.rows[rows], entries=[samples.glue.entries[i] for i in rows])
+        self._add_glue(glue, places[rows], contributions)
+
+
+def _add_outer(row: Row, other: Row, factor: int, contributions: Products) -> None:
+    """Add the products of each entry d of a row with the entries c <= d of another one, times a factor."""
+    for column, place in zip(row.columns.tolist(), row.places.tolist(), strict=True):
+        end = int(np.searchsorted(other.columns, column, side="right"))
+        if end:
+            part = Row(other.columns[:end], other.places[:end])
+            contributions.append((np.full(end, column), part.columns, part, place, factor))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

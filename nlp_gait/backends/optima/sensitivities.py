@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.optima.kkt import build_kkt_functions, column, solve_kkt
-from nlp_gait.backends.optima.optimum import WEAK, Optimum
+from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, column, solve_kkt
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi

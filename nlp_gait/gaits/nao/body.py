@@ -11,7 +11,8 @@ from casadi import DM, MX, SX, cos, fmax, vertcat, vertsplit
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point, Signals
-from nlp_gait.formulation.display import Skeleton
+from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
+from nlp_gait.gaits.biped import skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors
@@ -27,10 +28,9 @@ from nlp_gait.gaits.nao.joints import (
     YAW_PITCHES,
     measure_leg,
 )
-from nlp_gait.gaits.nao.skeleton import make_skeleton
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import partner, point_masses, weld
-from nlp_gait.symbolic.inverse_kinematics import leg_angles
+from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
@@ -288,3 +288,32 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
             round(ground + GREATEST_HEIGHT_SHARE * leg_length, 3),
         ),
     )
+
+
+DRAWN = {"Neck", "Head", *(f"{side}{link}" for side in "LR" for link in ("Pelvis", "Tibia", "Shoulder", "Elbow"))}
+DRAWN |= {"l_wrist", "r_wrist"}
+LETTER = {LEFT: "L", RIGHT: "R"}
+
+
+def make_skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
+    """Return the function that draws a robot with NAO's links; a robot with other links is drawn as any biped."""
+    if not DRAWN <= set(robot.links):
+        return skeleton.make_skeleton(robot)
+    return lambda signals, parameters: _draw(robot, signals)
+
+
+def _draw(robot: Robot, signals: Signals) -> Skeleton:
+    arrays = signals.arrays
+    at = skeleton.locate_links(robot, signals)
+    torso, neck = at[robot.root], at["Neck"]
+    shoulders = (at["LShoulder"] + at["RShoulder"]) / 2
+    limbs = [Limb(side=TRUNK, points=np.stack([torso, shoulders, neck, at["Head tip"]], axis=1))]
+    soles = []
+    for side, letter in LETTER.items():
+        foot = robot.feet[side]
+        leg = [torso, *(at[f"{letter}{link}"] for link in ("Pelvis", "Tibia")), at[foot.link]]
+        arm = [shoulders, *(at[f"{letter}{link}"] for link in ("Shoulder", "Elbow")), at[f"{letter.lower()}_wrist tip"]]
+        sole_centre = arrays[f"{side}_foot"]
+        limbs += [Limb(side=side, points=np.stack(part, axis=1)) for part in ([*leg, sole_centre], arm)]
+        soles.append(skeleton.make_level_sole(robot, side, sole_centre))
+    return make_flat_skeleton(signals, limbs, soles)

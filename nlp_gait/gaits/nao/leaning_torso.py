@@ -28,8 +28,7 @@ from nlp_gait.gaits.nao.joints import (
     measure_leg,
 )
 from nlp_gait.robots import Robot
-from nlp_gait.symbolic.inverse_kinematics import leg_angles
-from nlp_gait.symbolic.kinematics import axis_rotation
+from nlp_gait.symbolic.kinematics import axis_rotation, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, map_motion, stack
 

@@ -9,7 +9,7 @@ import casadi as ca
 from casadi import SX
 
 from nlp_gait.gaits.stairs.planar_biped import Rod
-from nlp_gait.symbolic.inverse_kinematics import leg_angles
+from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
 

@@ -8,8 +8,7 @@ from scipy.linalg import toeplitz
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
-from nlp_gait.gaits.biped.cart_table import Footsteps, Walker, plan_cart_table_walk
-from nlp_gait.gaits.biped.preview_control import JERK_WEIGHT, PreviewController
+from nlp_gait.gaits.biped.cart_table import JERK_WEIGHT, Footsteps, PreviewController, Walker, plan_cart_table_walk
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
 from nlp_gait.gaits.nao.recorded import make_nao_cycles
 

@@ -15,8 +15,7 @@ import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.robots.robot import Joint, Link
-from nlp_gait.symbolic.inverse_kinematics import knee_cosine
-from nlp_gait.symbolic.kinematics import axis_rotation
+from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine
 from nlp_gait.symbolic.trajectories import Motion, map_motion
 
 
@@ -141,7 +140,7 @@ def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: 
     From the motion (3,) of the ankle seen from the hip joint and the lengths of both links [m]; see ``leg_frames``.
 
     Source:
-        Derivatives of Gupta, Pratihar, Deb (2023), eqs. (5)-(14), as in ``inverse_kinematics.leg_angles``.
+        Derivatives of Gupta, Pratihar, Deb (2023), eqs. (5)-(14), as in ``kinematics.leg_angles``.
     """
     (x, y, z), (xd, yd, zd), _ = (ca.vertsplit(part) for part in hip_to_ankle)
     length_squared = y * y + z * z
