@@ -20,6 +20,7 @@ from compare.cli.common import (
     print_table,
     print_written,
     progress_bar,
+    say,
     stdout,
 )
 from compare.cli.options import AsCsv, AsJson, Code, name_all
@@ -125,7 +126,7 @@ def reproduce(
     if effort:
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
     with interruptible(out), progress_bar(paper, chosen.steps) as advance:
-        reproduction.reproduce(out, chosen, advance, command=describe_command())
+        reproduction.reproduce(out, chosen, advance, command=describe_command(), on_outdated=say)
     print_written(out / "report.md")
 
 

@@ -20,7 +20,7 @@ from compare.study.task import IPOPT, ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.errors import InputError
-from nlp_gait.progress import Progress
+from nlp_gait.progress import Progress, ignore_progress
 
 Runs = dict[tuple[str, str], list[RunRecord]]
 """Records in the order of their runs, by title of the problem and of the solver."""
@@ -44,12 +44,14 @@ class Runner:
         folder: of the reproduction.
         progress: receives a line for each run and each computation.
         jobs: worker processes; 1 runs in this process.
+        on_outdated: receives a line for each solver whose stored runs are recomputed, with the reason.
         records: of all tasks, filled by ``run_tasks``.
     """
 
     folder: Path
     progress: Progress
     jobs: int
+    on_outdated: Progress = ignore_progress
     records: list[RunRecord] = field(default_factory=list)
 
     def run_tasks(self, tasks: Iterable[Task], run: Run = run_task) -> Runs:
@@ -66,7 +68,10 @@ class Runner:
 
         runs: Runs = {}
         records = run_study(
-            study, lambda task, _: self.progress(f"{task.problem.title}, {task.title} {task.run}"), report_stored
+            study,
+            lambda task, _: self.progress(f"{task.problem.title}, {task.title} {task.run}"),
+            report_stored,
+            self.on_outdated,
         )
         for task, record in zip(study.tasks, records, strict=True):
             if not record.x:

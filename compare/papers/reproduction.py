@@ -43,7 +43,7 @@ from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.decoding import decode, decode_value
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, make_writable_folder, read_json, write_json
-from nlp_gait.progress import Progress
+from nlp_gait.progress import Progress, ignore_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,7 +82,13 @@ class Reproduction(Generic[E, F]):
         return read_claims(f"{self.name}/{self.name}_claims.toml")
 
     def reproduce(
-        self, out: Path, effort: E, progress: Progress, jobs: int | None = None, command: str = "python"
+        self,
+        out: Path,
+        effort: E,
+        progress: Progress,
+        jobs: int | None = None,
+        command: str = "python",
+        on_outdated: Progress = ignore_progress,
     ) -> F:
         """Write the report (HTML, Markdown), tables (CSV) and figures (PNG, SVG), and return the findings.
 
@@ -92,6 +98,7 @@ class Reproduction(Generic[E, F]):
             progress: receives a line for each run, each step and the report, ``effort.steps`` times.
             jobs: worker processes; None for one on each core.
             command: command line, for the report.
+            on_outdated: receives a line for each solver whose stored runs are recomputed, with the reason.
 
         Raises:
             OutputError: the folder cannot be written to.
@@ -100,7 +107,7 @@ class Reproduction(Generic[E, F]):
         folder, jobs = make_writable_folder(out), jobs or available_cores()
         sessions = [*read_sessions(folder), Session.begin(command, str(jobs))]
         write_json(folder / SESSIONS, [asdict(session) for session in sessions])
-        runner = Runner(folder=folder, progress=progress, jobs=jobs)
+        runner = Runner(folder=folder, progress=progress, jobs=jobs, on_outdated=on_outdated)
         findings = self.run(runner, effort)
         progress("figures, tables and report")
         self.write_report(folder, findings, effort, runner, sessions)

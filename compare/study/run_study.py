@@ -11,6 +11,7 @@ from typing import Any
 
 from compare.study.definition import describe_differences
 from compare.study.evidence import check_records
+from compare.study.origin import hash_installed_code
 from compare.study.record import RunRecord, check_readable, make_frame
 from compare.study.record_files import find_record, locate_record, write_record
 from compare.study.run_task import PLANNED_RUNS, Run, run_task
@@ -78,7 +79,8 @@ def run_study(
     """Run all tasks without a record and return the records of all tasks, in task order.
 
     Each record is written as soon as its run has ended, so an interruption loses only the runs in progress. A record belongs to
-    a task if their definitions are equal. Other records stay in the folder under their own key.
+    a task if their definitions are equal. Other records stay in the folder under their own key. All runs of a study are of one
+    code: if one is to be computed, those of another code than the installed one are recomputed, too.
 
     Args:
         study: what to run.
@@ -93,6 +95,11 @@ def run_study(
     """
     check_study(study)
     records, outdated = _load_records(study)
+    if len(records) < len(study.tasks):
+        for index, record in list(records.items()):
+            if record.origin is not None and record.origin.code_sha256 != hash_installed_code():
+                del records[index]
+                outdated[record.problem, record.solver, f"it was computed by other code ({record.origin.code})"] += 1
     if on_outdated is not None:
         for (problem, solver, reason), count in outdated.items():
             on_outdated(f"{solver} on {problem}: {count} run{'s' * (count > 1)} recomputed: {reason}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -16,6 +16,7 @@ from compare.papers.stairs.stairs_paper import TABLE_4
 from compare.papers.stairs.stairs_runs import (
     DRAWN_CASE,
     StairsFindings,
+    fix,
     make_ideal_spec,
     make_plan_spec,
     make_track_spec,
@@ -37,7 +38,7 @@ TORQUE_WEIGHT, ACCELERATION_WEIGHT = 0.01, 1e-3  # of the effort that ``stairs-i
 
 
 def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
-    """Yield plans under every choice, from our best plans; steps with the reverse double support; floors of the effort."""
+    """Yield plans under every choice, from our best plans; with the paper's hip height, an upright torso, the reverse double support; floors of the effort."""
     effort = findings.effort
     for name in effort.plan_choices:
         choice = PLAN_CHOICES[name]
@@ -54,8 +55,11 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
                 effort.plan_settings,
             )
     for case in findings.cases:
-        yield _make_task(make_plan_spec(effort, case, "landing"), findings.best("jerk", case), effort.plan_settings)
-        yield from make_start_tasks(_make_floor_spec(findings, case), 1, settings=effort.plan_settings)
+        settings = effort.plan_settings
+        yield from make_start_tasks(make_plan_spec(effort, case, "hip"), effort.hip_starts, settings=settings)
+        yield _make_task(make_plan_spec(effort, case, "landing"), findings.best("jerk", case), settings)
+        yield _make_task(make_plan_spec(effort, case, "upright"), findings.best("plan", case), settings)
+        yield from make_start_tasks(_make_floor_spec(findings, case), 1, settings=settings)
 
 
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
@@ -79,7 +83,7 @@ def _make_task(spec: ProblemSpec, best: RunRecord, settings: Mapping[str, Any]) 
 def make_first_spec(findings: StairsFindings, case: int) -> ProblemSpec:
     """Return the planner of the first step before the step with a reverse double support."""
     spec, following = make_plan_spec(findings.effort, case, "first"), findings.best("landing", case).x
-    ends = {f"{name}.{end}": following[name] for name in ("hip_height_m", "hip_start_m") for end in ("lower", "upper")}
+    ends = fix("hip_height_m", following["hip_height_m"]) | fix("hip_start_m", following["hip_start_m"])
     return replace(spec, values={**spec.values, **ends})
 
 
@@ -175,9 +179,9 @@ def _list_choice(findings: StairsFindings, name: str) -> list[Value]:
     return [text, describe_plan(findings, "jerk", name), energy, times, jerk.verdict.indexes["knot_jerk_rad_s3"]]
 
 
-def list_choice_plans(name: str) -> list[str]:
-    """Return the plans that a choice has: both, or one if the choice is what is minimised."""
-    return ["jerk"] if name and "minimise" in PLAN_CHOICES[name].options else list(PLANS)
+def list_choice_plans(name: str) -> Iterable[str]:
+    """Return the plans that a choice has."""
+    return PLAN_CHOICES[name].plans if name else PLANS
 
 
 def describe_plan(findings: StairsFindings, what: str, name: str) -> str:

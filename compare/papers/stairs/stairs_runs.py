@@ -97,9 +97,9 @@ class StairsEffort(Effort):
 
     @property
     def plan_steps(self) -> int:
-        """Plans under every choice, with a reverse double support, first steps, floors of the effort, and simulations."""
-        chosen = sum(1 if "minimise" in PLAN_CHOICES[name].options else 2 for name in self.plan_choices)
-        return chosen + len(self.cases) * (1 + self.first_starts + 1 + 1 + 3)
+        """Plans under every choice, with an upright torso or a reverse double support, first steps, floors of the effort, and simulations."""
+        chosen = sum(len(PLAN_CHOICES[name].plans) for name in self.plan_choices)
+        return chosen + len(self.cases) * (2 + self.first_starts + 1 + 1 + 3)
 
     @property
     def steps(self) -> int:
@@ -111,13 +111,27 @@ class StairsEffort(Effort):
 
 
 def make_plan_spec(effort: StairsEffort, case: int, what: str = "plan") -> ProblemSpec:
-    """Return the planner of a case: ``plan`` of least energy or ``jerk``; of least jerk too, ``first`` step and ``landing``."""
-    options: dict[str, str | int] = {"intervals": effort.plan_intervals}
-    if what != "plan":
+    """Return the planner of a case: ``plan`` of least energy or ``jerk``; of least jerk too, ``first`` step and ``landing``.
+
+    Of least energy too: ``hip`` at the paper's height without our limits; ``upright`` torso.
+    """
+    options: dict[str, str | int | bool] = {"intervals": effort.plan_intervals}
+    values = get_stair(case)
+    if what in ("jerk", "first", "landing"):
         options["minimise"] = "jerk"
     if what in ("first", "landing"):
         options |= {"step": what, "balance": "polygon"}
-    return ProblemSpec(name="stairs-plan", options=options, values=get_stair(case), label=f"{what}-{case}")
+    if what == "hip":
+        options |= PLAN_CHOICES["no-limits"].options
+        values |= {**PLAN_CHOICES["no-limits"].values, **fix("hip_height_m", TABLE_3["hip_height_m"])}
+    if what == "upright":
+        values |= fix("torso_pitch_rad", np.pi / 2)
+    return ProblemSpec(name="stairs-plan", options=options, values=values, label=f"{what}-{case}")
+
+
+def fix(name: str, value: float) -> dict[str, float]:
+    """Return the bounds of a variable that has a given value."""
+    return {f"{name}.{end}": value for end in ("lower", "upper")}
 
 
 def make_ideal_spec(effort: StairsEffort, case: int) -> ProblemSpec:
@@ -182,17 +196,12 @@ class StairsFindings:
 
 def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
     """Yield ideals and plans, on the paper's stairs and on others."""
-    height, least = TABLE_3["hip_height_m"], PLAN_CHOICES["no-limits"]
+    settings = effort.plan_settings
     for case in effort.cases:
-        plan = make_plan_spec(effort, case)
-        fixed = {**plan.values, **least.values, "hip_height_m.lower": height, "hip_height_m.upper": height}
         yield from make_start_tasks(make_ideal_spec(effort, case), effort.ideal_starts, seed=case)
-        low = replace(plan, options={**plan.options, **least.options}, values=fixed, label=f"hip-{case}")
-        settings = effort.plan_settings
-        yield from make_start_tasks(plan, effort.plan_starts, settings=settings)
-        yield from make_start_tasks(make_plan_spec(effort, case, "jerk"), effort.jerk_starts, settings=settings)
-        yield from make_start_tasks(low, effort.hip_starts, settings=settings)
-        for spec in (plan, make_plan_spec(effort, case, "jerk")):
+        for what, starts in (("plan", effort.plan_starts), ("jerk", effort.jerk_starts)):
+            spec = make_plan_spec(effort, case, what)
+            yield from make_start_tasks(spec, starts, settings=settings)
             for name, algorithm in ALGORITHMS.items():
                 yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:

@@ -96,7 +96,12 @@ PARAMETERS = (
 
 @maker
 def stairs_plan(
-    *, minimise: Minimise = "energy", step: StepKind = "next", balance: BalanceRule = "feet", intervals: int = 40
+    *,
+    minimise: Minimise = "energy",
+    step: StepKind = "next",
+    balance: BalanceRule = "feet",
+    angle_limits: bool = True,
+    intervals: int = 40,
 ) -> GaitProblem:
     """Return the planner of one step.
 
@@ -107,6 +112,7 @@ def stairs_plan(
             one step up from standing at rest, with the hip from above the planned ZMP to where the next step starts.
         balance: feet, the centre of pressure below the stance foot; polygon, as printed, the ZMP of (49) in the convex hull of
             the contact points.
+        angle_limits: whether angles of links and knees are limited; the paper gives no limits.
         intervals: of the step, a quarter in each phase.
 
     Source:
@@ -118,7 +124,9 @@ def stairs_plan(
         )
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
-    planned = PlannedStep(per_phase=intervals // len(PHASES), kind=step, balance=balance)
+    planned = PlannedStep(
+        per_phase=intervals // len(PHASES), kind=step, balance=balance, angle_limits=angle_limits
+    )
     variables = VARIABLES if balance == "feet" else stair.GOVERNING_VARIABLES
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
@@ -186,7 +194,7 @@ def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: 
         clear = (_clearance(heights, point["clearance_m"]),)
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
     return Assembly(
-        objective=energy, constraints=(*_rows_at(point, samples, step.balance), *clear), indexes={"energy_J": energy}
+        objective=energy, constraints=(*_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
     )
 
 
@@ -194,19 +202,19 @@ def _clearance(heights: MX, least: MX) -> Constraint:
     return stair.rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
 
 
-def _rows_at(point: Point, samples: PlanSamples, balance: BalanceRule) -> tuple[Constraint, ...]:
+def _rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tuple[Constraint, ...]:
     """Return rows of reach, link angles, knees, accelerations and ground at every sample."""
     m = samples.q.shape[1]
     lower, upper = (MX(DM([stair.ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
     most = point["acceleration_limit_rad_s2"]
+    links = stair.rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper)
     return (
         stair.rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
-        stair.rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper),
-        stair.knee_limits("knee_angle", samples.q),
+        *((links, stair.knee_limits("knee_angle", samples.q)) if step.angle_limits else ()),
         stair.rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
         stair.stance_load(point, samples.stance_force),
         stair.grip("friction", samples.stance_force, point["friction"]),
-        stair.stance_zmp(point, samples.stance_pressure) if balance == "feet" else _polygon_zmp(point, samples),
+        stair.stance_zmp(point, samples.stance_pressure) if step.balance == "feet" else _polygon_zmp(point, samples),
     )
 
 
@@ -235,7 +243,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
         if minimise == "energy"
         else ops.largest(jerk if minimise == "jerk" else at_knots),
         constraints=(
-            *_rows_at(point, samples, step.balance),
+            *_rows_at(point, samples, step),
             _clearance(step.clearances(point, ops), least_clearance),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
             *rest,

@@ -54,6 +54,7 @@ class PlannedStep:
     per_phase: int  # equal parts of each phase
     kind: StepKind = "next"
     balance: BalanceRule = "feet"
+    angle_limits: bool = True  # whether angles of links and knees are limited
 
     @cached_property
     def grid(self) -> tuple[DM, Array]:

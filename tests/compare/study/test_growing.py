@@ -45,6 +45,20 @@ def test_more_runs_solvers_and_problems_continue_what_is_there(tmp_path: Path) -
     assert len(read_records(tmp_path)) == 8 + 2 + 4
 
 
+def test_records_of_other_code_stay_until_a_run_is_missing_and_are_recomputed_once(tmp_path: Path) -> None:
+    settings = replace(STUDY, solvers=STUDY.solvers[:1], stop=Stop(evaluations=50))
+    grown(tmp_path, settings)
+    for path in (tmp_path / "records" / "walk12").glob("*.json"):
+        record = json.loads(path.read_text())
+        record["origin"]["code_sha256"] = "f" * 64
+        path.write_text(json.dumps(record))
+    assert grown(tmp_path, settings)[1:] == (2, [])
+    more = replace(settings, runs=3)
+    _, kept, said = grown(tmp_path, more)
+    assert kept == 0 and len(said) == 1 and said[0].startswith("pso on walk12: 2 runs recomputed: it was computed by other")
+    assert grown(tmp_path, more)[1:] == (3, [])
+
+
 def test_a_larger_budget_is_another_run_and_the_smaller_ones_stay(tmp_path: Path) -> None:
     first = grown(tmp_path, STUDY)[0]
     more = replace(STUDY, stop=Stop(evaluations=300))
