@@ -18,7 +18,9 @@ class Choice:
     text: str
     plan: str = "plan"
     plans: tuple[str, ...] = ("jerk", "plan")  # of a reading of the planner: least jerk, least energy
-    contains: tuple[str, ...] = ()  # of the tracked step: readings with the same objective and narrower bounds or more limits
+    contains: tuple[
+        str, ...
+    ] = ()  # of the tracked step: readings with the same objective and narrower bounds or more limits
     options: Mapping[str, str | bool] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
 

@@ -38,7 +38,10 @@ TORQUE_WEIGHT, ACCELERATION_WEIGHT = 0.01, 1e-3  # of the effort that ``stairs-i
 
 
 def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
-    """Yield plans under every choice, from our best plans; with the paper's hip height, an upright torso, the reverse double support; floors of the effort."""
+    """Yield plans under every choice, and in each case with the paper's hip height, an upright torso or a reverse double support.
+
+    And floors of the effort.
+    """
     effort = findings.effort
     for name in effort.plan_choices:
         choice = PLAN_CHOICES[name]

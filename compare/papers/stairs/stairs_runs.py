@@ -97,7 +97,7 @@ class StairsEffort(Effort):
 
     @property
     def plan_steps(self) -> int:
-        """Plans under every choice, with an upright torso or a reverse double support, first steps, floors of the effort, and simulations."""
+        """Plans under every choice and other plans of each case, first steps, floors of the effort, and simulations."""
         chosen = sum(len(PLAN_CHOICES[name].plans) for name in self.plan_choices)
         return chosen + len(self.cases) * (2 + self.first_starts + 1 + 1 + 3)
 

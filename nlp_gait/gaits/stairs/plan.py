@@ -124,9 +124,7 @@ def stairs_plan(
         )
     if intervals < len(PHASES) or intervals % len(PHASES):
         raise InputError(f"intervals must be a multiple of {len(PHASES)} (one part for each phase), got {intervals!r}")
-    planned = PlannedStep(
-        per_phase=intervals // len(PHASES), kind=step, balance=balance, angle_limits=angle_limits
-    )
+    planned = PlannedStep(per_phase=intervals // len(PHASES), kind=step, balance=balance, angle_limits=angle_limits)
     variables = VARIABLES if balance == "feet" else stair.GOVERNING_VARIABLES
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:

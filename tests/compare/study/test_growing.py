@@ -55,7 +55,11 @@ def test_records_of_other_code_stay_until_a_run_is_missing_and_are_recomputed_on
     assert grown(tmp_path, settings)[1:] == (2, [])
     more = replace(settings, runs=3)
     _, kept, said = grown(tmp_path, more)
-    assert kept == 0 and len(said) == 1 and said[0].startswith("pso on walk12: 2 runs recomputed: it was computed by other")
+    assert (
+        kept == 0
+        and len(said) == 1
+        and said[0].startswith("pso on walk12: 2 runs recomputed: it was computed by other")
+    )
     assert grown(tmp_path, more)[1:] == (3, [])
 
 
