@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from compare.cli.command import command
 from compare.cli.common import end_if_excluded, fail, print_json, print_written, progress_bar, stdout
-from compare.cli.options import AsJson, Code, name_all
+from compare.cli.options import name_all
 from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
 
@@ -17,9 +14,9 @@ from nlp_gait.errors import InputError
 @command
 def archive(
     *,
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
-    out: Annotated[Path, typer.Option(help="The archive to write.")] = Path("study.zip"),
-    code: Code = None,
+    folder: Path,
+    out: Path = Path("study.zip"),
+    code: list[str] | None = None,
 ) -> None:
     """Pack a study for others: records, report, user code, robots, certificates, versions, hashes, and how to repeat it.
 
@@ -44,13 +41,10 @@ def archive(
 @command
 def verify(
     *,
-    study: Annotated[Path, typer.Argument(metavar="DIR_OR_ZIP", help="Folder of a study, or its archive.")],
-    rerun: Annotated[
-        str,
-        typer.Option(metavar="SHARE", help="Also repeat a random share of the runs, such as 5%: same seed, same bits."),
-    ] = "0%",
-    code: Code = None,
-    as_json: AsJson = False,
+    study: Path,
+    rerun: str = "0%",
+    code: list[str] | None = None,
+    as_json: bool = False,
 ) -> None:
     """Check a study: evaluate every point again, check histories, hashes, sessions, certificates and, of an archive, the report.
 
@@ -88,15 +82,8 @@ def _parse_share(text: str) -> float:
 
 @command
 def cite(
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[PROBLEM|PAPER|INSTANCE]",
-            help="What you used: a problem (`nlp-gait list`), a paper (nao, walk12, stairs) or an instance of GaitBench; "
-            "everything without it.",
-        ),
-    ] = None,
-    as_json: AsJson = False,
+    name: str | None = None,
+    as_json: bool = False,
 ) -> None:
     """Print BibTeX for the software, and for the papers and the suite that a problem comes from.
 

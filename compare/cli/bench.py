@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
-
-import typer
+from typing import Literal
 
 from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks
 from compare.cli.command import command
@@ -19,30 +17,21 @@ from compare.cli.common import (
     stdout,
     until_interrupted,
 )
-from compare.cli.options import AsJson, Jobs, parse_names
+from compare.cli.options import parse_names
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
 
 @command
 def bench(
-    algorithm: Annotated[
-        str | None,
-        typer.Option(
-            help="Your algorithm as my.py:MyAlgo or module:name, or a name; without it, only the baseline is shown."
-        ),
-    ] = None,
-    suite: Annotated[Literal["small", "full"], typer.Option(help="small (ten instances, minutes) or full.")] = "small",
-    instances: Annotated[
-        str | None, typer.Option(help="Only these instances, separated by commas, instead of a suite.")
-    ] = None,
-    label: Annotated[str, typer.Option(help="Name of your algorithm on the page (default: its own name).")] = "",
-    runs: Annotated[int, typer.Option(min=2, max=1000, help="Runs on each instance; the baseline has 15.")] = RUNS,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the page and the records; finished runs in it are reused.")
-    ] = Path("bench"),
-    jobs: Jobs = None,
-    as_json: AsJson = False,
+    algorithm: str | None = None,
+    suite: Literal["small", "full"] = "small",
+    instances: str | None = None,
+    label: str = "",
+    runs: int = RUNS,
+    out: Path = Path("bench"),
+    jobs: int | None = None,
+    as_json: bool = False,
 ) -> None:
     """Run an algorithm on GaitBench and rank it with the shipped baseline.
 

@@ -1,7 +1,8 @@
 """Commands: groups of options, and exit by errors.
 
 Options of several commands form a group: a frozen dataclass whose fields are annotated like parameters of a Typer command. A
-command with a parameter of that type has every field as an option, and receives the dataclass.
+command with a parameter of that type has every field as an option, and receives the dataclass. Texts, flags and limits of options
+are in ``options.toml``, except those that a program computes: these are annotated.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ import io
 import os
 import select
 import sys
+import tomllib
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
+from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import typer
 
@@ -40,6 +43,10 @@ FORCE = inspect.Parameter(
     inspect.Parameter.KEYWORD_ONLY,
     default=False,
     annotation=Annotated[bool, typer.Option("--force", help="Replace inputs and files of other programs, too.")],
+)
+# By command or group of options, and by parameter; "shared" has what several commands take.
+TEXTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    (files("compare.cli") / "options.toml").read_text(encoding="utf-8")
 )
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -71,8 +78,11 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
 
     options: list[inspect.Parameter] = []
     for parameter in parameters:
-        alone = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
-        options += _options(groups[parameter.name]) if parameter.name in groups else alone
+        if parameter.name in groups:
+            options += _options(groups[parameter.name])
+        else:
+            annotation = _annotate(parameter.annotation, parameter.name, [function.__name__])
+            options.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=annotation))
     if any(option.name in OUTPUTS for option in options):
         options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
@@ -96,9 +106,20 @@ def _options(group: Any) -> Iterator[inspect.Parameter]:
     hints = get_type_hints(group, include_extras=True)
     for field in fields(group):
         default = inspect.Parameter.empty if field.default is MISSING else field.default
-        yield inspect.Parameter(
-            field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hints[field.name]
-        )
+        annotation = _annotate(hints[field.name], field.name, [kind.__name__ for kind in group.__mro__])
+        yield inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _annotate(annotation: Any, name: str, owners: Sequence[str]) -> Any:
+    """Add the text, flags and limits of ``options.toml`` to the type of a parameter; the first owner that has them decides."""
+    if annotation is typer.Context or get_origin(annotation) is Annotated:
+        return annotation
+    entry = next((TEXTS[owner][name] for owner in (*owners, "shared") if name in TEXTS.get(owner, ())), None)
+    if entry is None:
+        raise KeyError(f"options.toml has no text for {name!r} of {owners[0]}")
+    described = {"help": entry} if isinstance(entry, str) else dict(entry)
+    make = typer.Argument if described.pop("argument", False) else typer.Option
+    return Annotated[annotation, make(*described.pop("flags", ()), **described)]
 
 
 def run_app(app: Callable[[], object]) -> None:

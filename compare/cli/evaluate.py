@@ -6,9 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
@@ -21,7 +19,7 @@ from compare.cli.common import (
     print_written,
     stdout,
 )
-from compare.cli.options import AnyProblem, AsJson, parse_values, parse_x
+from compare.cli.options import AnyProblem, parse_values, parse_x
 from compare.cli.outputs import output_file
 from compare.judge import Evaluation
 from nlp_gait.errors import InputError
@@ -37,30 +35,16 @@ SHOWN_VIOLATIONS = 10
 
 @command
 def evaluate(
-    x: Annotated[
-        str | None,
-        typer.Option(
-            "--x", help="Decision variables in order, separated by commas; or a .csv file with one candidate per row."
-        ),
-    ] = None,
-    motion: Annotated[
-        Path | None,
-        typer.Option(help="Joint angles over time instead: a CSV with columns t and joints, or a Webots .motion."),
-    ] = None,
-    touch_down: Annotated[
-        float | None,
-        typer.Option(help="Landing time of the swing foot of a cycle in --motion [s] (default: inferred)."),
-    ] = None,
-    engine: Annotated[bool, typer.Option(help="Also simulate a motion in the physics engine (extra sim).")] = True,
+    x: str | None = None,
+    motion: Path | None = None,
+    touch_down: float | None = None,
+    engine: bool = True,
     *,
     problem: AnyProblem,
-    rounded: Annotated[
-        bool,
-        typer.Option("--rounded", help="Judge all points that round to the digits of --x, not that point alone."),
-    ] = False,
-    signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file.")] = None,
-    table: Annotated[Path | None, typer.Option("--csv", help="Write the judged points to this CSV file.")] = None,
-    as_json: AsJson = False,
+    rounded: bool = False,
+    signals: Path | None = None,
+    table: Path | None = None,
+    as_json: bool = False,
 ) -> None:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
 

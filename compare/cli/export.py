@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from compare.cli.command import command
 from compare.cli.common import interruptible, print_result, print_written
-from compare.cli.options import AsJson, NamedProblem, StoredGait
+from compare.cli.options import NamedProblem, StoredGait
 from compare.cli.outputs import output_file
 from nlp_gait.export.set_points import PERIOD_MS
 
@@ -19,11 +16,9 @@ SHEET = ".png"  # suffix of a contact sheet
 @command
 def export(
     stored: StoredGait,
-    format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf or naoqi.")],
-    out: Annotated[
-        Path | None, typer.Option(help="File; by default next to the result, with the format's suffix.")
-    ] = None,
-    period_ms: Annotated[int, typer.Option(min=1, max=86_400_000, help="Time between rows [ms].")] = PERIOD_MS,
+    format_: str,
+    out: Path | None = None,
+    period_ms: int = PERIOD_MS,
 ) -> None:
     """Write a gait in a format of other tools.
 
@@ -39,9 +34,9 @@ def export(
 
 @command
 def export_objective(
-    instance: Annotated[str, typer.Argument(metavar="INSTANCE", help="Of GaitBench, for example ssp-v5.")],
-    to: Annotated[Path, typer.Option("--to", help="Folder for the files.")],
-    as_json: AsJson = False,
+    instance: str,
+    to: Path,
+    as_json: bool = False,
 ) -> None:
     """Write an instance of GaitBench as plain C++ with a C header, for C, MATLAB, Octave and Julia.
 
@@ -58,14 +53,11 @@ def export_objective(
 
 @command
 def export_solver(
-    to: Annotated[Path, typer.Option("--to", help="Folder for the files.")],
+    to: Path,
     *,
     problem: NamedProblem,
-    nl: Annotated[
-        bool,
-        typer.Option("--nl", help="Write an .nl file for AMPL's solvers instead, with names and best known value."),
-    ] = False,
-    as_json: AsJson = False,
+    nl: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
 
@@ -87,12 +79,10 @@ def export_solver(
 @command
 def animate(
     stored: StoredGait,
-    out: Annotated[
-        Path | None, typer.Option(help="A .gif or .mp4, or a .png contact sheet; by default a GIF next to the result.")
-    ] = None,
-    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames per second.")] = 12.5,
-    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,
-    poses: Annotated[int, typer.Option(min=2, max=20, help="Poses of a contact sheet.")] = 6,
+    out: Path | None = None,
+    frames_per_s: float = 12.5,
+    speed: float = 1.0,
+    poses: int = 6,
 ) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
 

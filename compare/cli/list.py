@@ -6,13 +6,10 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from compare.cli.command import command
 from compare.cli.common import print_json, print_table, print_written, stdout
-from compare.cli.options import AsJson
 from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load, problem_names
@@ -20,27 +17,11 @@ from nlp_gait.formulation import load, problem_names
 
 @command
 def list_problems(
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[NAME]",
-            help="A problem, for its variables, parameters and options; an algorithm or solver, for its settings.",
-        ),
-    ] = None,
-    algorithms: Annotated[
-        bool, typer.Option("--algorithms", help="Show the settings of all algorithms and solvers.")
-    ] = False,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE",
-            help="Show a robot as read: URDF, MJCF (.xml), JSON, or a name; with a problem, that problem for this robot.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG.")
-    ] = None,
-    as_json: AsJson = False,
+    name: str | None = None,
+    algorithms: bool = False,
+    robot: str | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
 ) -> None:
     """List problems, algorithms and robots, or describe one of them.
 

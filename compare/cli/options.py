@@ -18,15 +18,7 @@ from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import allow_code, is_reference
 
-ResultFile = Annotated[
-    Path, typer.Argument(metavar="RESULT.json", help="From `solve --out`, a study's record, or written by hand.")
-]
-ProblemName = Annotated[
-    str, typer.Argument(metavar="PROBLEM", help="For example nao-ssp, see `nlp-gait list`; or your own, FILE.py:NAME.")
-]
-Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
 Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
-Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
 Code = Annotated[
     list[str] | None,
     typer.Option(
@@ -47,8 +39,8 @@ FLAGS = ("robot", "intervals", "derivatives")
 class StoredGait:
     """A gait in a file, and the user code that it needs."""
 
-    result: ResultFile
-    code: Code = None
+    result: Path
+    code: list[str] | None = None
 
     def load(self) -> Result:
         """Return the gait; raises as ``load_result``, and InputError for code that is not a reference."""
@@ -60,28 +52,11 @@ class StoredGait:
 class CycleOptions:
     """Options and values of a walking cycle."""
 
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            help="Of NAO and humanoid problems: nao-v5 (default), nao-v6, nao-v4, or a robot file (.json, .urdf)."
-        ),
-    ] = None
-    intervals: Annotated[
-        int | None,
-        typer.Option(help="Equal intervals of the motion (default: see `nlp-gait list PROBLEM`)."),
-    ] = None
-    option: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Any other option of the problem; repeatable.")
-    ] = None
-    values: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="NAME=VALUE", help="Parameter, or a variable's bound as NAME.lower=VALUE; repeatable."
-        ),
-    ] = None
-    fix: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a variable at a value; repeatable.")
-    ] = None
+    robot: str | None = None
+    intervals: int | None = None
+    option: list[str] | None = None
+    values: list[str] | None = None
+    fix: list[str] | None = None
 
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
@@ -100,25 +75,21 @@ class CycleOptions:
 class AnyCycle(CycleOptions):
     """A walking cycle, by default NAO's."""
 
-    name: Annotated[
-        str, typer.Argument(metavar="[PROBLEM]", help="nao-cycle, or humanoid-cycle with --robot FILE.")
-    ] = "nao-cycle"
+    name: str = "nao-cycle"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProblemOptions(CycleOptions):
     """Options and values of any problem."""
 
-    derivatives: Annotated[
-        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
-    ] = None
+    derivatives: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedProblem(ProblemOptions):
     """A problem by name, with its options and values."""
 
-    name: ProblemName
+    name: str
 
     def spec(self) -> ProblemSpec:
         """Return the problem as plain data; raises as ``make_spec``."""
@@ -133,10 +104,7 @@ class NamedProblem(ProblemOptions):
 class AnyProblem(ProblemOptions):
     """A problem whose name may be left out where a file determines it."""
 
-    name: Annotated[
-        str | None,
-        typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out where a file names it."),
-    ] = None
+    name: str | None = None
 
     def spec(self) -> ProblemSpec:
         """Return the problem; raises as ``make_spec``."""
@@ -149,32 +117,22 @@ class AnyProblem(ProblemOptions):
 class NaoPhase(NamedProblem):
     """A problem, by default nao-ssp."""
 
-    name: ProblemName = "nao-ssp"
+    name: str = "nao-ssp"
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
     """Number of runs of search algorithms, constraint handling, and stop criteria."""
 
-    runs: Annotated[int, typer.Option(min=1, max=100_000, help="Runs of each search algorithm.")] = 11
-    seed: Seed = 0
-    evaluations: Evaluations = 10_000
-    handling: Annotated[
-        str, typer.Option(help="Constraints in searches: deb (feasibility rules), penalty or epsilon.")
-    ] = "deb"
-    penalty_weight: Annotated[
-        float | None, typer.Option(help="Objective units per unit of violation, for --handling penalty.")
-    ] = None
-    target: Annotated[float | None, typer.Option(help="End a search at a feasible objective at least this good.")] = (
-        None
-    )
-    stagnation: Annotated[
-        int | None, typer.Option(min=1, help="End a search after this many generations without progress.")
-    ] = None
-    time_limit: Annotated[float | None, typer.Option(help="End a run after this many seconds.")] = None
-    polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each search's result, as another solver.")] = (
-        False
-    )
+    runs: int = 11
+    seed: int = 0
+    evaluations: int = 10_000
+    handling: str = "deb"
+    penalty_weight: float | None = None
+    target: float | None = None
+    stagnation: int | None = None
+    time_limit: float | None = None
+    polish: bool = False
 
     def make_study(
         self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20

@@ -6,9 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
@@ -21,7 +19,7 @@ from compare.cli.common import (
     progress_bar,
     stdout,
 )
-from compare.cli.options import AsJson, StoredGait
+from compare.cli.options import StoredGait
 from compare.cli.outputs import output_file
 from compare.cli.simulation_options import ConditionOptions, DriveOptions, FilmOptions
 
@@ -39,23 +37,17 @@ if TYPE_CHECKING:
 def simulate(
     stored: StoredGait,
     *,
-    steps: Annotated[int | None, typer.Option(help="Simulate this many steps of a gait that repeats.")] = None,
-    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for report, time histories, model and figure.")] = None,
-    sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
+    steps: int | None = None,
+    viewer: bool = False,
+    out: Path | None = None,
+    sole: str = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
-    share_loads: Annotated[
-        bool, typer.Option("--share-loads", help="Redistribute loads in double support for least power (extra qp).")
-    ] = False,
-    load_rate: Annotated[
-        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load [robot weights/s].")
-    ] = 12.5,
+    share_loads: bool = False,
+    load_rate: float = 12.5,
     film: FilmOptions,
-    robustness: Annotated[
-        bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
-    ] = False,
-    as_json: AsJson = False,
+    robustness: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Simulate a gait in MuJoCo, open loop or with balance feedback, and compare it with the model's predictions.
 

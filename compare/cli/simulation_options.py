@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from compare.cli.options import parse_number
 from nlp_gait.errors import InputError, unknown
@@ -21,28 +19,15 @@ if TYPE_CHECKING:
 class DriveOptions:
     """The drive of the simulated robot, by name, and its settings."""
 
-    drive: Annotated[
-        str,
-        typer.Option(
-            help="feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. "
-            "held: each held for 40 ms, nothing fed forward."
-        ),
-    ] = "feed-forward"
-    period_ms: Annotated[float | None, typer.Option(help="Time between set-points (default: the drive's).")] = None
-    interpolation: Annotated[str | None, typer.Option(help="Between set-points: linear or held.")] = None
-    feed_forward: Annotated[str | None, typer.Option(help="torque (and velocity), velocity, or none.")] = None
-    torque_limits: Annotated[
-        str | None, typer.Option(help="urdf (default), stall or continuous: published limits differ.")
-    ] = None
-    feedback: Annotated[
-        str,
-        typer.Option(help="none, in open loop, or torso-spring: balance by measured place and attitude of the torso."),
-    ] = "none"
-    feedback_delay_ms: Annotated[
-        float | None, typer.Option(help="From measuring to acting (default: the feedback's).")
-    ] = None
-    feedback_noise: Annotated[float, typer.Option(help="Factor on the noise of its sensors; 0 for none.")] = 1.0
-    feedback_seed: Annotated[int, typer.Option(min=0, help="Of this noise: same seed, same walk.")] = 0
+    drive: str = "feed-forward"
+    period_ms: float | None = None
+    interpolation: str | None = None
+    feed_forward: str | None = None
+    torque_limits: str | None = None
+    feedback: str = "none"
+    feedback_delay_ms: float | None = None
+    feedback_noise: float = 1.0
+    feedback_seed: int = 0
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
@@ -67,15 +52,11 @@ class DriveOptions:
 class ConditionOptions:
     """Differences of the simulated world and robot from the planned ones."""
 
-    friction: Annotated[float | None, typer.Option(help="Coefficient of sliding friction (default: 0.7).")] = None
-    slope_deg: Annotated[str, typer.Option(metavar="X,Y", help="Rise of the floor forward and to the left.")] = "0,0"
-    mass_factor: Annotated[float, typer.Option(help="On all masses; the gait was planned for 1.")] = 1.0
-    stiffness_factor: Annotated[
-        float, typer.Option(help="True stiffness of the joints over what their drive assumes.")
-    ] = 1.0
-    push: Annotated[
-        str, typer.Option(metavar="X,Y", help="Impulse on the torso in the middle, forward and to the left [N s].")
-    ] = "0,0"
+    friction: float | None = None
+    slope_deg: str = "0,0"
+    mass_factor: float = 1.0
+    stiffness_factor: float = 1.0
+    push: str = "0,0"
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
@@ -97,16 +78,11 @@ class ConditionOptions:
 class FilmOptions:
     """A film of a simulated gait, and how it is made."""
 
-    video: Annotated[
-        Path | None, typer.Option(help="Film it to this .gif or .mp4 file, from the side, the front and above.")
-    ] = None
-    beside: Annotated[
-        Path | None,
-        typer.Option(metavar="OTHER.json", help="Simulate this gait as well, next to the other in the film."),
-    ] = None
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Of the film [pixels].")] = "1280x720"
-    speed: Annotated[float, typer.Option(min=0.05, max=20.0, help="Speed of the film; 0.25 is slow motion.")] = 1.0
-    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")] = 25.0
+    video: Path | None = None
+    beside: Path | None = None
+    size: str = "1280x720"
+    speed: float = 1.0
+    frames_per_s: float = 25.0
 
     @property
     def note(self) -> str:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
@@ -24,7 +22,7 @@ from compare.cli.common import (
     until_interrupted,
 )
 from compare.cli.compare import print_summaries
-from compare.cli.options import AsJson, Jobs, NamedProblem, SearchOptions, Seed, parse_x
+from compare.cli.options import NamedProblem, SearchOptions, parse_x
 from compare.cli.outputs import output_file
 from compare.study.settings import SolverSpec
 from nlp_gait.backends.identity import identify_problem
@@ -37,23 +35,15 @@ if TYPE_CHECKING:
 @command
 def solve(
     *,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=100_000, help="Random starts within the bounds (default: 20, fewer for slow problems)."
-        ),
-    ] = None,
-    seed: Seed = 0,
-    x0: Annotated[str | None, typer.Option("--x0", help="First start: values separated by commas.")] = None,
+    starts: int | None = None,
+    seed: int = 0,
+    x0: str | None = None,
     problem: NamedProblem,
-    solver: Annotated[str, typer.Option(help="NLP solver; see nlp-gait list.")] = "ipopt",
-    linear_solver: Annotated[
-        str | None,
-        typer.Option(help="Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."),
-    ] = None,
-    jobs: Jobs = None,
-    out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file.")] = None,
-    as_json: AsJson = False,
+    solver: str = "ipopt",
+    linear_solver: str | None = None,
+    jobs: int | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
 ) -> None:
     """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
 
@@ -145,17 +135,12 @@ def _print(solution: Solution) -> None:
 @command
 def search(
     *,
-    algorithm: Annotated[
-        str,
-        typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...; or your own, FILE.py:NAME or cmd:COMMAND."),
-    ] = "pso",
+    algorithm: str = "pso",
     searches: SearchOptions,
     problem: NamedProblem,
-    out: Annotated[
-        Path | None, typer.Option(help="Store one record file per run in this folder; continue from it.")
-    ] = None,
-    jobs: Jobs = 1,
-    as_json: AsJson = False,
+    out: Path | None = None,
+    jobs: int | None = 1,
+    as_json: bool = False,
 ) -> None:
     """Search a problem with a metaheuristic and the compiled exact functions.
 

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from compare.cli.command import command
 from compare.cli.common import print_json, progress_bar, stdout
 from compare.cli.options import (
     AnyProblem,
-    AsJson,
-    Code,
-    Evaluations,
     NamedProblem,
     NaoPhase,
-    Seed,
     name_all,
     parse_names,
 )
-from compare.cli.questions.output import Folder, Output
+from compare.cli.questions.output import Output
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
@@ -29,27 +22,18 @@ from nlp_gait.files import make_writable_folder
 @command
 def certainty(
     *,
-    starts: Annotated[int, typer.Option(min=1, max=1_000_000, help="Random starts of IPOPT.")] = 10_000,
-    evaluations: Annotated[
-        int, typer.Option(min=0, max=10**12, help="Budget of one long CMA-ES with restarts; 0 for none.")
-    ] = 1_000_000,
-    tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 1e-6,
-    time_limit: Annotated[
-        float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables and NAO's phases; 0 for none.")
-    ] = 1800.0,
-    seed: Seed = 0,
+    starts: int = 10_000,
+    evaluations: int = 1_000_000,
+    tolerance: float = 1e-6,
+    time_limit: float = 1800.0,
+    seed: int = 0,
     problem: AnyProblem,
-    check: Annotated[
-        Path | None,
-        typer.Option(help="Certificate to check instead: look for a better point, then repeat paths of its proof."),
-    ] = None,
-    paths: Annotated[int, typer.Option(min=1, max=100_000, help="Paths of a proof to check.")] = 200,
-    complete: Annotated[
-        bool, typer.Option("--complete", help="With --check: also repeat the whole proof; rerun to continue.")
-    ] = False,
-    code: Code = None,
-    out: Folder = Path("certainty"),
-    as_json: AsJson = False,
+    check: Path | None = None,
+    paths: int = 200,
+    complete: bool = False,
+    code: list[str] | None = None,
+    out: Path = Path("certainty"),
+    as_json: bool = False,
 ) -> None:
     """Gather evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
 
@@ -105,19 +89,13 @@ def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: b
 @command
 def motions(
     *,
-    problem: Annotated[str, typer.Argument(metavar="[nao-ssp|nao-dsp]")] = "nao-ssp",
-    orders: Annotated[
-        str, typer.Option(help="Motions of hip, foot and arms, separated by commas.")
-    ] = "cubic,quintic,spline-2,spline-4,spline-8",
-    free_orders: Annotated[
-        str, typer.Option(help="Motions of free joints, separated by commas; empty for none.")
-    ] = "spline-2,spline-4,spline-8,spline-16",
-    starts: Annotated[
-        int, typer.Option(min=0, max=100_000, help="Random starts for each order, next to the simpler optimum.")
-    ] = 1,
-    seed: Seed = 0,
-    robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
-    intervals: Annotated[int, typer.Option(min=1, help="Intervals of the phase.")] = 10,
+    problem: str = "nao-ssp",
+    orders: str = "cubic,quintic,spline-2,spline-4,spline-8",
+    free_orders: str = "spline-2,spline-4,spline-8,spline-16",
+    starts: int = 1,
+    seed: int = 0,
+    robot: str = "nao-v5",
+    intervals: int = 10,
     output: Output,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the least power of richer motions.
@@ -137,8 +115,8 @@ def motions(
 @command
 def motors(
     *,
-    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts for each variant.")] = 10,
-    seed: Seed = 0,
+    starts: int = 10,
+    seed: int = 0,
     problem: NaoPhase,
     output: Output,
 ) -> None:
@@ -154,9 +132,9 @@ def motors(
 @command
 def prices(
     *,
-    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts within the bounds.")] = 10,
-    seed: Seed = 0,
-    checks: Annotated[int, typer.Option(min=0, help="Quantities of the robot that are verified by solving again.")] = 3,
+    starts: int = 10,
+    seed: int = 0,
+    checks: int = 3,
     problem: NamedProblem,
     output: Output,
 ) -> None:
@@ -172,18 +150,12 @@ def prices(
 @command
 def robust(
     *,
-    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
-    sole: Annotated[
-        float, typer.Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")
-    ] = 2.0,
-    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts of the nominal problem.")] = 10,
-    seed: Seed = 0,
-    samples: Annotated[
-        int, typer.Option(min=0, max=100_000, help="Random corners on which each result is evaluated.")
-    ] = 20,
-    simulate: Annotated[
-        bool, typer.Option(help="Simulate both gaits in MuJoCo on the worst robots (extra sim).")
-    ] = True,
+    mass: float = 5.0,
+    sole: float = 2.0,
+    starts: int = 10,
+    seed: int = 0,
+    samples: int = 20,
+    simulate: bool = True,
     problem: NaoPhase,
     output: Output,
 ) -> None:
@@ -200,11 +172,11 @@ def robust(
 @command
 def sweep(
     *,
-    over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
-    algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
-    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
-    evaluations: Evaluations = 10_000,
-    seed: Seed = 0,
+    over: list[str],
+    algorithm: str = "ipopt",
+    starts: int = 5,
+    evaluations: int = 10_000,
+    seed: int = 0,
     problem: NamedProblem,
     output: Output,
 ) -> None:

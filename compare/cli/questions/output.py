@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from compare.cli.common import (
     describe_command,
@@ -20,22 +18,20 @@ from compare.cli.common import (
     say,
     stdout,
 )
-from compare.cli.options import RESULTS, AsJson
+from compare.cli.options import RESULTS
 from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted, defer_interrupts
 
 if TYPE_CHECKING:
     from compare.questions.question import Answer, Question
 
-Folder = Annotated[Path, typer.Option(help="Folder for report, tables, figures, data and stored results.")]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
     """Folder of the answer, and how it is printed."""
 
-    out: Folder = RESULTS
-    as_json: AsJson = False
+    out: Path = RESULTS
+    as_json: bool = False
 
     def __post_init__(self) -> None:
         """Require a writable folder before the work."""

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
-
-import typer
 
 from compare.cli.command import command
-from compare.cli.options import AnyCycle, Seed
+from compare.cli.options import AnyCycle
 from compare.cli.questions.output import Output
 from compare.cli.simulation_options import DriveOptions
 
@@ -16,24 +13,12 @@ from compare.cli.simulation_options import DriveOptions
 @command
 def walk(
     *,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME=LOW:HIGH:COUNT",
-            help="Speeds (default: ten from 0.01 to 0.1 m/s, for humanoids in proportion to the root of their leg length), or "
-            "another parameter or variable; NAME=V1,V2,...",
-        ),
-    ] = None,
-    engine: Annotated[
-        bool, typer.Option("--engine", help="Simulate ten steps of each gait in MuJoCo (extra sim).")
-    ] = False,
-    steps: Annotated[int | None, typer.Option(min=0, max=1000, help="Simulate so many steps; 0 for none.")] = None,
-    baseline: Annotated[
-        list[str] | None,
-        typer.Option(help="Planner to compare with, on the same footsteps: cart-table, least-torque; repeatable."),
-    ] = None,
-    starts: Annotated[int, typer.Option(min=1, max=100_000, help="Random starts where no neighbour helps.")] = 5,
-    seed: Seed = 0,
+    over: str | None = None,
+    engine: bool = False,
+    steps: int | None = None,
+    baseline: list[str] | None = None,
+    starts: int = 5,
+    seed: int = 0,
     drives: DriveOptions,
     problem: AnyCycle,
     output: Output,
