@@ -112,11 +112,9 @@ def _options(group: Any) -> Iterator[inspect.Parameter]:
 
 def _annotate(annotation: Any, name: str, owners: Sequence[str]) -> Any:
     """Add the text, flags and limits of ``options.toml`` to the type of a parameter; the first owner that has them decides."""
-    if annotation is typer.Context or get_origin(annotation) is Annotated:
-        return annotation
     entry = next((TEXTS[owner][name] for owner in (*owners, "shared") if name in TEXTS.get(owner, ())), None)
-    if entry is None:
-        raise KeyError(f"options.toml has no text for {name!r} of {owners[0]}")
+    if entry is None or get_origin(annotation) is Annotated:
+        return annotation
     described = {"help": entry} if isinstance(entry, str) else dict(entry)
     make = typer.Argument if described.pop("argument", False) else typer.Option
     return Annotated[annotation, make(*described.pop("flags", ()), **described)]

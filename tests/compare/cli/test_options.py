@@ -1,9 +1,9 @@
 """Texts, flags and limits of options in ``options.toml``."""
 
-import pytest
+from typer.main import get_command
 
 from compare.cli import app, options, simulation_options
-from compare.cli.command import TEXTS, command
+from compare.cli.command import TEXTS
 
 
 def test_each_text_belongs_to_an_option():
@@ -15,9 +15,6 @@ def test_each_text_belongs_to_an_option():
         assert texts.keys() <= known, owner
 
 
-def test_an_option_without_a_text_is_an_error():
-    def forgotten(number: int = 0) -> None:
-        """Do nothing."""
-
-    with pytest.raises(KeyError, match="no text for 'number' of forgotten"):
-        command(forgotten)
+def test_each_option_has_a_text():
+    for name, made in get_command(app).commands.items():
+        assert [option.name for option in made.params if not (option.help or option.metavar)] == [], name
