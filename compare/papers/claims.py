@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from compare.report.document import Table
 from nlp_gait.decoding import decode
 
+CALL = ("check", "part", "arguments")  # keys of a claim in its file that say what decides, see ``bind_checks``
 SIGNIFICANT = 0.05  # p-value below which a difference is not put down to chance
 T = TypeVar("T")
 
@@ -58,6 +59,7 @@ class Claim:
     found: str = ""  # our numbers
     verdict: str = ""  # a ``Verdict``; in a file only of a claim without a check
     detail: str = ""  # of the verdict, for example by how much a claim holds
+    reading_of: str = ""  # id of the row of the same claim in its first reading
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,11 +220,36 @@ def read_printed(cls: Callable[..., T], file: str) -> T:
 
 def read_claims(file: str) -> ClaimsFile:
     """Return claims and differences; ``like = "id"`` in a claim stands for the fields of an earlier one that it omits."""
-    raw = read_tables(file)
-    claims: dict[str, Any] = {}
-    for name, claim in raw.get("claims", {}).items():
+    texts = {
+        name: {key: value for key, value in claim.items() if key not in CALL}
+        for name, claim in _merge_claims(file).items()
+    }
+    return decode(ClaimsFile, {**read_tables(file), "claims": texts}, file)
+
+
+def bind_checks(file: str, functions: Mapping[str, Callable[..., Check]]) -> dict[str, Callable[[Any], Check]]:
+    """Return the checks of a file's claims by id, as functions of the findings.
+
+    ``check = "name"`` in a claim names the function ``_check_name``, ``arguments`` are its arguments besides the findings, and
+    ``part`` is the attribute of the findings that it takes, if not all of them.
+
+    Raises:
+        KeyError: there is no such function.
+    """
+
+    def bind(check: str, part: str = "", arguments: Mapping[str, Any] | None = None) -> Callable[[Any], Check]:
+        function = functions[f"_check_{check}"]
+        return lambda findings: function(getattr(findings, part) if part else findings, **(arguments or {}))
+
+    calls = {name: {key: claim[key] for key in CALL if key in claim} for name, claim in _merge_claims(file).items()}
+    return {name: bind(**call) for name, call in calls.items() if call}
+
+
+def _merge_claims(file: str) -> dict[str, dict[str, Any]]:
+    claims: dict[str, dict[str, Any]] = {}
+    for name, claim in read_tables(file).get("claims", {}).items():
         claims[name] = {**claims.get(claim.pop("like", ""), {}), **claim}
-    return decode(ClaimsFile, {**raw, "claims": claims}, file)
+    return claims
 
 
 def read_tables(file: str) -> dict[str, Any]:

@@ -2,16 +2,16 @@
 
 A reproduction runs what a paper ran, checks its claims, and writes tables, figures and a report. Its text is a template in
 Markdown (see ``compare.report.template``) with places for values, tables and figures; ``{claims}`` and ``{differences}`` are the
-tables of ``<paper>_claims.toml``. To add a claim, add it to that file, and a function with its id to ``checks`` if our numbers
-decide it; else the file gives ``found`` and ``verdict``. ``summary.json`` has both tables and what computed them: its copy from a
-full reproduction, ``docs/papers/<paper>.json``, is what the documentation shows.
+tables of ``<paper>_claims.toml``. To add a claim, add it to that file. If our numbers decide it, ``checks`` has a function with
+its id, or the file names one (``claims.bind_checks``); else the file gives ``found`` and ``verdict``. ``summary.json`` has both
+tables and what computed them: its copy from a full reproduction, ``docs/papers/<paper>.json``, is what the documentation shows.
 """
 
 from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib import resources
@@ -152,7 +152,7 @@ class Reproduction(Generic[E, F]):
         document = replace(
             document,
             title=document.title if label == "full" else f"{document.title} ({label})",
-            verdict=[*{"full": [], "quick": [QUICK], "reduced": [REDUCED]}[label], *count_verdicts(claims.values())],
+            verdict=[*{"full": [], "quick": [QUICK], "reduced": [REDUCED]}[label], *count_verdicts(claims)],
             parts=(*document.parts, provenance, make_citation_section(r.definition["problem"] for r in runner.records)),
         )
         write_document(folder, document)
@@ -174,11 +174,19 @@ def read_sessions(folder: Path) -> list[Session]:
         return list(decode_value(tuple[Session, ...], read_json(path, "sessions"), "sessions"))
 
 
-def count_verdicts(claims: Iterable[Claim]) -> list[str]:
-    """Return a sentence with the number of claims by verdict; nothing without claims."""
-    counts = Counter(claim.verdict for claim in claims)
+def count_verdicts(claims: Mapping[str, Claim]) -> list[str]:
+    """Return a sentence with the numbers of rows, claims, tested claims and rows by verdict; nothing without claims."""
+    counts = Counter(claim.verdict for claim in claims.values())
     words = ", ".join(f'{count} "{verdict}"' for verdict, count in counts.items())
-    return [f"{counts.total()} claims of the paper were checked: {words}."] if counts else []
+    every, tested = (
+        {claim.reading_of or name for name, claim in claims.items() if claim.verdict != left_out}
+        for left_out in ("", Verdict.UNTESTABLE)
+    )
+    return (
+        [f"{len(claims)} rows on {len(every)} claims, of which {len(tested)} are tested here: {words}."]
+        if claims
+        else []
+    )
 
 
 def _summarise(

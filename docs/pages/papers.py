@@ -35,12 +35,12 @@ def paper_page(name: str) -> str:
     if not path.exists():
         return page(f"No full reproduction is recorded yet: `nlp-gait reproduce {name} --out DIR` computes the tables.")
     record = json.loads(path.read_text(encoding="utf-8"))
-    claims = [Claim(**claim) for claim in record["claims"].values()]
+    claims = {key: Claim(**claim) for key, claim in record["claims"].items()}
     differences = [Difference(**row) for row in record["differences"]]
     return page(
         literal(" ".join([*count_verdicts(claims), _describe(record, name)])),
         "### Claims",
-        _format(make_claims_table(claims)),
+        _format(make_claims_table(claims.values())),
         "### What is not as printed",
         _format(make_differences_table(differences)),
     )

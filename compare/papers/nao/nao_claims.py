@@ -1,14 +1,14 @@
-"""Checks of the NAO paper's claims about searches and power, by id in ``nao_claims.toml``; others are in ``nao_gait_claims.py``.
+"""Checks of the NAO paper's claims about searches and power; ``nao_claims.toml`` names them with their arguments.
 
 Claims about PSO are checked twice: with the constant inertia weight that the paper prints (the id) and with the damping of the
-code that it cites (the id with ``-damped``).
+code that it cites (the id with ``-damped``). Other checks are in ``nao_gait_claims.py``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -23,8 +23,7 @@ from compare.papers.claims import (
     require_significance,
 )
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
-from compare.papers.nao.nao_gait_claims import GAIT_CHECKS
-from compare.papers.nao.nao_paper import DSP, PAPER, SSP, SWING_HEIGHT, SWING_POWER_W, PrintedPhase, VelocityRange
+from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
 
 # A solution that costs this share more than the optimum is as good for a walker.
@@ -33,7 +32,6 @@ NEARLY_OPTIMAL = 0.01
 MOST = 0.9
 # A curve that rises by less than this share of itself between two points counts as falling: IPOPT's local optima differ so.
 RIPPLE = 1e-3
-SWARMS = {"": "pso-constant", "-damped": "pso"}  # by end of the id
 RANK_SUM = "rank-sum test"
 
 
@@ -98,22 +96,14 @@ def _check_same_optimum(phase: PhaseFindings, swarm: str) -> Check:
     return decide(bool(np.all(gaps <= 100 * NEARLY_OPTIMAL)), swarm=NAMES[swarm], low=gaps.min(), high=gaps.max())
 
 
-def _check_higher_hip(phase: PhaseFindings) -> Check:
+def _check_falling(phase: PhaseFindings, over: Literal["hip", "time"]) -> Check:
+    """Check whether the feasible optima over the hip's height or the time fall, and give the price of its bound."""
+    sweep = [point for point in phase.sweeps[phase.paper.duration if over == "time" else 0] if point.feasible]
     prices = (bound.price for bound in phase.optimum.active_constraints if bound.name == "bounds[hip_height_m]")
-    return _check_falling(phase, 0, price=-next(prices, 0.0))
-
-
-def _check_slower(phase: PhaseFindings) -> Check:
-    return _check_falling(phase, phase.paper.duration)
-
-
-def _check_falling(phase: PhaseFindings, position: int, **values: float) -> Check:
-    """Check whether the feasible optima over a variable fall."""
-    sweep = [point for point in phase.sweeps[position] if point.feasible]
     power = np.array([point.power_W for point in sweep])
     falls = bool(np.all(power[1:] <= power[:-1] * (1 + RIPPLE)))
     gain = 100 * (1 - power[-1] / power[0])
-    values |= {"gain": gain, "factor": power[0] / power[-1]}
+    values = {"gain": gain, "factor": power[0] / power[-1], "price": -next(prices, 0.0)}
     falling = "falling" if falls else "not falling"
     return require_change(gain if falls else -math.inf, first=sweep[0], last=sweep[-1], falling=falling, **values)
 
@@ -215,7 +205,8 @@ def _check_swing_range(phase: PhaseFindings, algorithm: str, printed_mm: float) 
     )
 
 
-def _check_velocity(phase: PhaseFindings, printed: VelocityRange) -> Check:
+def _check_velocity(phase: PhaseFindings, name: str) -> Check:
+    printed = PAPER.velocity_ranges[name]
     symbols = [f"x{i + 1}" for i in printed.variables]
     names = [phase.problem.names[i] for i in printed.variables]
     optimum = np.array([phase.optimum.x[name] for name in names])
@@ -260,8 +251,8 @@ def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
     return require_significance(check, RANK_SUM, p)
 
 
-def _check_wider(findings: NaoFindings, printed: tuple[VelocityRange, VelocityRange], position: int) -> Check:
-    share = 5 * NEARLY_OPTIMAL
+def _check_wider(findings: NaoFindings, ranges: Sequence[str], position: int) -> Check:
+    share, printed = 5 * NEARLY_OPTIMAL, [PAPER.velocity_ranges[name] for name in ranges]
     ssp, dsp = (float(np.ptp(phase.range_within(position, share))) for phase in findings.phases)
     factors = ((printed[1].high - printed[1].low) / (printed[0].high - printed[0].low), dsp / ssp if ssp else math.inf)
     before, after = (100 * (factor - 1) for factor in factors)
@@ -355,49 +346,3 @@ def _check_faster(findings: NaoFindings) -> Check:
 def _check_same_median(phase: PhaseFindings, swarm: str) -> Check:
     pso, ga = phase.median_run(swarm), phase.median_run("ga")
     return decide(pso == ga, swarm=NAMES[swarm], pso=pso, ga=ga)
-
-
-def _in(printed: PrintedPhase, check: Callable[[PhaseFindings], Check]) -> Callable[[NaoFindings], Check]:
-    """Return the check of one phase as a check of all findings."""
-    return lambda findings: check(findings.ssp if printed is SSP else findings.dsp)
-
-
-CHECKS: dict[str, Callable[[NaoFindings], Check]] = {
-    "swing-plateau": partial(_check_swing_price, algorithm="pso", height_m=0.024),
-    "swing-plateau-ga": partial(_check_swing_price, algorithm="ga", height_m=0.024),
-    "swing-rise": partial(_check_swing_rise, algorithm="pso"),
-    "swing-rise-ga": partial(_check_swing_rise, algorithm="ga"),
-    "swing-range-ga": _in(SSP, partial(_check_swing_range, algorithm="ga", printed_mm=2.0)),
-    "exponential": _check_exponential,
-    "slope-ssp": _in(SSP, partial(_check_signs, signs={"hip_vz_start_m_s": -1, "hip_vz_end_m_s": 1})),
-    "rise-dsp": _in(DSP, partial(_check_signs, signs={"hip_vz_start_m_s": 1})),
-    "gaps": _in(DSP, _check_gaps),
-    "forward-power": _in(SSP, partial(_check_dearer, positions=(3, 4), beyond=0.008)),
-    "lateral-power": _in(DSP, partial(_check_dearer, positions=(5, 6), beyond=0.075)),
-    "near-zero": _in(DSP, _check_near_zero),
-    "positive": _in(DSP, _check_positive),
-    "faster-dsp": _check_faster,
-    **GAIT_CHECKS,
-}
-for _suffix, _phase in (("ssp", SSP), ("dsp", DSP)):
-    CHECKS[f"statistic-{_suffix}"] = _in(_phase, _check_statistic)
-    CHECKS[f"better-{_suffix}-more"] = _in(_phase, _check_more_pairs)
-    CHECKS[f"higher-hip-{_suffix}"] = _in(_phase, _check_higher_hip)
-    CHECKS[f"slower-{_suffix}"] = _in(_phase, _check_slower)
-    CHECKS[f"average-speed-{_suffix}"] = _in(_phase, _check_average_speed)
-    for _end, _swarm in SWARMS.items():
-        CHECKS[f"better-{_suffix}{_end}"] = _in(_phase, partial(_check_better, swarm=_swarm))
-        CHECKS[f"same-median-{_suffix}{_end}"] = _in(_phase, partial(_check_same_median, swarm=_swarm))
-        CHECKS[f"same-optimum-{_suffix}{_end}"] = _in(_phase, partial(_check_same_optimum, swarm=_swarm))
-        CHECKS[f"steadier-{_suffix}{_end}"] = _in(_phase, partial(_check_steadier, swarm=_swarm))
-        CHECKS[f"run-torque-change-{_suffix}{_end}"] = _in(_phase, partial(_check_torque_change, swarm=_swarm))
-for _end, _swarm in SWARMS.items():
-    CHECKS[f"swing-heights{_end}"] = _in(SSP, partial(_check_swing_heights, swarm=_swarm))
-    CHECKS[f"swing-lead{_end}"] = _in(SSP, partial(_check_swing_lead, swarm=_swarm))
-    CHECKS[f"swing-range{_end}"] = _in(SSP, partial(_check_swing_range, algorithm=_swarm, printed_mm=9.0))
-    CHECKS[f"lateral-equal{_end}"] = _in(SSP, partial(_check_lateral, swarm=_swarm))
-for _words, _position in (("start", 3), ("end", 4)):
-    _ranges = PAPER.velocity_ranges["forward-velocity-ssp"], PAPER.velocity_ranges[f"forward-{_words}-dsp"]
-    CHECKS[f"wider-{_words}"] = partial(_check_wider, printed=_ranges, position=_position)
-for _id, _range in PAPER.velocity_ranges.items():
-    CHECKS[_id] = _in(SSP if _range.phase == "ssp" else DSP, partial(_check_velocity, printed=_range))

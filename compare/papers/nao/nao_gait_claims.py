@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -243,41 +242,3 @@ def _check_simulations(findings: NaoFindings, key: str) -> Check:
     return decide(
         holds, tilts=tilts, room=room, falls=", ".join(falls) or "no gait", period=1000 * WEBOTS_DRIVE.period_s
     )
-
-
-Checked = Callable[[NaoFindings], Check]
-
-
-def _both(name: str, check: Callable[[PhaseFindings], Check]) -> dict[str, Checked]:
-    return {f"{name}-ssp": lambda f: check(f.ssp), f"{name}-dsp": lambda f: check(f.dsp)}
-
-
-GAIT_CHECKS: dict[str, Checked] = {
-    **_both("power", _check_power),
-    **_both("margins", partial(_check_levels, indexes=MARGINS)),
-    **_both("torque-level", partial(_check_levels, indexes=("torque_change_Nm",))),
-    **_both("torque-change", _check_torque_lead),
-    **_both("too-slow", partial(_check_pace, slow=True)),
-    **_both("too-fast", partial(_check_pace, slow=False)),
-    **_both("torque-limit", _check_torque_limit),
-    "mean-x-lead": lambda f: _check_lead(f.ssp, ("dbm_x_mean_m",), 1.0),
-    "mean-lead-dsp": lambda f: _check_lead(f.dsp, ("dbm_x_mean_m", "dbm_y_mean_m"), -1.0),
-    "min-lead-dsp": lambda f: _check_lead(f.dsp, ("dbm_x_min_m", "dbm_y_min_m"), 1.0),
-    "similar-power": lambda f: _check_similar_power(f.dsp),
-    "more-stable": _check_more_stable,
-    "lower-hip-x": partial(_check_lower_hip, axis="x"),
-    "lower-hip-y": partial(_check_lower_hip, axis="y"),
-    "arms": _check_arms,
-    "relief": _check_relief,
-    "lateral-margin": lambda f: _check_lateral_margin(f.ssp),
-    "straight": _check_straight,
-    "oscillation": _check_oscillation,
-    "oscillation-torque": _check_oscillation_torque,
-    "least-margins-ssp": lambda f: _check_close(f.ssp),
-    "contradiction": _check_contradiction,
-    "knees": partial(_check_joints, kind="Knee"),
-    "hips": partial(_check_joints, kind="Hip"),
-    "stretched": _check_stretched,
-    "no-fall": partial(_check_simulations, key="fell_at_s"),
-    "joint-limits": partial(_check_simulations, key="simulated_beyond_rad"),
-}

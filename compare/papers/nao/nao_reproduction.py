@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.statistics.inference import a12
+from compare.papers.claims import bind_checks
+from compare.papers.nao import nao_claims, nao_gait_claims
 from compare.papers.nao import nao_runs as nao
-from compare.papers.nao.nao_claims import CHECKS
 from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_gait_claims import MARGINS, compute_joint_shares, describe_effect
@@ -345,5 +346,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    checks=CHECKS,
+    checks=bind_checks("nao/nao_claims.toml", {**vars(nao_claims), **vars(nao_gait_claims)}),
 )

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
+from typing import get_args
 
 import numpy as np
 
-from compare.papers.paper_runs import Runs, choose_best
-from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3
+from compare.papers.paper_runs import Runs, choose_best, list_objectives
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4_DIGITS, PaperRow
 from compare.papers.walk12.walk12_runs import (
     CORNER_M,
     PAPER,
+    READINGS,
     PathPoint,
     Walk12Effort,
     compute_f1,
@@ -23,8 +26,12 @@ from compare.papers.walk12.walk12_runs import (
 from compare.papers.walk12.walk12_walks import WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
+from nlp_gait.formulation import Array
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
+
+KNEES = ("theta_3", "theta_10")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +44,7 @@ class Walk12Findings:
     front: Sequence[PathPoint]  # largest f1 for each step length
     printed_step: Mapping[str, float]  # optimal f with the paper's integration step, by lambda
     walks: Sequence[WalkedGait]  # in the engine; none without it
-    f1_of_table_3: Sequence[float] = field(default_factory=lambda: [compute_f1(row) for row in TABLE_3])
+    _f1: dict[Zmp, Sequence[float]] = field(default_factory=dict)
 
     def records(self, label: str, weight: float, solver: str) -> Sequence[RunRecord]:
         """Return the runs of a solver at a lambda under a normalisation."""
@@ -52,16 +59,38 @@ class Walk12Findings:
         """The model's largest f1 [1/(m^2 s)]."""
         return find_f1max(self.runs, title_table_3(PAPER, 1.0))
 
+    @property
+    def f1_of_table_3(self) -> Sequence[float]:
+        """f1 of the printed gaits of Table III [1/(m^2 s)]."""
+        return self.f1_by("exact")
+
     @cached_property
     def stable(self) -> Sequence[StableShare]:
         """When each gait of Table III satisfies (8)."""
         return [compute_stable_share(row.x) for row in TABLE_3]
 
-    def f_of_printed_gaits(self, label: str) -> list[float]:
+    def f1_by(self, zmp: Zmp) -> Sequence[float]:
+        """Return f1 of the printed gaits of Table III by a reading of the ZMP [1/(m^2 s)]."""
+        if zmp not in self._f1:
+            self._f1[zmp] = [compute_f1(row, zmp=zmp) for row in TABLE_3]
+        return self._f1[zmp]
+
+    def describe_f1_change(self, zmp: Zmp, by: Zmp = "exact") -> str:
+        """Return the least and greatest change of f1 of the printed gaits from a reading of the ZMP to another, as words."""
+        changes = 100 * (np.array(self.f1_by(zmp)) / np.array(self.f1_by(by)) - 1)
+        return f"{changes.min():+z.2f} % to {changes.max():+z.2f} %"
+
+    def f_of_printed_gaits(self, label: str, zmp: Zmp = "exact") -> list[float]:
         """Return f of the printed gaits in the model under a normalisation."""
         f1max = F1MAX if label == PAPER else self.own_f1max
-        known = zip(TABLE_3, self.f1_of_table_3, strict=True)
+        known = zip(TABLE_3, self.f1_by(zmp), strict=True)
         return [row.weight * f1 / f1max + (1 - row.weight) * row.x[0] / F2MAX for row, f1 in known]
+
+    def list_optima(self, zmp: Zmp) -> list[float]:
+        """Return the optimal f by a reading of the ZMP at each lambda where it is solved, under the paper's f1max."""
+        if zmp == "exact":
+            return list_objectives(self.optimum(PAPER, row.weight) for row in TABLE_3)
+        return list_objectives(choose_best(self.runs[f"{zmp}-{weight:g}", IPOPT]) for weight in READINGS[zmp])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,14 +112,45 @@ def compute_stable_share(x: tuple[float, ...]) -> StableShare:
     return StableShare(share=float(inside.mean()), first_s=float(times.min()), last_s=float(times.max()))
 
 
-def compute_hip_miss() -> float:
-    """Return the distance between the hip and where the angles of the printed (2) put it, for a vertical leg in the corner [m].
+def choose_median(runs: Sequence[RunRecord]) -> RunRecord:
+    """Return the run of median f; infeasible runs are the least."""
+    return sorted(runs, key=lambda run: run.verdict.objective if run.verdict.feasible else -math.inf)[
+        (len(runs) - 1) // 2
+    ]
+
+
+def list_rounded(row: PaperRow) -> list[PaperRow]:
+    """Return a row of Table IV as printed, and with half the last digit more or less of each variable, in all combinations."""
+    corners = [(0, 0, 0, 0), *product((-1, 1), repeat=4)]
+    shifted = (np.array(row.x) + np.array(signs) * TABLE_4_DIGITS for signs in corners)
+    return [replace(row, x=tuple(np.maximum(x, 1e-3).tolist())) for x in shifted]
+
+
+def compute_zmp_error(x: tuple[float, ...], zmp: Zmp) -> float:
+    """Return the largest distance over a step between the ZMP by a reading and the point without moment [m]."""
+    points = [
+        compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=400, zmp=reading).arrays["zmp_foot"]
+        for reading in (zmp, get_args(Zmp)[-1])
+    ]
+    return float(np.linalg.norm(points[0] - points[1], axis=1).max())
+
+
+def compute_leg_lengths(x: tuple[float, ...]) -> Array:
+    """Return the distances between hip and ankle of both legs over a step [m]."""
+    robot = load_point_mass_biped()
+    arrays = compute_steps(robot, np.array(x), steps=1, intervals=400).arrays
+    knees = arrays["q"][:, [JOINTS.index(name) for name in KNEES]]
+    return np.sqrt(robot.thigh_m**2 + robot.shank_m**2 + 2 * robot.thigh_m * robot.shank_m * np.cos(knees))
+
+
+def compute_hip_miss(distance: float | None = None) -> float:
+    """Return the distance between the hip and where the angles of the printed (2) put it, for a vertical leg [m].
 
     (2) takes theta_B, the complement of the angle at the ankle, from an arccosine that is never negative; below
-    sqrt(d1^2 - d2^2) that angle exceeds a right one.
+    sqrt(d1^2 - d2^2) that angle exceeds a right one. Without a distance between hip and ankle [m] the leg is that of the corner.
     """
     robot = load_point_mass_biped()
-    d1, d2, distance = robot.thigh_m, robot.shank_m, robot.leg_m - 2 * CORNER_M
+    d1, d2, distance = robot.thigh_m, robot.shank_m, distance or robot.leg_m - 2 * CORNER_M
     theta_a = math.acos((d1**2 + d2**2 - distance**2) / (2 * d1 * d2))
     ankle = math.pi / 2 - math.acos(d1 * math.sin(theta_a) / distance)
     thigh = ankle - (math.pi - theta_a)
@@ -102,5 +162,4 @@ def compute_hip_miss() -> float:
 def compute_straightest_knee(x: Sequence[float]) -> float:
     """Return the least angle of a knee in a step [rad]."""
     arrays = compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=1000).arrays
-    knees = [JOINTS.index(name) for name in ("theta_3", "theta_10")]
-    return float(arrays["q"][:, knees].min())
+    return float(arrays["q"][:, [JOINTS.index(name) for name in KNEES]].min())

@@ -35,11 +35,15 @@ class Walk12Paper:
 
     table_3: tuple[PaperRow, ...]
     table_4: tuple[PaperRow, ...]
-    f1_changes: Mapping[str, tuple[float, float]]  # ours [%], by what is read in another way
+    table_4_digits: tuple[float, float, float, float]  # half the last printed digit of x [m]
+    # Ours, by what is read in another way: changes of f1 [%], errors of the ZMP by moments of the links [mm]
+    changes: Mapping[str, tuple[float, float]]
+    shares: Mapping[str, float]  # ours: of the gaits within the bounds (7) [%]
 
 
 PAPER = read_printed(Walk12Paper, "walk12/walk12_paper.toml")
-TABLE_3, TABLE_4, F1_CHANGES = PAPER.table_3, PAPER.table_4, PAPER.f1_changes
+TABLE_3, TABLE_4, TABLE_4_DIGITS = PAPER.table_3, PAPER.table_4, PAPER.table_4_digits
+CHANGES, SHARES = PAPER.changes, PAPER.shares
 
 
 def find_row(weight: float) -> PaperRow:

@@ -12,19 +12,32 @@ import numpy as np
 
 from compare.analysis.units import join_words
 from compare.judge import DENSE_INTERVALS
+from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
+from compare.papers.walk12 import walk12_claims, walk12_step_time_claims, walk12_walks
 from compare.papers.walk12 import walk12_runs as runs
-from compare.papers.walk12 import walk12_walks
-from compare.papers.walk12.walk12_claims import CHECKS, count_upright
+from compare.papers.walk12.walk12_claims import count_upright
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
 from compare.papers.walk12.walk12_findings import (
     Walk12Findings,
+    choose_median,
     compute_hip_miss,
     compute_straightest_knee,
+    list_rounded,
 )
-from compare.papers.walk12.walk12_paper import F1_CHANGES, F1MAX, F2MAX, TABLE_3, TABLE_4, find_row
+from compare.papers.walk12.walk12_paper import (
+    CHANGES,
+    F1MAX,
+    F2MAX,
+    SHARES,
+    TABLE_3,
+    TABLE_4,
+    PaperRow,
+    find_row,
+)
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
+from compare.papers.walk12.walk12_step_time_claims import list_f1max
 from compare.papers.walk12.walk12_walks import DRIVES, PERTURBATION_RAD, WALKED_STEPS, WalkedGait
 from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
@@ -34,10 +47,12 @@ from nlp_gait.formulation import load
 from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS, make_rigid_bodies
 from nlp_gait.gaits.walk12.walk12_model import Zmp
+from nlp_gait.gaits.walk12.walk12_problem import Horizon
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
 
+CHECKS = bind_checks("walk12/walk12_claims.toml", {**vars(walk12_claims), **vars(walk12_step_time_claims)})
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
 
@@ -48,14 +63,17 @@ def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     records |= runner.run_tasks(runs.make_second_tasks(effort, records))
     paths = runner.compute(runs.make_paths(effort), code=(runs,))
     weighted, front = ([PathPoint(**row) for row in rows] for rows in paths.values())
-    last = runner.compute(runs.make_last(effort, records), code=(runs, walk12_walks))
+    optima = {
+        row.weight: get_point(choose_best(records[runs.title_table_3(PAPER, row.weight), IPOPT])) for row in TABLE_3
+    }
+    walks = runner.compute(runs.make_walks(effort, optima), code=(walk12_walks,))
     return Walk12Findings(
         effort=effort,
         runs=records,
         weighted=weighted,
         front=front,
-        printed_step=last["printed-step"],
-        walks=[WalkedGait(**row) for name, rows in last.items() if name.startswith("walks") for row in rows],
+        printed_step=runner.compute(runs.make_printed_step(effort, optima), code=(runs,))["printed-step"],
+        walks=[WalkedGait(**row) for rows in walks.values() for row in rows],
     )
 
 
@@ -84,7 +102,6 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         "f2max": F2MAX,
         "knee_rad": problem.value("reach_margin_rad"),
         "agree": SAME_OPTIMUM,
-        "intervals": problem.options["intervals"],
         "dense_intervals": DENSE_INTERVALS,
         "s_bounds": lengths,
         "longest_mm": 1e3 * lengths[1],
@@ -95,7 +112,9 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         "branch_m": math.sqrt(abs(robot.thigh_m**2 - robot.shank_m**2)),
         "corner_m": CORNER_M,
         "corner_leg_mm": 1e3 * (robot.leg_m - 2 * CORNER_M),
-        "free_weights": runs.MOMENT_FREE_WEIGHTS,
+        "instants": int(problem.options["intervals"]) // 2 + 1,
+        "circle_off_mm": CHECKS["circle"](findings).values["off"],
+        "time_s": {name: _compute_time(findings, name) for name in ("ga", IPOPT)},
         **_compute_normalisation(findings),
         **_compute_tradeoff(findings),
         **_compute_errata(findings),
@@ -152,37 +171,49 @@ def _compute_tradeoff(findings: Walk12Findings) -> dict[str, Any]:
 
 
 def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
-    exact = np.array(findings.f1_of_table_3)
-    changes = {
-        zmp: compute_range(100 * (np.array([compute_f1(row, zmp=zmp) for row in TABLE_3]) / exact - 1))
-        for zmp in get_args(Zmp)
-    }
     (corner,) = findings.runs["corner", IPOPT]
-    free = [choose_best(findings.runs[f"moment-free-{weight:g}", IPOPT]) for weight in runs.MOMENT_FREE_WEIGHTS]
-    f1 = {horizon: [compute_f1(row, horizon=horizon) for row in TABLE_4] for horizon in HORIZONS}
-    implied = [row.implied_f1 for row in TABLE_4]
+    gaps: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {}
+    for horizon in HORIZONS:
+        gap = [_compute_gap(row, horizon) for row in TABLE_4]
+        least = [min(_compute_gap(rounded, horizon) for rounded in list_rounded(row)) for row in TABLE_4]
+        gaps[horizon] = compute_range(gap), compute_range(least)
     return {
-        "f1_change": {zmp: f"{low:+z.2f} % to {high:+z.2f} %" for zmp, (low, high) in changes.items()},
-        "free": list_objectives(free),
+        "f1_change": {zmp: findings.describe_f1_change(zmp) for zmp in get_args(Zmp)},
+        "read": {zmp: _describe_reading(findings, zmp) for zmp in runs.READINGS},
         "hip_miss_mm": 1e3 * compute_hip_miss(),
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
         "up_mm": 1e3 * load_point_mass_biped().foot_com_height_m,
         "lift_mm": 1e3 * find_row(0.15).x[2],
         "stable": findings.stable[-1],
-        "f1_read": F1_CHANGES,
+        "f1_read": CHANGES,
+        "shares": SHARES,
         "stable_intervals": ", ".join(
             f"{findings.stable[k].first_s:.2f} to {findings.stable[k].last_s:.2f} s at λ = {TABLE_3[k].weight:g}"
             for k in (0, 1, -1)
         ),
-        "step_gap": _compute_gap(f1["step"], implied),
-        "horizon_gap": _compute_gap(f1["1s"], implied),
+        "gap": {horizon: gap for horizon, (gap, _) in gaps.items()},
+        "least_gap": {horizon: least for horizon, (_, least) in gaps.items()},
+        "f1max_by_T": join_words(f"{value:.0f}" for value in list_f1max(findings, "step")),
     }
 
 
-def _compute_gap(values: Iterable[float], wanted: Iterable[float]) -> tuple[float, float]:
-    """Least and greatest difference in percent."""
-    return compute_range(100 * abs(f / expected - 1) for f, expected in zip(values, wanted, strict=True))
+def _compute_gap(row: PaperRow, horizon: Horizon) -> float:
+    """Difference [%] between f1 of a printed gait and what its printed f implies."""
+    return 100 * abs(compute_f1(row, horizon=horizon) / row.implied_f1 - 1)
+
+
+def _describe_reading(findings: Walk12Findings, zmp: Zmp) -> str:
+    """Return f1max, the optimum at lambda = 0.15 and where the optimum moves between both ends of s, by a reading."""
+    ends = [choose_best(findings.runs[f"{zmp}-{weight:g}", IPOPT]) for weight in (0.15, 1.0)]
+    (long, low), (short, high) = (
+        (get_point(run)[0] / F2MAX, run.verdict.indexes["f1_per_m2s"] / F1MAX) for run in ends
+    )
+    weight = (long - short) / (long - short + high - low)
+    return (
+        f"f1max becomes {F1MAX * high:.2f}, the optimum at λ = 0.15 {ends[0].verdict.objective:.4f}, and both ends of s have "
+        f"the same f at λ = {weight:.3f}"
+    )
 
 
 def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
@@ -201,7 +232,9 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         for name, record in (("bound", findings.optimum(PAPER, 1.0)), ("simpson_bound", simpson[-1]))
     }
     return {
-        "walked": _count_walks(findings),
+        "walked": "; ".join(f"{drives}: {count_upright(findings.walks, drives, 'paper')}" for drives in DRIVES),
+        "ga_gap": _compute_ga_gaps(findings, [runs.title_table_3(PAPER, row.weight) for row in TABLE_3]),
+        "ga_gap_4": _compute_ga_gaps(findings, [runs.title_table_4(row, "step") for row in TABLE_4]),
         "simulator": _list_simulator_numbers(),
         "perturbed": findings.effort.perturbed_starts,
         "bent_weights": join_words(f"{weight:g}" for weight in weights),
@@ -221,9 +254,16 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
     }
 
 
-def _count_walks(findings: Walk12Findings) -> dict[str, str]:
-    """Count the walks of the paper's gaits from perturbed starts that do not fall, as words, by drives."""
-    return {drives: count_upright(findings.walks, drives, "paper") for drives in DRIVES}
+def _compute_ga_gaps(findings: Walk12Findings, titles: Iterable[str]) -> tuple[float, float]:
+    """Least and greatest distance [%] of the GA's median run from the optimum."""
+    pairs = ((choose_median(findings.runs[title, "ga"]), choose_best(findings.runs[title, IPOPT])) for title in titles)
+    return compute_range(100 * (1 - ga.verdict.objective / best.verdict.objective) for ga, best in pairs)
+
+
+def _compute_time(findings: Walk12Findings, solver: str) -> float:
+    """Median time of a run on Table III [s]."""
+    found = [run.time_s.solve for row in TABLE_3 for run in findings.records(PAPER, row.weight, solver)]
+    return float(np.median(found))
 
 
 def _list_simulator_numbers() -> dict[str, Any]:
@@ -270,6 +310,7 @@ def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
         "table3-paper": _list_table_3(findings, PAPER),
         "table3-model": _list_table_3(findings, MODEL),
         "gaits": _list_gaits(findings),
+        "readings": _list_readings(findings),
         "table4": _list_table_4(findings),
         "quadrature": _list_quadratures(findings),
         "walks": [_make_walk_row(walk) for walk in findings.walks],
@@ -319,8 +360,11 @@ def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
         begun, optimum = findings.records(label, row.weight, IPOPT), findings.optimum(label, row.weight)
         f_best = optimum.verdict.objective
         agreeing = sum(r.claimed and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
-        time_s = float(np.median([r.time_s.solve for r in begun]))
-        rows.append([*cells, f_best, get_dense(optimum)["f"], agreeing, time_s])
+        times = [
+            float(np.median([r.time_s.solve for r in done]))
+            for done in (findings.records(label, row.weight, "ga"), begun)
+        ]
+        rows.append([*cells, f_best, get_dense(optimum)["f"], agreeing, *times])
     return rows
 
 
@@ -334,6 +378,14 @@ def _list_gaits(findings: Walk12Findings) -> Rows:
             figures = get_dense(found)
             rows.append([row.weight, solver.upper(), *get_point(found), figures["f1_per_m2s"], figures["stable_share"]])
     return rows
+
+
+def _list_readings(findings: Walk12Findings) -> Rows:
+    """f1 of the printed gaits by each reading of the ZMP, and f and the optimum with (A1) as printed."""
+    printed: Zmp = "appendix-as-printed"
+    columns = [findings.f1_by(zmp) for zmp in ("exact", "moment-free", "appendix", printed)]
+    columns += [findings.f_of_printed_gaits(PAPER, printed), findings.list_optima(printed)]
+    return [[row.weight, row.f, row.implied_f1, *values] for row, *values in zip(TABLE_3, *columns, strict=True)]
 
 
 def _list_table_4(findings: Walk12Findings) -> Rows:

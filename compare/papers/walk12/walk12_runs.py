@@ -15,7 +15,6 @@ from compare.papers.paper_runs import (
     Effort,
     Runs,
     choose_best,
-    get_point,
     make_computation,
     make_search_tasks,
     make_start_tasks,
@@ -30,6 +29,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.optima.continuation import Continuation
 from nlp_gait.backends.solve import solve
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.walk12.walk12_model import Zmp
 from nlp_gait.gaits.walk12.walk12_problem import VARIABLES, Horizon
 
 PAPER, MODEL = "paper", "model"  # whose f1max
@@ -37,7 +37,13 @@ HORIZONS: tuple[Horizon, ...] = get_args(Horizon)
 # Table II: 30 epochs after the first population.
 GA, GA_EVALUATIONS = GeneticAlgorithm.goswami2008(), 930
 CORNER_M = 0.13
-MOMENT_FREE_WEIGHTS, BENT_FREELY_WEIGHTS = (0.15, 1.0), (0.15, 0.9, 1.0)
+BENT_FREELY_WEIGHTS = (0.15, 0.9, 1.0)
+# Other readings of the ZMP, with the lambda at which IPOPT solves: all of Table III by the equations that the paper prints.
+READINGS: Mapping[Zmp, Sequence[float]] = {
+    "moment-free": (0.15, 1.0),
+    "appendix": (0.15, 1.0),
+    "appendix-as-printed": tuple(row.weight for row in TABLE_3),
+}
 BELOW_WEIGHT = 0.05  # the paper: the robot falls below lambda = 0.1
 # What Table II leaves open: settings of the GA other than ours, at lambda = 0.15.
 GA_VARIANTS = {
@@ -71,9 +77,10 @@ class Walk12Effort(Effort):
     def steps(self) -> int:
         """Runs, the two paths, the printed integration step, the walks, and the report."""
         table_3, table_4 = len(TABLE_3) * (self.starts + 2 * self.runs), len(TABLE_4) * len(HORIZONS) * self.starts
-        walks = 2 * len(self.walked_weights)
-        variants = len(MOMENT_FREE_WEIGHTS) + len(BENT_FREELY_WEIGHTS) + len(TABLE_3) + 1
-        return 2 * (table_3 + table_4) + variants * self.starts + len(GA_VARIANTS) * self.runs + 1 + 2 + 1 + walks + 1
+        variants = sum(map(len, READINGS.values())) + len(BENT_FREELY_WEIGHTS) + len(TABLE_3) + 1
+        searches = len(GA_VARIANTS) + 2 * len(TABLE_4)  # Table IV has the GA with Q over one step
+        runs = 2 * (table_3 + table_4) + variants * self.starts + searches * self.runs + 1
+        return runs + 2 + 1 + 2 * len(self.walked_weights) + 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,9 +116,12 @@ def make_first_tasks(effort: Walk12Effort) -> Iterator[Task]:
         title = title_table_4(row, horizon, most_stable=True)
         most_stable = _make_spec(title, 1.0, F1MAX, {"horizon": horizon}, step_time_s=row.step_time_s)
         yield from make_start_tasks(most_stable, effort.starts)
-    for weight in MOMENT_FREE_WEIGHTS:
-        free = _make_spec(f"moment-free-{weight:g}", weight, F1MAX, {"zmp": "moment-free"})
-        yield from make_start_tasks(free, effort.starts)
+        if horizon == "step":
+            yield from make_search_tasks(most_stable, "ga", GA, effort.runs, GA_EVALUATIONS)
+    for zmp, weights in READINGS.items():
+        for weight in weights:
+            read = _make_spec(f"{zmp}-{weight:g}", weight, F1MAX, {"zmp": zmp})
+            yield from make_start_tasks(read, effort.starts)
     for weight in BENT_FREELY_WEIGHTS:
         yield from make_start_tasks(
             _make_spec(f"no-reach-margin-{weight:g}", weight, F1MAX, reach_margin_rad=0.0), effort.starts
@@ -135,6 +145,8 @@ def make_second_tasks(effort: Walk12Effort, runs: Runs) -> Iterator[Task]:
         options, title = {"horizon": horizon}, title_table_4(row, horizon)
         spec = _make_spec(title, row.weight, f1max, options, step_time_s=row.step_time_s)
         yield from make_start_tasks(spec, effort.starts)
+        if horizon == "step":
+            yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
 
 
 def _make_table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Task]:
@@ -173,21 +185,20 @@ def make_paths(effort: Walk12Effort) -> list[Computation]:
     ]
 
 
-def make_last(effort: Walk12Effort, runs: Runs) -> list[Computation]:
-    """Return what needs the optima: solving with the paper's integration step, and walking in the engine."""
-    spec = ProblemSpec(name="walk12")
-    optima = {row.weight: get_point(choose_best(runs[title_table_3(PAPER, row.weight), IPOPT])) for row in TABLE_3}
+def make_printed_step(effort: Walk12Effort, optima: Mapping[float, Sequence[float]]) -> list[Computation]:
+    """Return solving with the paper's integration step from the optima, by lambda."""
     starts = {f"{weight:g}": optima[weight] for weight in effort.printed_step_weights}
+    return [make_computation("printed-step", ProblemSpec(name="walk12"), solve_with_printed_step, starts=starts)]
+
+
+def make_walks(effort: Walk12Effort, optima: Mapping[float, Sequence[float]]) -> list[Computation]:
+    """Return walking in the engine, for the paper's gaits and the optima."""
+    spec, starts = ProblemSpec(name="walk12"), effort.perturbed_starts
     rows = [row for row in TABLE_3 if row.weight in effort.walked_weights]
-    gaits = [(row.weight, by, x) for row in rows for by, x in (("paper", [*row.x]), ("IPOPT", optima[row.weight]))]
+    gaits = [(row.weight, by, x) for row in rows for by, x in (("paper", [*row.x]), ("IPOPT", [*optima[row.weight]]))]
     return [
-        make_computation("printed-step", spec, solve_with_printed_step, starts=starts),
-        *(
-            make_computation(
-                f"walks-{weight:g}-{by}", spec, simulate_walks, gait=(weight, by, x), starts=effort.perturbed_starts
-            )
-            for weight, by, x in gaits
-        ),
+        make_computation(f"walks-{gait[0]:g}-{gait[1]}", spec, simulate_walks, gait=gait, starts=starts)
+        for gait in gaits
     ]
 
 

@@ -1,4 +1,4 @@
-"""Gaits of the 12-joint walk in MuJoCo: two step times, four drives, and starts whose joints are slightly off."""
+"""Gaits of the 12-joint walk in MuJoCo: two step times, seven drives, and starts whose joints are slightly off."""
 
 from __future__ import annotations
 
@@ -22,13 +22,16 @@ ROBOT_STEP_S = 1.2  # of the experiments, section 7
 STEP_TIMES_S = (1.0, ROBOT_STEP_S)
 WALKED_STEPS = 10
 PERTURBATION_RAD = 0.01  # standard deviation of the joint angles at a perturbed start
-# Whether the motors' torque and the number of set-points are as printed, and what is added to a set-point.
+HELD = "as printed: 1.02 Nm, 10 set-points held, nothing added"
+# Whether the motors' torque and the number of set-points are as printed, what is added to a set-point, and what is between two.
 DRIVES = {
-    "ours": (False, False, "torque"),
-    "printed torque": (True, False, "torque"),
-    "printed set-points": (False, True, "torque"),
-    "printed": (True, True, "torque"),
-    "printed, no feed-forward": (True, True, "none"),
+    "ours": (False, False, "torque", "linear"),
+    "1.02 Nm": (True, False, "torque", "linear"),
+    "10 set-points": (False, True, "torque", "linear"),
+    "1.02 Nm, 10 set-points": (True, True, "torque", "linear"),
+    "1.02 Nm, 10 set-points, no feed-forward": (True, True, "none", "linear"),
+    "10 set-points held, no feed-forward": (False, True, "none", "held"),
+    HELD: (True, True, "none", "held"),
 }
 
 
@@ -52,12 +55,11 @@ def simulate_walks(gait: tuple[float, str, Sequence[float]], starts: int) -> lis
     if find_spec("mujoco") is None:
         return []
     (weight, by, x), found = gait, []
-    for step_time_s, (drives, (torque, set_points, feed_forward)) in product(STEP_TIMES_S, DRIVES.items()):
+    for step_time_s, (drives, (torque, set_points, added, between)) in product(STEP_TIMES_S, DRIVES.items()):
         problem = ProblemSpec(name="walk12").load().with_values(step_time_s=step_time_s)
-        plan, drive = (
-            make_plan(Result(problem=problem, x=problem.check_x(x)), WALKED_STEPS),
-            Drive(feed_forward=feed_forward),
-        )
+        plan = make_plan(Result(problem=problem, x=problem.check_x(x)), WALKED_STEPS)
+        period_s = step_time_s / SET_POINTS if between == "held" else Drive().period_s
+        drive = Drive(feed_forward=added, interpolation=between, period_s=period_s)
         plan = _drive_as_printed(plan, torque, set_points)
         walk = measure_walk(plan, simulate_plan(plan, None, drive), drive, WALKED_STEPS)
         known = {"weight": weight, "by": by, "step_time_s": step_time_s, "drives": drives, "starts": starts}

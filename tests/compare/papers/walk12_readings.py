@@ -33,7 +33,8 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
 
     "ground": heights of the masses from the ground, with an ankle at the height L of the foot's mass above it; "g": 9.8 m/s^2;
     "foot": the foot's mass stays at the height L above its ankle; "rods": (13) with M of uniform rods for thighs and shanks,
-    a tenth of the actuators' mass in all; "spheres": with M of the spheres that are the legs' masses in the engine.
+    a tenth of the actuators' mass in all; "spheres": with M of the spheres that are the legs' masses in the engine. "rods_mm" and
+    "spheres_mm" are the greatest shifts of the ZMP by these moments [mm].
     """
     robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
     m, up = np.array(list_masses(robot)).ravel(), robot.foot_com_height_m
@@ -63,6 +64,7 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
             turning["rods"] += ROD_SHARE / 4 * m.sum() / 12 * spin
             turning["spheres"] += 0.4 * mass * SPHERE_RADIUS**2 * spin / (rod[:, :, 0] ** 2).sum(axis=1, keepdims=True)
     moments = {name: f1(P, A, moments=spin[:, [1, 0]] * [-1.0, 1.0]) for name, spin in turning.items()}
+    shifts = {name: 1e3 * np.hypot(*spin[:, :2].T).max() / (GRAVITY * m.sum()) for name, spin in turning.items()}
     return {
         "ours": f1(P, A),
         "ground": f1(P, A, base=up),
@@ -70,6 +72,8 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
         "foot": f1(P_foot, A_foot),
         "rods": moments["rods"],
         "spheres": moments["spheres"],
+        "rods_mm": shifts["rods"],
+        "spheres_mm": shifts["spheres"],
     }
 
 
@@ -100,12 +104,30 @@ def compute_corner_slopes() -> dict[str, float]:
     return {name: (f(corner - shift) - f(corner)) / STEP_M for name, shift in shifts.items()}
 
 
-def compute_unreachable_share() -> float:
-    """Return the share of the bounds (7) whose gaits no leg reaches, or only with a knee straighter than the limit."""
-    problem = load_walk12()
+def compute_shares() -> dict[str, float]:
+    """Return shares of the gaits within the bounds (7) [%].
+
+    "limit": they break the limit of reach, by the problem. By (4) and (6) in NumPy, "out_of_reach": a leg does not reach;
+    "too_close": hip and ankle come so close that (2) misses.
+    """
+    problem, robot = load_walk12(), load_point_mass_biped()
     points = qmc.scale(qmc.Sobol(len(problem.names), rng=0).random(SAMPLES), problem.lower, problem.upper)
     _, violation = compile_objective(problem, threads=1)(points)
-    return float(np.mean(violation > 0.0))
+    (s, n, lift, bend), t = points.T[:, :, None], np.linspace(0.0, 1.0, 21)
+    hip_x = s / 4 * np.sin(np.pi * (t - 0.5))
+    hip_y = n * np.sin(np.pi / 2 * (np.sin(np.pi * t / 2) + 1)) * np.sin(np.pi * t)
+    lifted = lift * np.sin(np.pi * (np.sin(np.pi * (t - 0.5)) / 2 + 0.5))
+    hip_z = robot.leg_m - bend
+    stance, swing = (
+        np.sqrt(hip_x**2 + hip_y**2 + z**2) for z in (hip_z, hip_z - lifted)
+    )  # the swing hip is as far behind its ankle as the stance hip before its own, and mirrored
+    far, close = np.maximum(stance, swing).max(axis=1), np.minimum(stance, swing).min(axis=1)
+    least = abs(robot.thigh_m - robot.shank_m)
+    return {
+        "limit": 100 * float(np.mean(violation > 0.0)),
+        "out_of_reach": 100 * float(np.mean((far > robot.leg_m) | (close < least))),
+        "too_close": 100 * float(np.mean(close < np.sqrt(robot.thigh_m**2 - robot.shank_m**2))),
+    }
 
 
 def is_rounding(row: PaperRow) -> bool:

@@ -1,0 +1,82 @@
+"""Checks of the claims of the 12-joint walk's paper on other step times (section 7.2, Table IV), as in ``walk12_claims.py``."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from compare.papers.claims import Check, Verdict, compare_changes, compare_levels, decide, require_change
+from compare.papers.paper_runs import choose_best, compute_range, get_point
+from compare.papers.walk12.walk12_findings import Walk12Findings, choose_median, list_rounded
+from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
+from compare.papers.walk12.walk12_runs import HORIZONS, PAPER, compute_f1, title_table_4
+from compare.study.record import RunRecord
+from compare.study.task import IPOPT
+from nlp_gait.gaits.walk12.walk12_problem import Horizon
+
+
+def _choose(
+    findings: Walk12Findings, row: PaperRow, horizon: Horizon, solver: str, most_stable: bool = False
+) -> RunRecord:
+    runs = findings.runs[title_table_4(row, horizon, most_stable=most_stable), solver]
+    return choose_best(runs) if solver == IPOPT else choose_median(runs)
+
+
+def list_f1max(findings: Walk12Findings, horizon: Horizon, solver: str = IPOPT) -> list[float]:
+    """Return f1 of the most stable gait at each T of Table IV [1/(m^2 s)], IPOPT's or that of a search's median run."""
+    return [F1MAX * _choose(findings, row, horizon, solver, True).verdict.objective for row in TABLE_4]
+
+
+def _check_f1max_over_time(findings: Walk12Findings, horizon: Horizon, solver: str) -> Check:
+    f1max = list_f1max(findings, horizon, solver)
+    return compare_levels([row.f1max for row in TABLE_4], f1max, found=", ".join(f"{value:.0f}" for value in f1max))
+
+
+def _check_trend(findings: Walk12Findings, horizon: Horizon) -> Check:
+    slow, fast, f1max = TABLE_4[0], TABLE_4[-1], list_f1max(findings, horizon)
+    ours = 100 * (f1max[0] / f1max[-1] - 1)
+    times = {"slow": slow.step_time_s, "fast": fast.step_time_s}
+    return compare_changes(100 * (slow.f1max / fast.f1max - 1), ours, **times, found=ours)
+
+
+def _check_f1_over_time(_: Walk12Findings, horizon: Horizon) -> Check:
+    """Check whether f1 of the printed gaits rises with T, also for the gaits that round to the printed digits."""
+    f1 = [compute_f1(row, horizon=horizon) for row in TABLE_4]
+    ranges = [compute_range(compute_f1(row, horizon=horizon) for row in list_rounded(row)) for row in TABLE_4]
+    least, most = ([100 * (a[k] / b[1 - k] - 1) for a, b in pairwise(ranges)] for k in (0, 1))
+    texts = (", ".join(f"{v:.0f}" for v in f1), ", ".join(f"{low:.0f} to {high:.0f}" for low, high in ranges))
+    return require_change([least, most], found=texts[0], ranges=texts[1])
+
+
+def _check_variables_over_time(findings: Walk12Findings, horizon: Horizon, solver: str) -> Check:
+    rows = [TABLE_3[1].x, *(row.x for row in TABLE_4)]
+    choose = choose_best if solver == IPOPT else choose_median
+    ours = [
+        choose(findings.records(PAPER, 0.15, solver)),
+        *(_choose(findings, row, horizon, solver) for row in TABLE_4),
+    ]
+    printed, found = (1e3 * np.ptp(np.array(x), axis=0) for x in (rows, [get_point(run) for run in ours]))
+    texts = [", ".join(f"{value:.0f}" for value in values) for values in (printed, found)]
+    return compare_levels(printed, found, ranges=texts[0], found=texts[1])
+
+
+def _check_f_over_time(findings: Walk12Findings) -> Check:
+    """Report the spread of f over T; no verdict, since the paper prints no size."""
+    values: dict[str, list[float]] = {
+        h: [_choose(findings, row, h, IPOPT).verdict.objective for row in TABLE_4] for h in HORIZONS
+    }
+    values["printed"] = [row.f for row in TABLE_4]
+    spreads = {name: 100 * (max(f) / min(f) - 1) for name, f in values.items()}
+    texts = {name: ", ".join(f"{value:.4f}" for value in f) for name, f in values.items()}
+    return decide(Verdict.UNTESTABLE, f=texts, spread=spreads)
+
+
+def _check_share_over_time(findings: Walk12Findings) -> Check:
+    """Check the spread of f1 / f1max over T [%]: of the printed numbers, which give it by (11), and of the optima."""
+    printed = [row.implied_f1 / row.f1max for row in TABLE_4]
+    optima, f1max = [_choose(findings, row, "step", IPOPT) for row in TABLE_4], list_f1max(findings, "step")
+    ours = [run.verdict.indexes["f1_per_m2s"] / most for run, most in zip(optima, f1max, strict=True)]
+    spreads = [100 * (max(values) / min(values) - 1) for values in (printed, ours)]
+    texts = [", ".join(f"{value:.3f}" for value in values) for values in (printed, ours)]
+    return compare_levels(np.zeros(2), spreads, printed=texts[0], ours=texts[1], spreads=spreads)
