@@ -25,6 +25,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphin
 exclude_patterns = [
     "pages",
     "generated/papers",
+    "generated/examples",
     "generated/gallery/*.ipynb",
     "generated/gallery/*.py",
     "**/sg_execution_times.*",

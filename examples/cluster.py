@@ -7,7 +7,6 @@ study continues. Here two workers on this machine replace a cluster. Needs the e
 `nlp-gait compare nao-ssp --scheduler tcp://HOST:8786 --out study`.
 """
 
-import sys
 from pathlib import Path
 
 from distributed import LocalCluster
@@ -18,17 +17,30 @@ from compare.drawing.comparison_figures import plot_final_gaps
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
-if __name__ == "__main__":  # workers import this file
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "study")
-    tasks = [
-        Task(problem=ProblemSpec(name="nao-dsp"), solver=algorithm, run=run)
-        for algorithm in ("ipopt", "pso", "ga")
-        for run in range(4)
-    ]
+tasks = [
+    Task(problem=ProblemSpec(name="nao-dsp"), solver=algorithm, run=run)
+    for algorithm in ("ipopt", "pso", "ga")
+    for run in range(4)
+]
+
+# %%
+# Workers import this file, so only the main process starts a cluster and runs the study.
+
+if __name__ == "__main__":
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        study = Study(tasks=tuple(tasks), folder=folder, scheduler=cluster.scheduler_address)
+        study = Study(tasks=tuple(tasks), folder=Path("study"), scheduler=cluster.scheduler_address)
         records = run_study(study, progress=lambda task, record: print(record))
+
+# %%
+# The records are those of a study on one machine.
+
+if __name__ == "__main__":
     (comparison,) = compare_problems(records)
     for row in summarise(comparison):
         print(f"{row.solver}: {row.feasible} of {row.runs} feasible, median {row.median:.6f} W")
-    figure = plot_final_gaps(comparison)
+
+# %%
+# The gap of every run at its end.
+
+figure = plot_final_gaps(comparison) if __name__ == "__main__" else None
+figure

@@ -7,9 +7,6 @@ No gait here: a pole is swung up by pushing its cart. A rollout of 60 steps is w
 along the compiled gradient improve the plan further.
 """
 
-import sys
-from pathlib import Path
-
 import casadi as ca
 import matplotlib.pyplot as plt
 import numpy as np
@@ -31,9 +28,15 @@ for k in range(STEPS):
     cost = cost + STEP_S * (1 - ca.cos(angle) + 0.1 * position**2 + 1e-3 * force[k] ** 2 + 0.01 * rate**2)
 rollout = ca.Function("rollout", [force], [cost, ca.vertcat(*angles)], ["force"], ["cost", "angles"])
 
+# %%
+# The compiled function and its gradient accept one plan or many.
+
 evaluate = nlp_gait.compile_function(rollout)
 gradient = evaluate.jacobian("cost", "force")
 print(evaluate.argument_shapes, evaluate.result_shapes, gradient.result_shapes)
+
+# %%
+# A search over plans: sample, keep the best 1 %, sample around their mean. Then 300 steps along the gradient.
 
 rng = np.random.default_rng(0)
 plan, history = np.zeros(STEPS), []
@@ -52,9 +55,12 @@ print(
     f"cost {rollout(np.zeros(STEPS))[0].full().item():.2f} without a push, {sampled:.4f} sampled, {final:.4f} with the gradient"
 )
 
+# %%
+# The pole ends upright.
+
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
 left.plot(history)
 left.set(xlabel="iteration", ylabel="lowest cost of 4000 plans")
 right.plot(np.arange(STEPS + 1) * STEP_S, np.degrees(swing))
 right.set(xlabel="time in s", ylabel="angle of the pole in degrees, 0 is up")
-figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "swing.png", dpi=150)
+figure.savefig("swing.png", dpi=150)

@@ -15,6 +15,9 @@ import matplotlib.pyplot as plt
 import nlp_gait
 from nlp_gait.robots import load_robot
 
+# %%
+# Three robots that differ in the mass of the torso; each file overrides one table of NAO V5.
+
 torso = load_robot("nao-v5").links["torso"]
 loads_kg, powers = (0.0, 0.5, 1.0), []
 with tempfile.TemporaryDirectory() as folder:
@@ -38,6 +41,9 @@ with tempfile.TemporaryDirectory() as folder:
         solution = nlp_gait.solve(nlp_gait.load("nao-ssp", robot=str(path)), starts=1, seed=0)
         powers.append(solution.objective)
         print(f"{load_robot(str(path)).name}: {load_kg:g} kg, {solution.objective:.6f} W, {solution.status}")
+
+# %%
+# Power rises with the load.
 
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 axes.plot(loads_kg, powers, "o-")

@@ -25,6 +25,9 @@ for name, value in verdict.indexes.items():
 too_high = evaluate(problem, [0.36, *x[1:]])
 print("with the hip at 0.36 m:", *(f"\n  {row.name} by {row.violation:.3g}" for row in too_high.violations[:3]))
 
+# %%
+# The power of the same point over the height of the hip.
+
 heights = [0.27 + 0.005 * k for k in range(9)]
 powers = [evaluate(problem, [height, *x[1:]]).objective["value"] for height in heights]
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")

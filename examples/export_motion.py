@@ -6,7 +6,6 @@ A gait as files for other programs: Webots' `.motion`, CSV with every time histo
 back: `nlp-gait evaluate --motion gait.csv` judges them, like any other motion.
 """
 
-import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -16,15 +15,21 @@ from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.export.set_points import make_set_points
 from nlp_gait.formulation import Result
 
-folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 problem = nlp_gait.load("nao-ssp")
 solution = nlp_gait.solve(problem, starts=2)
 gait = Result(problem=problem, x=problem.check_x(solution.x))
+
+# %%
+# One file in each format, sampled every 40 ms.
+
 for name in ("webots", "csv", "naoqi"):
-    path = folder / f"gait{FORMATS[name]}"
+    path = Path(f"gait{FORMATS[name]}")
     write_as(name, path, gait, period_ms=40)
     print(f"{path.name}: {len(path.read_text().splitlines())} lines")
-print((folder / "gait.motion").read_text()[:180], "...")
+print(Path("gait.motion").read_text()[:180], "...")
+
+# %%
+# The same set-points as arrays.
 
 points = make_set_points(gait, period_ms=40)
 figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")

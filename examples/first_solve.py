@@ -6,15 +6,20 @@ IPOPT finds the cheapest step of NAO from three random starts. The active constr
 gait is drawn: stick figures from the side, the mechanical power, and the distance of the zero-moment point from the sole's edge.
 """
 
-import sys
-from pathlib import Path
-
 import nlp_gait
 
 solution = nlp_gait.solve("nao-ssp", starts=3, seed=0)
 print(f"{solution.objective_name} {solution.objective:.6f} {solution.objective_unit}, {solution.status}")
+
+# %%
+# Each active constraint has a price: the change of the least power per unit by which its bound is raised.
+
 for bound in solution.active_constraints:
     print(f"  limited by {bound.name} at {bound.bound:g} {bound.unit}: {bound.price:.4g} {bound.price_unit}")
 
+# %%
+# The gait: from blue (left) and orange (right) poses to curves over time, also as a file.
+
 figure = solution.plot()
-figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else ".") / "gait.png", dpi=150)
+figure.savefig("gait.png", dpi=150)
+figure

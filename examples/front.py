@@ -12,11 +12,17 @@ import nlp_gait
 from compare.questions.pareto.competing import make_competing_objective
 from compare.questions.pareto.front import solve_front
 
+# %%
+# Five points of the front, each an optimum with another required margin.
+
 problem = nlp_gait.load("nao-dsp")
 margin = make_competing_objective("dbm_y_mean", problem)
 front = solve_front(problem, margin, points=5, starts=1)
 for point in front:
     print(f"{1000 * point.value:6.2f} mm: {point.power_W:.4f} W, the next millimetre for {point.price / 1000:.4f} W")
+
+# %%
+# A search approximates this line from above; no gait lies below it.
 
 figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 axes.plot([1000 * point.value for point in front], [point.power_W for point in front], "o-")

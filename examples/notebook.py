@@ -29,6 +29,7 @@ frame.iloc[:4, :4]
 # The gait as a figure.
 
 figure = solution.plot()
+figure
 
 # %%
 # A study, and its runs as a data frame; a study with a folder has `study.to_frame()`.
@@ -41,6 +42,7 @@ study = Study(tasks=tuple(tasks))
 study
 
 # %%
+# Its records are a data frame, too.
 
 records = run_study(study)
 runs = make_frame(records)

@@ -17,12 +17,19 @@ from nlp_gait.simulation.simulate import simulate_plan
 
 problem = nlp_gait.load("nao-ssp")
 solution = nlp_gait.solve(problem, starts=2)
+
+# %%
+# The planned motion, simulated open loop, and what was measured.
+
 plan, drive = make_plan(Result(problem=problem, x=problem.check_x(solution.x))), Drive()
 trace = simulate_plan(plan, drive=drive)
 found = measure(plan, trace, drive)
 print("it fell" if found.fallen else f"it stayed up, tilting by {found.largest_tilt_deg:.2f} degrees at most")
 print(f"power: {found.predicted.total_W:.3f} W by the model, {found.measured.total_W:.3f} W in the engine")
 print(f"centre of pressure: {1000 * found.pressure_rms_m:.1f} mm from the planned ZMP (root mean square)")
+
+# %%
+# Where the feet press in the engine, and where the model planned it.
 
 during = trace.t <= plan.duration_s
 t, pressure = trace.t[during], average_pressure(trace, drive.period_s)[during]

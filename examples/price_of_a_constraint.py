@@ -17,6 +17,9 @@ optimum = nlp_gait.solve(problem, starts=3)
 (price,) = (a.price for a in optimum.active_constraints if a.name == "dbm_y_mean")
 print(f"at {1000 * here:g} mm: {optimum.objective:.6f} W, and {price / 1000:.5f} W per millimetre")
 
+# %%
+# Optima at other limits, each from the first one, and one 0.1 mm away: its difference quotient is the price.
+
 limits = np.linspace(0.016, 0.024, 9)
 powers = [
     nlp_gait.solve(problem.with_values(dbm_y_mean_limit_m=limit), starts=1, x0=optimum.x).objective for limit in limits
@@ -24,6 +27,9 @@ powers = [
 step = 1e-4
 nearby = nlp_gait.solve(problem.with_values(dbm_y_mean_limit_m=here + step), starts=1, x0=optimum.x)
 print(f"by solving again {1000 * step:g} mm away: {(nearby.objective - optimum.objective) / step / 1000:.5f} W per mm")
+
+# %%
+# The price is the slope of the solved points.
 
 figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 axes.plot(1000 * limits, powers, "o", label="solved")

@@ -7,7 +7,6 @@ Each point is judged like all others. From the command line: `nlp-gait import na
 """
 
 import csv
-import sys
 from pathlib import Path
 
 from compare.analysis.comparison import compare_problems
@@ -17,7 +16,7 @@ from compare.study.import_runs import import_runs
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
-folder, spec = Path(sys.argv[1] if len(sys.argv) > 1 else "."), ProblemSpec(name="nao-dsp")
+spec = ProblemSpec(name="nao-dsp")
 
 # %%
 # A file as MATLAB's `writetable` writes it: here the two points that Gupta, Pratihar and Deb (2023) print for double support,
@@ -28,16 +27,21 @@ rows = [
     (0.31, -0.0008, -0.0055, 0.0520, 0.0010, -0.0367, -0.0424, 2.0, 0, 1.0682, 10000),
     (0.31, 0.0002, -0.0052, 0.0582, 0.0010, -0.0384, -0.0405, 2.0, 1, 1.0685, 10000),
 ]
-with (folder / "finals.csv").open("w", newline="") as file:
+with Path("finals.csv").open("w", newline="") as file:
     csv.writer(file).writerows([header, *rows])
 
 # %%
 # The records are compared with those of solvers that run here.
 
-records = import_runs(spec, folder / "finals.csv", "paper (MATLAB)")
+records = import_runs(spec, Path("finals.csv"), "paper (MATLAB)")
 tasks = [Task(problem=spec, solver=algorithm, run=k) for algorithm in ("ipopt", "pso") for k in range(3)]
 (comparison,) = compare_problems([*records, *run_study(Study(tasks=tuple(tasks)))])
 for row in summarise(comparison):
     claim = "no claim" if row.best_claim is None else f"claims {row.best_claim:.4f} W"
     print(f"{row.solver}: {row.feasible} of {row.runs} feasible, {claim}, judged {row.best:.4f} W at best")
+
+# %%
+# The gap of every run at its end.
+
 figure = plot_final_gaps(comparison)
+figure

@@ -19,6 +19,9 @@ from compare.report.writing import markdown_page
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
+# %%
+# The settings of the algorithm start a search.
+
 
 @dataclass(frozen=True, kw_only=True)
 class ShrinkingBox:
@@ -30,6 +33,10 @@ class ShrinkingBox:
 
     def start(self, start):
         return ShrinkingBoxSearch(self, start)
+
+
+# %%
+# The search proposes candidates when asked, and is told their objectives and violations.
 
 
 class ShrinkingBoxSearch:
@@ -52,9 +59,17 @@ class ShrinkingBoxSearch:
         return ()
 
 
+# %%
+# Five runs of each solver, judged by the same exact functions.
+
 problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
 tasks = [Task(problem=problem, solver=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
 (comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
 table = text_table(HEADER, [format_cells(summary, comparison) for summary in summarise(comparison)])
 print(markdown_page(Document(title="A shrinking box", parts=[table])))
+
+# %%
+# The best gap so far over evaluations and seconds.
+
 figure = plot_convergence(comparison)
+figure

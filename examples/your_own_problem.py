@@ -30,6 +30,10 @@ curves = [ca.Function("c", [s], [c]).map(N + 1)(phases) for c in (shapes, rates,
 BOUNDS = {"angle_rad": (0.05, 0.5), "sway_rad": (-2, 2), "swing_rad": (-4, 4), "lift_m": (0, 0.2), "time_s": (0.2, 2)}
 
 
+# %%
+# The motion: three curves of five variables. The objective is power, the rows are clearance and speed.
+
+
 def motion(at):
     """Coordinates, their rates and accelerations, each (3, N + 1)."""
     a, sway, swing, lift, time = (at[name] for name in BOUNDS)
@@ -50,6 +54,10 @@ def assemble(at, ops):
     return Assembly(objective=power, constraints=rows, indexes={"speed_m_s": speed})
 
 
+# %%
+# The maker names variables, bounds and parameters.
+
+
 @maker
 def walker() -> GaitProblem:
     """A step of two legs at least power, at a speed."""
@@ -59,6 +67,9 @@ def walker() -> GaitProblem:
     return GaitProblem(name="walker", title="Two legs at least power", variables=variables, own_parameters=parameters,
                        objective=Objective(name="power", unit="W"), assemble=assemble)  # fmt: skip
 
+
+# %%
+# IPOPT solves it from five random starts; the stick figures show every fourth sample.
 
 if __name__ == "__main__":
     solution = nlp_gait.solve(walker(), starts=5)

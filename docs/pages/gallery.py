@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +22,25 @@ ORDER = (
     "export_motion.py",
     "compile_function.py",
     "notebook.py",
+    "slider.py",
     "cluster.py",
 )
 
 
 def configuration(root: Path) -> dict[str, Any]:
-    """Return the settings of sphinx-gallery."""
+    """Return the settings of sphinx-gallery, which runs a copy of the examples: they write files to the current folder."""
+    copy = root / "docs" / "generated" / "examples"
+    shutil.copytree(root / "examples", copy, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__", "callers"))
     return {
-        "examples_dirs": str(root / "examples"),
+        "examples_dirs": str(copy),
         "gallery_dirs": "generated/gallery",
         "filename_pattern": r"\.py$",
         "ignore_pattern": r"(bring_your_own|__init__)\.py$",
         "within_subsection_order": Graded(),
         "image_scrapers": (figures,),
         "reset_modules": (),
-        "reset_argv": OwnFolder(),
         "capture_repr": ("_repr_html_", "__repr__"),
+        "ignore_repr_types": r"Figure|function",  # figures are shown as pictures, sliders in Jupyter alone
         "abort_on_example_error": True,
         "download_all_examples": False,
         "remove_config_comments": True,
@@ -61,16 +64,33 @@ class Graded:
         return "graded"
 
 
-class OwnFolder:
-    """Pass an empty folder as the first argument of an example, to which it writes."""
+def make_notebook(example: Path) -> dict[str, Any]:
+    """Return an example as the notebook that its page offers for download."""
+    from sphinx_gallery.gen_gallery import DEFAULT_GALLERY_CONF
+    from sphinx_gallery.notebook import jupyter_notebook
+    from sphinx_gallery.py_source_parser import split_code_and_text_blocks
 
-    def __call__(self, configuration: Any, variables: Any) -> list[str]:
-        """Return the arguments of an example."""
-        return [tempfile.mkdtemp(prefix="nlp-gait-example-")]
+    _, blocks = split_code_and_text_blocks(str(example))
+    notebook: dict[str, Any] = jupyter_notebook(blocks, DEFAULT_GALLERY_CONF | {"pypandoc": False}, example.parent)
+    return notebook
 
-    def __repr__(self) -> str:
-        """Return a constant."""
-        return "own folder"
+
+def run_notebook(notebook: dict[str, Any], folder: Path) -> tuple[str, int]:
+    """Run a notebook in a new kernel, in a folder; return what it printed and the number of figures that it shows.
+
+    Raises:
+        nbclient.exceptions.CellExecutionError: a cell raised an error.
+    """
+    import nbformat
+    from nbclient import NotebookClient
+
+    cells = nbformat.from_dict(notebook)
+    for cell in cells.cells:
+        cell.source = "".join(cell.source)
+    NotebookClient(cells, timeout=600, resources={"metadata": {"path": str(folder)}}).execute()
+    outputs = [output for cell in cells.cells for output in cell.get("outputs", ())]
+    figures = sum("image/png" in output.get("data", {}) for output in outputs)
+    return "".join(output.get("text", "") for output in outputs), figures
 
 
 def figures(block: Any, variables: dict[str, Any], configuration: dict[str, Any]) -> str:

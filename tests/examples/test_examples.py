@@ -41,7 +41,7 @@ FEWER = {
     "custom_robot.py": ("(0.0, 0.5, 1.0)", "(0.0,)"),
 }
 # Run by the gallery alone: they print no number, or those of a sweep, a study and a simulation, which tests of these check.
-GALLERY_ALONE = ("sweep.py", "front.py", "physics_engine.py", "notebook.py", "cluster.py")
+GALLERY_ALONE = ("sweep.py", "front.py", "physics_engine.py", "notebook.py", "slider.py", "cluster.py")
 WITHOUT_FIGURE = {"bring_your_own.py"}  # three kinds at once, for the page of that name; not in the gallery
 
 

@@ -1,0 +1,37 @@
+"""The notebooks that the gallery offers run under Jupyter in an empty folder and show their figures.
+
+`python -m benchmarks.notebooks` runs all of them; here those run that failed there before: they write files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from docs.pages.gallery import ORDER, make_notebook, run_notebook
+
+pytest.importorskip("sphinx_gallery", reason="notebooks of the gallery need the extra docs")
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.mark.parametrize("name", ORDER)
+def test_a_notebook_has_several_cells_with_prose_between_them(name: str) -> None:
+    kinds = [cell["cell_type"] for cell in make_notebook(EXAMPLES / name)["cells"]]
+    assert kinds[0] == "markdown" and kinds.count("code") >= 3
+    assert not any(first == second == "code" for first, second in zip(kinds, kinds[1:], strict=False))
+
+
+@pytest.mark.parametrize("name", ORDER)
+def test_an_example_reads_no_arguments(name: str) -> None:
+    """A kernel has arguments of its own."""
+    assert "argv" not in (EXAMPLES / name).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "printed", "file"), [("first_solve.py", "limited by dbm_y_mean", "gait.png")])
+def test_a_notebook_runs_in_an_empty_folder(name: str, printed: str, file: str, tmp_path: Path) -> None:
+    pytest.importorskip("nbclient", reason="nbclient runs notebooks")
+    text, figures = run_notebook(make_notebook(EXAMPLES / name), tmp_path)
+    assert printed in text and figures == 1
+    assert (tmp_path / file).stat().st_size > 10_000
