@@ -30,7 +30,9 @@ ORDER = (
 def configuration(root: Path) -> dict[str, Any]:
     """Return the settings of sphinx-gallery, which runs a copy of the examples: they write files to the current folder."""
     copy = root / "docs" / "generated" / "examples"
-    shutil.copytree(root / "examples", copy, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__", "callers"))
+    shutil.copytree(
+        root / "examples", copy, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__", "callers")
+    )
     return {
         "examples_dirs": str(copy),
         "gallery_dirs": "generated/gallery",
