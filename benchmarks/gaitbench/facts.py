@@ -13,7 +13,6 @@ import json
 import math
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -27,13 +26,13 @@ from nlp_gait import gaitbench
 from nlp_gait.decoding import decode
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.facts import Evidence, Facts, Probe
+from nlp_gait.gaitbench.best_known import SAME, make_probes, make_strictly_feasible
+from nlp_gait.gaitbench.facts import Evidence, Facts
 from nlp_gait.gaitbench.instance import Instance
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import load_certificates
 
 FILE = Path(nlp_gait.__file__).parent / "gaitbench" / "facts.json"
-SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +57,6 @@ THOROUGH = Effort(
 )
 QUICK = Effort(starts=((12, 6), (22, 2), (300, 1)), cma_runs=1, cma_evaluations=5_000, cma_most_variables=12)
 SHARES, TIMED = 100_000, 20_000
-# Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
-SLACK = 1e-10
 PROOF_TOLERANCE = 1e-3
 BASELINE_POINTS = 5  # points of the baseline's best runs that the search starts from
 
@@ -109,6 +106,8 @@ def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None)
         raise NothingFound("no start of IPOPT converged to a feasible point")
     ends.sort(key=lambda outcome: outcome.cost)
     best = make_strictly_feasible(instance, np.array(ends[0].x))
+    if best is None:
+        raise NothingFound("no strictly feasible point near IPOPT's result")
     best_known = float(instance(best[None])[0][0])
     searched = long_search(instance, effort) if n <= effort.cma_most_variables else None
     others = [] if searched is None else [searched]
@@ -143,7 +142,7 @@ def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None)
         evidence=evidence,
         feasible_share=feasible,
         evaluation_us=evaluation_us(instance, X[:TIMED]),
-        probes=probes(instance, best) if published is None else published.probes,
+        probes=make_probes(instance, best) if published is None else published.probes,
     )
 
 
@@ -167,8 +166,8 @@ def near(instance: Instance, point: Array) -> Iterator[Array]:
     yield point
     refined = nlp_gait.solve(instance.gait_problem, starts=1, x0=np.clip(point, instance.lower, instance.upper))
     for x in (point, np.array(list(refined.x.values()))):
-        with suppress(NothingFound):
-            yield make_strictly_feasible(instance, x)
+        if (feasible := make_strictly_feasible(instance, x)) is not None:
+            yield feasible
 
 
 def best_baseline_points(id: str) -> list[tuple[float, Array]]:
@@ -195,43 +194,6 @@ def prove_gap(instance: Instance, best: Array, limit_s: float) -> float | None:
     return found.gap if math.isfinite(found.bound) else None
 
 
-def make_strictly_feasible(instance: Instance, x: Array) -> Array:
-    """Return the nearest point with a slack in every row, by linear programs with the smallest possible step.
-
-    IPOPT may leave a row violated by about 1e-8; the shipped point has a violation of exactly zero. The programs ignore the
-    objective: where it is the largest of several functions, its gradient is that of one of them.
-    """
-    from scipy.optimize import linprog
-
-    width = instance.upper - instance.lower
-    first = np.clip(x, instance.lower, instance.upper)
-    n, found = len(width), list[tuple[float, Array]]()
-    for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
-        x = first
-        for _ in range(4):
-            G = instance.rows(x[None])[0]
-            if G.max() <= -SLACK / 2:
-                found.append((float(instance(x[None])[0][0]), x))
-                break
-            J = instance.jacobian(x) * width
-            near = np.abs(J).sum(axis=1) * radius + G > -SLACK
-            low, high = (instance.lower - x) / width / radius, (instance.upper - x) / width / radius
-            bounds = [*zip(np.maximum(low, -1.0), np.minimum(high, 1.0), strict=True), (0.0, 1.0)]
-            least = np.hstack([np.vstack([np.eye(n), -np.eye(n)]), -np.ones((2 * n, 1))])  # |step| <= its largest part
-            step = linprog(
-                np.eye(n + 1)[-1],
-                A_ub=np.vstack([np.hstack([J[near], np.zeros((int(near.sum()), 1))]), least]),
-                b_ub=np.concatenate([-(G[near] + SLACK) / radius, np.zeros(2 * n)]),
-                bounds=bounds,
-            )
-            if step.x is None:
-                break
-            x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
-    if not found:
-        raise NothingFound("no strictly feasible point near IPOPT's result")
-    return min(found, key=lambda item: item[0])[1]
-
-
 def evaluation_us(instance: Instance, X: Array) -> float:
     """Return the least processor time of an evaluation in a batch, over some rounds [us]."""
     rounds = []
@@ -240,20 +202,6 @@ def evaluation_us(instance: Instance, X: Array) -> float:
         instance(X)
         rounds.append((time.process_time() - before) / len(X))
     return round(1e6 * min(rounds), 2)
-
-
-def probes(instance: Instance, best: Array) -> tuple[Probe, ...]:
-    """Return values at random points, between them and the best one, and at the best one."""
-    rng = np.random.default_rng(20260101)
-    draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
-    X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])
-    f, violation = instance(X)
-    G = instance.rows(X)
-    weights = 1.0 + np.arange(G.shape[1]) % 7
-    return tuple(
-        Probe(x=tuple(x.tolist()), objective=float(fi), violation=float(vi), rows=float(ri))
-        for x, fi, vi, ri in zip(X, f, violation, G @ weights, strict=True)
-    )
 
 
 if __name__ == "__main__":

@@ -15,10 +15,12 @@ from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.errors import InputError, check_name
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
-from nlp_gait.gaitbench.definitions import get_definition
-from nlp_gait.gaitbench.facts import Evidence, Facts, load_facts
+from nlp_gait.gaitbench.best_known import find_facts
+from nlp_gait.gaitbench.facts import Evidence, Facts, Features
+from nlp_gait.gaitbench.generated import define, make_id
 from nlp_gait.gaitbench.suite_problem import gaitbench
 
+FEATURE_POINTS = 20_000
 # Compiled functions are shared by all threads, and built by one of them.
 _BUILDING = threading.RLock()
 
@@ -55,7 +57,7 @@ class Instance:
         """Use ``gaitbench.load`` instead."""
         self.id = id  #: its name, which never changes
         self.unit_cube = unit_cube  #: whether x runs from 0 to 1 instead of in physical units
-        self.definition = get_definition(id)  #: what it is made from
+        self.definition = define(id)  #: what it is made from
         self.gait_problem: GaitProblem = gaitbench(instance=id)
         self.names = self.gait_problem.names  #: (n,) variables
         self._origin = self.gait_problem.lower
@@ -116,10 +118,41 @@ class Instance:
         """(m,) names of the rows."""
         return self._sides.names
 
-    @property
+    def make_one_sided(self, g: Array) -> Array:
+        """Return the rows G (P, m) of the values (P, ...) of the kernel's rows."""
+        return self._sides(g)
+
+    @cached_property
     def facts(self) -> Facts:
-        """Best known point, its evidence, and what was measured."""
-        return load_facts()[self.id]
+        """Best known point, its evidence, and what was measured; of a generated instance computed on first use, and stored."""
+        return find_facts(load(self.id))
+
+    @cached_property
+    def features(self) -> Features:
+        """What makes the instance easy or hard, from a few ten thousand evaluations."""
+        rng, n, width = np.random.default_rng(0), len(self.names), self.upper - self.lower
+        X = rng.uniform(self.lower, self.upper, (FEATURE_POINTS, n))
+        slopes = np.array([self.gradient(x) * width for x in X[: 4 * n]])
+        length = np.linalg.norm(slopes, axis=1, keepdims=True)
+        values = np.linalg.svd((slopes / length)[np.isfinite(length[:, 0]) & (length[:, 0] > 0.0)], compute_uv=False)
+        return Features(
+            dimension=n,
+            constraints=len(self.row_names),
+            feasible_share=float(np.mean(self(X)[1] == 0.0)),
+            conditioning=float(values[0] / values[-1]) if len(values) == n and values[-1] else np.inf,
+            local_optima=self.facts.local_optima,
+        )
+
+    @property
+    def description(self) -> str:
+        """What it is, in words."""
+        made = self.definition
+        drawn = {**made.options, **made.values, **made.held}
+        details = ", ".join(f"{name} {value}" for name, value in drawn.items())
+        return (
+            f"{made.what}: {len(self.names)} variables, {len(self.row_names)} inequalities; problem {made.problem}"
+            f"{' with ' * bool(details)}{details}. Source: {made.source}."
+        )
 
     @property
     def best_known(self) -> float:
@@ -183,6 +216,21 @@ def load(id: str, *, unit_cube: bool = False) -> Instance:
     """Load an instance by its id, in the unit cube or in physical units; raises UnknownNameError."""
     check_name("instance", id)
     return _load(id, bool(unit_cube))
+
+
+def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:
+    """Draw an instance of GaitBench 2 from a family; the same seed gives the same one on every machine.
+
+    Args:
+        family: one of ``families()``.
+        seed: 0 or above; test seeds (``list_test_seeds``) are disjoint from those for training.
+        unit_cube: whether x runs from 0 to 1; generated instances always do.
+
+    Raises:
+        UnknownNameError: no such family.
+        InputError: the seed is not a whole number from 0 to 1e12.
+    """
+    return load(make_id(family, seed), unit_cube=unit_cube)
 
 
 @lru_cache(maxsize=128)

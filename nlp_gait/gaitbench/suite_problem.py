@@ -21,7 +21,9 @@ from nlp_gait.formulation import (
     load,
     maker,
 )
-from nlp_gait.gaitbench.definitions import Definition, get_definition
+from nlp_gait.gaitbench.definitions import Definition
+from nlp_gait.gaitbench.generated import define, draw_box, is_generated
+from nlp_gait.gaitbench.transform import change_variables
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # No search satisfies an equation to the last bit: it becomes a band of this share of its row's scale to either side.
@@ -30,18 +32,19 @@ BAND = 1e-2
 
 @maker
 def gaitbench(*, instance: str = "ssp-v5") -> GaitProblem:
-    """Make a problem of the suite by the id of its instance; raises UnknownNameError.
+    """Make a problem of the suite by the id of its instance, of GaitBench 1 or generated; raises UnknownNameError.
 
     Source:
-        GaitBench 1, whose instances name their papers.
+        GaitBench, whose instances name their papers.
     """
     return _make(instance)
 
 
 @lru_cache(maxsize=64)
 def _make(id: str) -> GaitProblem:
-    definition = get_definition(id)
-    return _convert(load(definition.problem, **definition.options), definition)
+    definition = define(id)
+    problem = _convert(load(definition.problem, **definition.options), definition)
+    return change_variables(problem, draw_box(problem, id)) if is_generated(id) else problem
 
 
 def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:

@@ -1,0 +1,134 @@
+"""The best known point of an instance, strictly feasible, by IPOPT from random starts, and values that identify it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nlp_gait.backends.kernel.kernel_source import build_kernel
+from nlp_gait.backends.kernel.library_cache import find_cache_folder
+from nlp_gait.backends.solve import solve
+from nlp_gait.decoding import read_dataclass
+from nlp_gait.disk import make_folder
+from nlp_gait.errors import InputError
+from nlp_gait.files import replace_nan, write_json
+from nlp_gait.formulation import Array
+from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, load_facts
+from nlp_gait.gaitbench.generated import parse_id
+
+if TYPE_CHECKING:
+    from nlp_gait.gaitbench.instance import Instance
+
+SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
+# Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
+SLACK = 1e-10
+MOST_ROUNDS = 4  # of the starts, until one of them converges
+
+
+def find_facts(instance: Instance) -> Facts:
+    """Return the facts about an instance: shipped ones, or those of this call or of an earlier one on this machine.
+
+    Raises:
+        InputError: no start of IPOPT converged, so that the instance has no best known point.
+    """
+    if instance.id in load_facts():
+        return load_facts()[instance.id]
+    path = find_cache_folder() / "gaitbench" / version("nlp-gait") / f"{instance.id.replace(':', '-')}.json"
+    try:
+        return read_dataclass(Facts, path, "stored best known point", error=InputError)
+    except InputError:
+        facts = compute_facts(instance, parse_id(instance.id)[0].starts)
+    make_folder(path.parent)
+    write_json(path, replace_nan(asdict(facts)))
+    return facts
+
+
+def compute_facts(instance: Instance, starts: int) -> Facts:
+    """Return the best point of IPOPT from random starts and its evidence; raises InputError if no start converges."""
+    problem = instance.gait_problem
+    for seed in range(MOST_ROUNDS):
+        ends = [outcome for outcome in solve(problem, starts=starts, seed=seed, workers=1).starts if outcome.converged]
+        for end in sorted(ends, key=lambda outcome: outcome.cost):
+            best = make_strictly_feasible(instance, np.array(end.x))
+            if best is None:
+                continue
+            best_known = evaluate(instance, best)[0]
+            costs = [outcome.cost for outcome in ends]
+            return Facts(
+                best_known=best_known,
+                best_x=tuple(best.tolist()),
+                evidence=Evidence(
+                    starts=starts * (seed + 1),
+                    agreeing=sum(abs(c - best_known) <= SAME * abs(best_known) for c in costs),
+                ),
+                local_optima=count_distinct(costs),
+                probes=make_probes(instance, best),
+            )
+    raise InputError(
+        f"{instance.id}: none of {starts * MOST_ROUNDS} starts of IPOPT converged to a feasible point; choose another seed"
+    )
+
+
+def count_distinct(costs: Sequence[float]) -> int:
+    """Return the number of costs that differ from the next lower one by more than 1e-4 of it."""
+    order = sorted(costs)
+    return 1 + sum(b - a > 1e-4 * abs(a) for a, b in zip(order, order[1:], strict=False))
+
+
+def evaluate(instance: Instance, x: Array) -> tuple[float, Array]:
+    """Return cost and rows (m,) at x (n,) without compiling anything."""
+    kernel = build_kernel(instance.gait_problem)
+    cost, g = kernel.function(x, instance.gait_problem.p)
+    return float(cost), instance.make_one_sided(np.array(g).reshape(1, -1))[0]
+
+
+def make_strictly_feasible(instance: Instance, x: Array) -> Array | None:
+    """Return the nearest point with a slack in every row, by linear programs with the smallest possible step, or None.
+
+    IPOPT may leave a row violated by about 1e-8; the best known point has a violation of exactly zero. The programs ignore the
+    objective: where it is the largest of several functions, its gradient is that of one of them.
+    """
+    from scipy.optimize import linprog
+
+    width = instance.upper - instance.lower
+    first = np.clip(x, instance.lower, instance.upper)
+    n, found = len(width), list[tuple[float, Array]]()
+    for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
+        x = first
+        for _ in range(4):
+            cost, G = evaluate(instance, x)
+            if G.max() <= -SLACK / 2:
+                found.append((cost, x))
+                break
+            J = instance.jacobian(x) * width
+            near = np.abs(J).sum(axis=1) * radius + G > -SLACK
+            low, high = (instance.lower - x) / width / radius, (instance.upper - x) / width / radius
+            bounds = [*zip(np.maximum(low, -1.0), np.minimum(high, 1.0), strict=True), (0.0, 1.0)]
+            least = np.hstack([np.vstack([np.eye(n), -np.eye(n)]), -np.ones((2 * n, 1))])  # |step| <= its largest part
+            step = linprog(
+                np.eye(n + 1)[-1],
+                A_ub=np.vstack([np.hstack([J[near], np.zeros((int(near.sum()), 1))]), least]),
+                b_ub=np.concatenate([-(G[near] + SLACK) / radius, np.zeros(2 * n)]),
+                bounds=bounds,
+            )
+            if step.x is None:
+                break
+            x = np.clip(x + radius * width * step.x[:n], instance.lower, instance.upper)
+    return min(found, key=lambda item: item[0])[1] if found else None
+
+
+def make_probes(instance: Instance, best: Array) -> tuple[Probe, ...]:
+    """Return values at random points, between them and the best one, and at the best one."""
+    rng = np.random.default_rng(20260101)
+    draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
+    X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])
+    values = [evaluate(instance, x) for x in X]
+    weights = 1.0 + np.arange(len(values[0][1])) % 7
+    return tuple(
+        Probe(x=tuple(x.tolist()), objective=f, violation=float(np.maximum(G, 0.0).sum()), rows=float(G @ weights))
+        for x, (f, G) in zip(X, values, strict=True)
+    )

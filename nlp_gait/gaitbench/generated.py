@@ -1,0 +1,182 @@
+"""GaitBench 2: instances drawn from families of problems by a seed, as ``gb2:FAMILY:SEED``.
+
+Every drawn number comes from SHA-256 of a text, so an instance is the same on every machine and in every version:
+
+    u(NAME) = first 53 bits of SHA-256("gb2:FAMILY:SEED:NAME") / 2**53
+
+A drawn quantity in [a, b] is a + u (b - a), rounded to six significant digits. Families never change; one that has to change
+gets a new name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from nlp_gait.decoding import decode
+from nlp_gait.errors import InputError, check_count, unknown
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaitbench.definitions import Definition, get_definition
+from nlp_gait.gaitbench.transform import AffineMap
+from nlp_gait.robots.perturbation import perturbed_name
+
+PREFIX = "gb2"
+ID = re.compile(rf"{PREFIX}:([a-z0-9-]+):(0|[1-9][0-9]{{0,11}})")
+Range = tuple[float, float]
+# Training seeds are below, test seeds follow from a date: TEST_SEEDS * YYYYMMDD + number.
+TEST_SEEDS = 1000
+LEAST_TEST_SEED = TEST_SEEDS * 10_000_000
+# The box, in units of the range of each variable: its width, the share of it that stays free on both sides of where the best
+# points of the family are, and the angle by which two variables are mixed [rad].
+WIDTHS: Range = (1.2, 1.6)
+FREE = 0.02
+ANGLES: Range = (math.radians(10.0), math.radians(35.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """A problem, and what is drawn for each instance of it."""
+
+    name: str
+    what: str  #: one line
+    problem: str  #: as in ``nlp-gait list``
+    source: str  #: paper that the problem comes from
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)  #: of all instances
+    robots: tuple[str, ...] = ()  #: of which one is drawn
+    robot: Mapping[str, Range] = field(default_factory=dict)  #: changes of it, see ``robots/perturbation.py``
+    steps: Mapping[str, Range] = field(default_factory=dict)  #: options that are drawn
+    limits: Mapping[str, Range] = field(default_factory=dict)  #: parameters that are drawn
+    held: Mapping[str, Range] = field(default_factory=dict)  #: variables that are drawn, and constant
+    #: Where the best points of pilot seeds are in the problem's own bounds, as shares of each range: the box is placed so that
+    #: this is anywhere in it with equal probability
+    typical: Mapping[str, Range] = field(default_factory=dict)
+    starts: int  #: of IPOPT, for the best known point
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draw:
+    """The numbers of one instance, by name."""
+
+    family: str
+    seed: int
+
+    def share(self, name: str) -> float:
+        """Return a number of [0, 1)."""
+        digest = hashlib.sha256(f"{PREFIX}:{self.family}:{self.seed}:{name}".encode()).digest()
+        return float((int.from_bytes(digest[:8], "big") >> 11) / 2**53)
+
+    def within(self, name: str, ends: Range) -> float:
+        """Return a number between two ends, of six digits."""
+        return float(f"{ends[0] + self.share(name) * (ends[1] - ends[0]):.6g}")
+
+    def all_within(self, ranges: Mapping[str, Range]) -> dict[str, float]:
+        """Return a number for each range."""
+        return {name: self.within(name, ends) for name, ends in ranges.items()}
+
+
+@cache
+def load_families() -> Mapping[str, Family]:
+    """Return the families by name."""
+    raw = json.loads(files("nlp_gait.gaitbench").joinpath("families.json").read_text(encoding="utf-8"))
+    return {entry["name"]: decode(Family, entry, entry["name"]) for entry in raw}
+
+
+def families() -> tuple[str, ...]:
+    """Return the names of the families that ``generate`` draws from."""
+    return tuple(load_families())
+
+
+def make_id(family: str, seed: int) -> str:
+    """Return the id of a drawn instance; raises UnknownNameError for the family and InputError for the seed."""
+    if family not in load_families():
+        raise unknown("family of GaitBench 2", str(family), families())
+    return f"{PREFIX}:{family}:{check_count('seed', seed, at_least=0, at_most=10**12 - 1)}"
+
+
+def parse_id(id: str) -> tuple[Family, Draw]:
+    """Return the family and the numbers of an id; raises InputError and UnknownNameError."""
+    match = ID.fullmatch(id)
+    if match is None:
+        raise InputError(f"a generated instance is {PREFIX}:FAMILY:SEED, for example {PREFIX}:ssp:3, got {id!r}")
+    family, seed = match[1], int(match[2])
+    make_id(family, seed)
+    return load_families()[family], Draw(family=family, seed=seed)
+
+
+def list_test_seeds(day: date, count: int) -> tuple[int, ...]:
+    """Return the test seeds of a day; no training seed is among them."""
+    count = check_count("count", count, at_most=TEST_SEEDS)
+    return tuple(int(f"{day:%Y%m%d}") * TEST_SEEDS + k for k in range(count))
+
+
+def is_test_seed(seed: int) -> bool:
+    """Return whether a seed belongs to a date; smaller ones are for training and tuning."""
+    return seed >= LEAST_TEST_SEED
+
+
+def is_generated(id: str) -> bool:
+    """Return whether an id is that of a generated instance."""
+    return id.startswith(f"{PREFIX}:")
+
+
+def define(id: str) -> Definition:
+    """Return what an instance of either suite is made from; raises UnknownNameError, and InputError for a malformed id."""
+    return draw_definition(id) if is_generated(id) else get_definition(id)
+
+
+def draw_definition(id: str) -> Definition:
+    """Return what a drawn instance is made from; raises as ``parse_id``."""
+    family, draw = parse_id(id)
+    options = {**family.options, **draw.all_within(family.steps)}
+    if family.robots:
+        chosen = family.robots[int(draw.share("robot") * len(family.robots))]
+        options["robot"] = perturbed_name(chosen, draw.all_within(family.robot))
+    return Definition(
+        id=id,
+        what=f"{family.what}, drawn by seed {draw.seed}",
+        problem=family.problem,
+        options=options,
+        values=draw.all_within(family.limits),
+        held=draw.all_within(family.held),
+        difficulty="medium",
+        source=f"{family.source}; drawn by this package",
+    )
+
+
+def draw_box(problem: GaitProblem, id: str) -> AffineMap:
+    """Return the variables of a drawn instance, each from 0 to 1.
+
+    With u the variables of the problem as shares of their ranges and c the middle of ``typical``:
+    u = c + R diag(w) (z - t). R rotates pairs of variables by a moderate angle, w is the width of the box and t, where c is in
+    it, is uniform over what leaves ``FREE`` around the typical range. The box may leave out a part of the problem's ranges.
+    """
+    family, draw = parse_id(id)
+    names, n = problem.names, len(problem.names)
+    ends = np.array([family.typical.get(name, (0.0, 1.0)) for name in names])
+    centre, reach = ends.mean(axis=1), (ends[:, 1] - ends[:, 0]) / 2
+    rotation = np.eye(n)
+    order = sorted(range(n), key=lambda k: draw.share(f"order {names[k]}"))
+    for i, j in zip(order[::2], order[1::2], strict=False):
+        angle = draw.within(f"angle {names[i]}", ANGLES) * (1 if draw.share(f"side {names[i]}") < 0.5 else -1)
+        rotation[np.ix_([i, j], [i, j])] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    extent = np.abs(rotation.T) @ reach + FREE
+    width = np.maximum([draw.within(f"width {name}", WIDTHS) for name in names], 2 * extent)
+    share = np.array([draw.share(f"place {name}") for name in names])
+    place = extent / width + share * (1 - 2 * extent / width)
+    mirror = np.array([1.0 if draw.share(f"mirror {name}") < 0.5 else -1.0 for name in names])
+    matrix = problem.scale[:, None] * rotation * (width * mirror)
+    return AffineMap(
+        matrix=matrix,
+        offset=problem.lower + problem.scale * centre - matrix @ place,
+        lower=np.zeros(n),
+        upper=np.ones(n),
+    )
