@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -16,12 +16,9 @@ from nlp_gait.decoding import read_dataclass
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_nan, write_json
-from nlp_gait.formulation import Array
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, load_facts
 from nlp_gait.gaitbench.generated import parse_id
-
-if TYPE_CHECKING:
-    from nlp_gait.gaitbench.instance import Instance
 
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
@@ -29,7 +26,22 @@ SLACK = 1e-10
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
-def find_facts(instance: Instance) -> Facts:
+class Judged(Protocol):
+    """What is needed of an instance here."""
+
+    id: str
+    gait_problem: GaitProblem
+    lower: Array
+    upper: Array
+
+    def make_one_sided(self, g: Array) -> Array:
+        """Return the rows G (P, m)."""
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives (m, n) of the rows."""
+
+
+def find_facts(instance: Judged) -> Facts:
     """Return the facts about an instance: shipped ones, or those of this call or of an earlier one on this machine.
 
     Raises:
@@ -47,7 +59,7 @@ def find_facts(instance: Instance) -> Facts:
     return facts
 
 
-def compute_facts(instance: Instance, starts: int) -> Facts:
+def compute_facts(instance: Judged, starts: int) -> Facts:
     """Return the best point of IPOPT from random starts and its evidence; raises InputError if no start converges."""
     problem = instance.gait_problem
     for seed in range(MOST_ROUNDS):
@@ -79,14 +91,14 @@ def count_distinct(costs: Sequence[float]) -> int:
     return 1 + sum(b - a > 1e-4 * abs(a) for a, b in zip(order, order[1:], strict=False))
 
 
-def evaluate(instance: Instance, x: Array) -> tuple[float, Array]:
+def evaluate(instance: Judged, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     kernel = build_kernel(instance.gait_problem)
     cost, g = kernel.function(x, instance.gait_problem.p)
     return float(cost), instance.make_one_sided(np.array(g).reshape(1, -1))[0]
 
 
-def make_strictly_feasible(instance: Instance, x: Array) -> Array | None:
+def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     """Return the nearest point with a slack in every row, by linear programs with the smallest possible step, or None.
 
     IPOPT may leave a row violated by about 1e-8; the best known point has a violation of exactly zero. The programs ignore the
@@ -121,7 +133,7 @@ def make_strictly_feasible(instance: Instance, x: Array) -> Array | None:
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def make_probes(instance: Instance, best: Array) -> tuple[Probe, ...]:
+def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
     """Return values at random points, between them and the best one, and at the best one."""
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
