@@ -106,10 +106,11 @@ def check_plain(data: Any) -> None:
             _check_leaf(where or "the value", value)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file atomically; raises OutputError (no space, no permission, no folder)."""
+def write_text(path: Path, text: str) -> Path:
+    """Write a text file atomically and return its path; raises OutputError (no space, no permission, no folder)."""
     with replace_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+    return path
 
 
 def format_csv(rows: Iterable[Sequence[object]]) -> str:

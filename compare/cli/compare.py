@@ -90,7 +90,7 @@ def compare(
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
-    from compare.report import write_report
+    from compare.report import FurtherFiles, write_report
     from compare.study.import_runs import read_imported_records
     from compare.study.manifest import Session, read_manifest, write_manifest
     from compare.study.run_study import Study, check_study, run_study
@@ -136,7 +136,9 @@ def compare(
     imported = read_imported_records(out, records)
     records += imported.records
     gaits = simulate_best(out, records, Drive()) if engine else []
-    written = write_report(out, records, read_manifest(out), excluded=imported.excluded, as_csv=as_csv)
+    written = write_report(
+        out, records, read_manifest(out), excluded=imported.excluded, further=FurtherFiles(csv=as_csv)
+    )
     data = {"problems": summarise_problems(records), **plain_simulations(gaits)} if as_json else {}
 
     def tables() -> None:

@@ -47,7 +47,7 @@ def import_results(
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
     from compare.analysis.comparison import label_editions
-    from compare.report import write_report
+    from compare.report import FurtherFiles, write_report
     from compare.study.evidence import read_evidence
     from compare.study.import_runs import import_runs
     from compare.study.manifest import read_manifest
@@ -59,7 +59,9 @@ def import_results(
     kept = [write_record(record, make_writable_folder(out)) for record in records]
     evidence = read_evidence(out)
     everything = label_editions(evidence.records)
-    report = write_report(out, everything, read_manifest(out), excluded=evidence.excluded, as_csv=as_csv)
+    report = write_report(
+        out, everything, read_manifest(out), excluded=evidence.excluded, further=FurtherFiles(csv=as_csv)
+    )
     written = [*kept, *report]
     shown = [record for record in everything if record.problem == spec.title]
     print_result(as_json, {"problems": summarise_problems(shown)}, written, lambda: print_summaries(shown))

@@ -58,6 +58,15 @@ def report(
     latex: Annotated[
         bool, typer.Option("--latex", help="Also write a table of each problem for papers (LaTeX, package booktabs).")
     ] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Also write figures for papers, one column wide, and their captions in LaTeX.")
+    ] = False,
+    style: Annotated[
+        Path | None, typer.Option(metavar="FILE.mplstyle", help="Matplotlib style file for the figures of --pdf.")
+    ] = None,
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help="Also write all runs as runs.parquet (extra parquet).")
+    ] = False,
     code: Code = None,
     drive_options: DriveOptions,
     as_csv: AsCsv = False,
@@ -76,12 +85,14 @@ def report(
     """
     from compare.analysis.comparison import label_editions
     from compare.analysis.statistics.run_length import Weighting
-    from compare.report import write_report
+    from compare.report import FurtherFiles, write_report
     from compare.study.evidence import read_evidence
     from compare.study.manifest import read_manifest
 
     if not engine and drive_options != DriveOptions():
         raise InputError("the drive applies to simulated gaits: add --engine")
+    if style is not None and not pdf:
+        raise InputError("the style applies to the figures of --pdf: add --pdf, or omit --style")
     for flag, weight in (("--gradient-weight", gradient_weight), ("--hessian-weight", hessian_weight)):
         if weight is not None and not math.isfinite(weight):
             raise InputError(f"{flag} must be a finite number, got {weight}")
@@ -90,9 +101,8 @@ def report(
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
     simulated = simulate_best(folder, records, drive_options.make()) if engine else []
-    written = write_report(
-        folder, records, manifest, weighting, excluded=evidence.excluded, as_csv=as_csv, as_latex=latex
-    )
+    further = FurtherFiles(csv=as_csv, parquet=parquet, latex=latex, pdf=pdf, style=style)
+    written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     data = {**plain_simulations(simulated), "excluded": [exclusion.sentence for exclusion in evidence.excluded]}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
     end_if_excluded(evidence.excluded)

@@ -24,20 +24,22 @@ Draw = Callable[["Axes", SolverRuns, Look, str], None]
 AXES = {"evaluations": "equivalent evaluations", "seconds": "seconds of the solve"}
 
 
-def plot_convergence(comparison: Comparison) -> Figure:
+def plot_convergence(comparison: Comparison, *, column: bool = False) -> Figure:
     """Plot bands from the least to the greatest gap of all runs, with the median, over evaluations and seconds.
 
     A line begins where half of the runs are feasible, a band where all are. A run of a gradient method is a point at its end.
+    A figure for a printed column shows evaluations alone and has the width of the style's ``figure.figsize``.
     """
-    return plot_by_cost(comparison, _draw_gaps, "gap to the best known [%]", both=True)
+    return plot_by_cost(comparison, _draw_gaps, "gap to the best known [%]", both=True, column=column)
 
 
-def plot_by_cost(comparison: Comparison, draw: Draw, words: str, both: bool = False) -> Figure:
+def plot_by_cost(comparison: Comparison, draw: Draw, words: str, both: bool = False, *, column: bool = False) -> Figure:
     """Plot over evaluations and over seconds; ``draw`` receives the axes, a solver, its look and the kind of cost."""
     look = assign_looks([solver.name for solver in comparison.solvers])
     with style():
-        figure = new_figure(7.4, 2.8)
-        for axes, axis in zip(figure.subplots(1, 2, sharey=True), AXES, strict=True):
+        shown = ["evaluations"] if column else list(AXES)
+        figure = new_figure(None if column else 7.4, 2.8)
+        for axes, axis in zip(figure.subplots(1, len(shown), sharey=True, squeeze=False)[0], shown, strict=True):
             for solver in comparison.solvers:
                 if solver.has_costs(axis):
                     draw(axes, solver, look[solver.name], axis)
@@ -81,7 +83,7 @@ def clip_percent(gap: Array) -> Array:
     return 100.0 * np.maximum(gap, SMALLEST_GAP)
 
 
-def plot_ecdf(comparison: Comparison) -> Figure:
+def plot_ecdf(comparison: Comparison, *, column: bool = False) -> Figure:
     """Plot the share of all pairs of run and target solved within a cost, in evaluations and in seconds."""
 
     def draw(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
@@ -90,7 +92,7 @@ def plot_ecdf(comparison: Comparison) -> Figure:
         at, share = ecdf(costs)
         _draw_share(axes, at, share, solver.name, look, last)
 
-    return plot_by_cost(comparison, draw, "share of runs and targets")
+    return plot_by_cost(comparison, draw, "share of runs and targets", column=column)
 
 
 def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
@@ -115,10 +117,11 @@ def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
     return figure
 
 
-def plot_final_gaps(comparison: Comparison) -> Figure:
+def plot_final_gaps(comparison: Comparison, *, column: bool = False) -> Figure:
     """Plot the final gap of each run, one row per solver; infeasible runs are counted at the right edge."""
     with style():
-        figure = new_figure(7.4, 0.8 + 0.28 * len(comparison.solvers))
+        figure = new_figure(None if column else 7.4)
+        figure.set_figheight(0.8 + 0.28 * len(comparison.solvers))
         axes = figure.subplots()
         names = [solver.name for solver in comparison.solvers]
         for row, (solver, look) in enumerate(zip(comparison.solvers, assign_looks(names).values(), strict=True)):
@@ -131,7 +134,9 @@ def plot_final_gaps(comparison: Comparison) -> Figure:
             missing = int((~known).sum())
             if missing:
                 beside = axes.get_yaxis_transform()
-                axes.text(1.0, row, f"{missing} infeasible", transform=beside, ha="right", va="center", fontsize=8)
+                axes.text(
+                    1.0, row, f"{missing} infeasible", transform=beside, ha="right", va="center", fontsize="small"
+                )
         use_log_axes(axes)
         axes.set_xlabel("gap to the best known at the end [%], bars: medians")
         axes.set_yticks(range(len(names)), names)

@@ -8,12 +8,14 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from compare.drawing import STYLE
-from nlp_gait.files import replace_file, write_text
+from nlp_gait.errors import InputError
+from nlp_gait.files import convert_errors, replace_file, write_text
 from nlp_gait.interrupts import delay_interrupts
 
 if TYPE_CHECKING:
@@ -61,20 +63,48 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     return {name: found[name] for name in names}
 
 
+# Style files that ``style`` uses after the project's own one.
+_FURTHER: ContextVar[tuple[Path, ...]] = ContextVar("further styles", default=())
+
+
 @contextmanager
 def style() -> Iterator[None]:
-    """Use the project's matplotlib style within the context."""
+    """Use the project's matplotlib style, and those of ``add_styles``, within the context."""
     import matplotlib
 
     with matplotlib.rc_context(fname=STYLE):
+        for file in _FURTHER.get():
+            matplotlib.rcParams.update(matplotlib.rc_params_from_file(file, use_default_template=False))
         yield
 
 
-def new_figure(width_in: float = 6.3, height_in: float = 3.0) -> Figure:
-    """Return an empty figure of a size [inch] that fits a printed column; use inside ``style()``."""
+@contextmanager
+def add_styles(*files: Path) -> Iterator[None]:
+    """Draw within the context with further style files; the last one wins."""
+    token = _FURTHER.set(files)
+    try:
+        yield
+    finally:
+        _FURTHER.reset(token)
+
+
+def check_style(file: Path) -> None:
+    """Raise InputError if a style file cannot be read or contains what Matplotlib does not know."""
+    import matplotlib
+
+    with convert_errors(f"style file {str(file)!r}", InputError):
+        lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.partition("#")[0].strip()]
+        for key in (line.partition(":")[0].strip() for line in lines):
+            if key not in matplotlib.rcParams:
+                raise ValueError(f"{key!r} is no setting of Matplotlib")
+        matplotlib.rc_params_from_file(file, fail_on_error=True, use_default_template=False)
+
+
+def new_figure(width_in: float | None = 6.3, height_in: float = 3.0) -> Figure:
+    """Return an empty figure of a size [inch], of the style's size for a width of None; use inside ``style()``."""
     from compare.drawing.notebook_figure import NotebookFigure
 
-    return NotebookFigure(figsize=(width_in, height_in))
+    return NotebookFigure(figsize=None if width_in is None else (width_in, height_in))
 
 
 def add_legend_below(figure: Figure, axes: Axes | None = None) -> None:
@@ -121,6 +151,13 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     with style(), replace_file(paths[0]) as file, delay_interrupts():
         figure.savefig(file, format="png")
     return paths
+
+
+def save_pdf(figure: Figure, path: Path) -> Path:
+    """Write a figure as PDF in the current style and return the path; raises OutputError."""
+    with style(), replace_file(path) as file, delay_interrupts():
+        figure.savefig(file, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    return path
 
 
 def render_svg(figure: Figure) -> str:

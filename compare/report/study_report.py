@@ -12,7 +12,6 @@ from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.document import Document, Figure, Section, text_table
-from compare.report.latex_table import write_latex_tables
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import (
     TERMS,
@@ -20,19 +19,23 @@ from compare.report.provenance import (
     make_solver_table,
 )
 from compare.report.session_section import make_citation_section, make_session_section
+from compare.report.study_files import FurtherFiles
 from compare.report.writing import write_document
 from compare.study.evidence import Exclusion, read_evidence
 from compare.study.manifest import Manifest, read_manifest
-from compare.study.record import HEADER, JUDGED, RunRecord, make_judged_cells, make_row
+from compare.study.record import RunRecord
 from compare.study.simulations import SimulatedGait, load_simulations
-from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
+
+REPORT_ALONE = FurtherFiles()
 
 
-def rebuild_report(folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, *, as_csv: bool = False) -> list[Path]:
+def rebuild_report(
+    folder: Path, weighting: Weighting = DEFAULT_WEIGHTING, further: FurtherFiles = REPORT_ALONE
+) -> list[Path]:
     """Rewrite the report of all records of a folder, earlier ones included; return its files. Raises as ``read_evidence``."""
     evidence = read_evidence(folder)
     records, manifest = label_editions(evidence.records), read_manifest(folder)
-    return write_report(folder, records, manifest, weighting, excluded=evidence.excluded, as_csv=as_csv)
+    return write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
 
 
 def write_report(
@@ -42,19 +45,13 @@ def write_report(
     weighting: Weighting = DEFAULT_WEIGHTING,
     *,
     excluded: Sequence[Exclusion] = (),
-    as_csv: bool = False,
-    as_latex: bool = False,
+    further: FurtherFiles = REPORT_ALONE,
 ) -> list[Path]:
-    """Write the report with stored simulations, the figures as PNG and SVG, optionally CSV and LaTeX files; return all paths."""
+    """Write the report with stored simulations, the figures as PNG and SVG, and further files; return all paths."""
     simulated = load_simulations(folder, select_best_gaits(records))
     written = write_document(folder, make_study_document(records, manifest, weighting, simulated, excluded))
     comparisons = compare_problems(records, weighting)
-    written += write_better_points(folder, comparisons)
-    if as_latex:
-        written += write_latex_tables(folder, comparisons)
-    if as_csv:
-        written += _write_csv_files(folder, records)
-    return written
+    return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons)]
 
 
 def make_study_document(
@@ -146,21 +143,3 @@ def _list_settings(comparisons: Sequence[Comparison]) -> Section:
         title="Settings and seeds",
         parts=(solvers, text_table(("problem", "changed values", "options"), rows, prose=True)),
     )
-
-
-def _write_csv_files(folder: Path, records: Sequence[RunRecord]) -> list[Path]:
-    """Write ``runs.csv``, and ``<problem>-points.csv`` for each problem; unknown values are empty cells."""
-    tables: dict[str, list[Sequence[object]]] = {"runs": [HEADER, *map(make_row, records)]}
-    for problem in dict.fromkeys(record.problem for record in records):
-        own = [record for record in records if record.problem == problem]
-        names = list(dict.fromkeys(name for record in own for name in record.x))
-        taken = {*names, *JUDGED}
-        indexes = list(dict.fromkeys(name for record in own for name in record.verdict.indexes if name not in taken))
-        rows = tables[f"{make_file_name(problem)}-points"] = [("solver", "run", *names, *JUDGED, *indexes)]
-        for r in own:
-            if r.x:
-                values = (*map(r.x.get, names), *make_judged_cells(r), *map(r.verdict.indexes.get, indexes))
-                rows.append((r.solver, r.run, *values))
-    for name, rows in tables.items():
-        write_text(folder / f"{name}.csv", format_csv(replace_nan(rows)))  # None is an empty cell
-    return [folder / f"{name}.csv" for name in tables]

@@ -12,7 +12,7 @@ import pytest
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import summarise
 from compare.analysis.statistics.run_length import Weighting
-from compare.report import rebuild_report, write_report
+from compare.report import FurtherFiles, rebuild_report, write_report
 from compare.study.manifest import Manifest, Session
 from compare.study.record_files import write_record
 from nlp_gait.errors import InputError
@@ -204,7 +204,7 @@ def test_rebuilding_gives_the_same_report_and_names_what_is_no_evidence(tmp_path
     bad = replace(judged("pso", FAST_X, run=1), verdict=replace(good.verdict, objective=1.0))
     for r in (good, bad):
         write_record(r, tmp_path)
-    rebuild_report(tmp_path, as_csv=True)
+    rebuild_report(tmp_path, further=FurtherFiles(csv=True))
     page = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "Excluded records" in page and "its objective is 1, but that of its x is 1.4" in page
     assert (tmp_path / "runs.csv").read_text().count("pso") == 1

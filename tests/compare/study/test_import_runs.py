@@ -13,7 +13,7 @@ import pytest
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.solver_table import HEADER, describe_unknown, format_cells, summarise
 from compare.judge import evaluate
-from compare.report import rebuild_report
+from compare.report import FurtherFiles, rebuild_report
 from compare.study.import_runs import import_runs, read_imported_records, read_points
 from compare.study.record_files import read_records, write_record
 from compare.study.run_study import Study, run_study
@@ -83,7 +83,7 @@ def test_beside_the_others_unknown_times_are_dashes(tmp_path: Path) -> None:
     row = format_cells(ga, comparison)
     assert row[-1] == "-" and row[2] == "-" and "nan" not in " ".join(row)
     assert all(math.isnan(seconds) for seconds in ga.expected_s) and ga.evaluations == 5000
-    files = rebuild_report(tmp_path, as_csv=True)
+    files = rebuild_report(tmp_path, further=FurtherFiles(csv=True))
     page = (tmp_path / "report.md").read_text()
     assert "GA (MATLAB)" in page and "nan" not in page.lower().replace("nan,", "")
     with open(next(path for path in files if path.name == "runs.csv")) as file:

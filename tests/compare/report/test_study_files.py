@@ -1,0 +1,113 @@
+"""Files for papers and other programs: their numbers are those of the runs, and LaTeX and pyarrow read them."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from statistics import mean, stdev
+
+import pytest
+
+from compare.analysis.comparison import compare_problems
+from compare.report import FurtherFiles
+from compare.report.latex_table import format_latex_table
+from compare.study.record import RunRecord
+from compare.study.run_study import Study, run_study
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def records() -> list[RunRecord]:
+    problem, stop = ProblemSpec(name="walk12"), Stop(evaluations=1000)
+    labels = {"pso": "pso", "random": "RD_1 50"}
+    tasks = [
+        Task(problem=problem, solver=solver, stop=stop, run=run, label=labels[solver])
+        for solver in labels
+        for run in range(6)
+    ]
+    return run_study(Study(tasks=tuple(tasks)))
+
+
+def test_the_numbers_are_those_of_the_runs(records: list[RunRecord]) -> None:
+    text = format_latex_table(compare_problems(records)[0])
+    rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines() if line.startswith(("pso", "RD"))]
+    assert [row[0] for row in rows] == ["pso", r"RD\_1 50"] and rows[0][2].startswith("0.")
+    for row, solver in zip(rows, ("pso", "RD_1 50"), strict=True):
+        values = [r.verdict.objective for r in records if r.solver == solver and r.verdict.feasible]
+        assert row[1] == f"{len(values)}/6"
+        assert row[2] == f"{max(values):.4f}" and row[6] == f"{min(values):.4f}"  # maximised
+        assert (row[4], row[5]) == (f"{mean(values):.4f}", f"{stdev(values):.4f}")
+    assert rows[0][3].startswith(r"\textbf{") and not rows[1][3].startswith(r"\textbf{") and float(rows[1][8]) < 0.05
+    assert "n = 6 runs" in text and "at most 1,000 evaluations" in text and "rank-sum" in text
+    assert not re.search(r"(?<!\\)[%&_#](?! )", text.split(r"\begin{tabular}")[0].replace(r"\label{tab:walk12}", ""))
+
+
+def test_csv_has_the_gap_dimension_budget_and_costs_to_targets(records: list[RunRecord], tmp_path: Path) -> None:
+    comparisons = compare_problems(records)
+    further = FurtherFiles(csv=True)
+    further.write(tmp_path, comparisons)
+    with open(tmp_path / "runs.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(records) and {(row["n"], row["budget"]) for row in rows} == {("4", "1000")}
+    for row in rows:
+        gap = 1.0 - float(row["objective"]) / comparisons[0].reference
+        assert float(row["gap"]) == pytest.approx(gap, abs=1e-12)
+        assert (row["evaluations_to_0.01"] != "") == (gap <= 0.01) == (row["seconds_to_0.01"] != "")
+        assert row["evaluations_to_0.01"] == "" or 0 < float(row["evaluations_to_0.01"]) <= 1000
+
+
+def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp_path: Path) -> None:
+    nothing = FurtherFiles()
+    assert nothing.write(tmp_path, compare_problems(records)) == []
+    (tmp_path / "runs.csv").write_text("old\n")
+    assert tmp_path / "runs.csv" in nothing.write(tmp_path, compare_problems(records))
+    assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
+
+
+def test_parquet_has_the_same_runs(records: list[RunRecord], tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    (path,) = FurtherFiles(parquet=True).write(tmp_path, compare_problems(records))
+    rows = parquet.read_table(path).to_pylist()
+    assert [row["solver"] for row in rows] == ["pso"] * 6 + ["RD_1 50"] * 6
+    assert [row["objective"] for row in rows[:6]] == [r.verdict.objective for r in records if r.solver == "pso"]
+
+
+@pytest.mark.parametrize(
+    ("style", "message"), [("figur.figsize: 3, 2", "'figur.figsize' is no setting"), ("font.size: big", "font.size")]
+)
+def test_a_wrong_style_file_is_refused(style: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "my.mplstyle"
+    file.write_text(style)
+    with pytest.raises(InputError, match=message):
+        FurtherFiles(pdf=True, style=file).write(tmp_path, [])
+
+
+def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
+    style = tmp_path / "my.mplstyle"
+    style.write_text("figure.figsize: 3.0, 2.0  # a narrow column\n")
+    for further, width in ((FurtherFiles(pdf=True), 244.8), (FurtherFiles(pdf=True, style=style), 216.0)):
+        *figures, captions = further.write(tmp_path, compare_problems(records))
+        for figure in figures:
+            content = figure.read_bytes()
+            box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", content)
+            assert box and float(box[1]) == pytest.approx(width) and b"/FontFile2" in content
+    assert "n = 6 runs of each solver, at most 1,000 evaluations" in captions.read_text()
+
+
+@pytest.mark.slow
+def test_latex_reads_it(records: list[RunRecord], tmp_path: Path) -> None:
+    if shutil.which("pdflatex") is None:
+        pytest.skip("pdflatex is not installed")
+    FurtherFiles(latex=True, pdf=True).write(tmp_path, compare_problems(records))
+    (tmp_path / "page.tex").write_text(
+        "\\documentclass{article}\n\\usepackage{booktabs,graphicx}\n\\begin{document}\n\\input{walk12-table}\n"
+        "\\input{walk12-figures}\n\\end{document}\n"
+    )
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "page.tex"]
+    for _ in range(2):  # the second time with the labels of the first
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "LaTeX Warning" not in done.stdout and "Overfull" not in done.stdout
