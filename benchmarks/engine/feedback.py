@@ -14,8 +14,7 @@ from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.measurements import Walk, measure_walk
 from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.robustness import DIRECTIONS
-from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
+from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan
 
 SLOPE = math.radians(3.0)
 IMPULSE = 1.0  # [N s]

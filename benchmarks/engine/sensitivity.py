@@ -13,8 +13,7 @@ from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.film import recording
 from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.robustness import DIRECTIONS, measure_robustness
-from nlp_gait.simulation.simulate import simulate_plan
+from nlp_gait.simulation.simulate import DIRECTIONS, measure_robustness, simulate_plan
 
 SPEED = 0.05  # [m/s]
 VARIANTS = {

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from nlp_gait.simulation.film.video import Frame
     from nlp_gait.simulation.measurements import Measurements, Walk
     from nlp_gait.simulation.plan import Plan
-    from nlp_gait.simulation.robustness import Robustness
-    from nlp_gait.simulation.simulate import Simulation
+    from nlp_gait.simulation.simulate import Robustness, Simulation
 
 
 @command
@@ -67,8 +66,8 @@ def simulate(
     from nlp_gait.simulation.load_sharing import share_loads as redistribute
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.robustness import measure_robustness as sweep
     from nlp_gait.simulation.simulate import SETTLE_TIME, simulate_plan
+    from nlp_gait.simulation.simulate import measure_robustness as sweep
 
     load_mujoco(pictures=film.video is not None)
     if viewer and film.video is not None:

@@ -13,10 +13,11 @@ pytestmark = pytest.mark.slow  # each gait is simulated
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
-from nlp_gait.simulation.robustness import DIRECTIONS, measure_robustness  # noqa: E402
-from nlp_gait.simulation.simulate import (  # noqa: E402
+from nlp_gait.simulation.simulate import (  # noqa: E402  # noqa: E402
+    DIRECTIONS,
     Conditions,
     Push,
+    measure_robustness,
     simulate_plan,  # noqa: E402
 )
 
