@@ -13,7 +13,7 @@ from casadi import DM, MX, SX
 
 import nlp_gait
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Objective, Parameter, Variable, maker
-from nlp_gait.symbolic.lagrange import equations_of_motion
+from nlp_gait.symbolic.dynamics import equations_of_motion
 
 LENGTH, HIP, FOOT, GRAVITY, N = 0.8, 20.0, 2.0, 9.81, 20  # [m], [kg], [kg], [m/s^2], intervals of a step
 q, qd, qdd, s = SX.sym("q", 3), SX.sym("qd", 3), SX.sym("qdd", 3), SX.sym("s")  # stance leg, swing leg, slider

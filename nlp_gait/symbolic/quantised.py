@@ -9,7 +9,7 @@ import casadi as ca
 from casadi import DM, SX
 
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, implicit_equations
-from nlp_gait.symbolic.lagrange import EquationsOfMotion
+from nlp_gait.symbolic.dynamics import EquationsOfMotion
 
 # A link that turns by a radian within a quantum is not resolved: there this power of its turn brakes it as much as its inertia.
 # At the rates of a gait, a tenth of that, the brake is 1e-8 of the inertia.

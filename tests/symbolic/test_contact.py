@@ -18,7 +18,7 @@ from nlp_gait.symbolic.contact import (
     implicit_equations,
     solve_definite,
 )
-from nlp_gait.symbolic.lagrange import equations_of_motion
+from nlp_gait.symbolic.dynamics import equations_of_motion
 from nlp_gait.symbolic.quantised import Controller, QuantisedState, advance, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81

@@ -9,7 +9,7 @@ from casadi import SX
 
 from nlp_gait.gaits.stairs.planar_biped import ENDS, LINKS, biped_dynamics, centres, points
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.symbolic.lagrange import equations_of_motion
+from nlp_gait.symbolic.dynamics import equations_of_motion
 
 pinocchio = pytest.importorskip("pinocchio")
 

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, SX
 
-from nlp_gait.symbolic.lagrange import EquationsOfMotion, equations_of_motion
+from nlp_gait.symbolic.dynamics import EquationsOfMotion, equations_of_motion
 
 # Order of the angles, as in the paper's Table I: thigh, shank of both legs, torso, sole and toe of both feet.
 LINKS = ("HK", "KA", "HK'", "K'A'", "UH", "AS", "ST", "A'S'", "S'T'")
