@@ -1,7 +1,7 @@
 """The common frame of the reproductions of papers.
 
 A reproduction runs what a paper ran, checks its claims, and writes tables, figures and a report. Its text is a template in
-Markdown (see ``compare.report.template``) with places for values, tables and figures; ``{claims}`` and ``{differences}`` are the
+Markdown (see ``compare.report.document``) with places for values, tables and figures; ``{claims}`` and ``{differences}`` are the
 tables of ``<paper>_claims.toml``. To add a claim, add it to that file. If our numbers decide it, ``checks`` has a function with
 its id, or the file names one (``claims.bind_checks``); else the file gives ``found`` and ``verdict``. ``summary.json`` has both
 tables and what computed them: its copy from a full reproduction, ``docs/papers/<paper>.json``, is what the documentation shows.
@@ -33,10 +33,9 @@ from compare.papers.claims import (
     read_tables,
 )
 from compare.papers.paper_runs import Effort, Runner
-from compare.report.document import Rows, Section, Table, text_table
+from compare.report.document import Rows, Section, Table, fill_template, text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.session_section import make_citation_section, make_session_section
-from compare.report.template import fill_template
 from compare.report.writing import write_document, write_parts
 from compare.study.manifest import Session
 from nlp_gait.backends.kernel.compiled import available_cores

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from compare.drawing.figures import new_figure
-from compare.report.document import Document, Figure, Prose, Section, Table
-from compare.report.template import fill_template
+from compare.report.document import Document, Figure, Prose, Section, Table, fill_template
 from compare.report.writing import write_document, write_parts
 
 TEXT = """
