@@ -16,8 +16,7 @@ from compare.analysis.best_known import describe_value
 from compare.report.document import Document, Table, Value, text_table
 from compare.report.writing import write_document
 from compare.study.references import find_reference
-from compare.study.store import Store
-from compare.study.stored_solver import store_runs
+from compare.study.store import Store, store_runs
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decode

@@ -17,8 +17,7 @@ import nlp_gait
 from compare.cli import app
 from compare.questions import local_optima, real_motors
 from compare.questions.prices import prices
-from compare.study.store import Store
-from compare.study.stored_solver import parse_outcome, plain_outcome, store_runs
+from compare.study.store import Store, parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.solve import run_starts
 from nlp_gait.backends.solvers.ipopt import Ipopt
