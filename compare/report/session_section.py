@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from compare.report.document import Document, Prose, Section, text_table
-from compare.study.citations import cite_problems
+from compare.study.description import cite_problems
 from compare.study.manifest import Session
 
 D = TypeVar("D", bound=Document)
