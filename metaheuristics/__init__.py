@@ -12,11 +12,10 @@ from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, Rule, StaticPenalty
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, BatchObjective, Search, Start
+from metaheuristics.interface import Algorithm, BatchObjective, History, Interrupted, Result, Search, Start
 from metaheuristics.minimize import minimize
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, installed_algorithms
-from metaheuristics.result import History, Interrupted, Result
 from metaheuristics.user_algorithm import PlainFunction, as_algorithm
 
 __all__ = [

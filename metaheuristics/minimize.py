@@ -14,7 +14,7 @@ from threadpoolctl import ThreadpoolController
 from metaheuristics.array import Array, real_array
 from metaheuristics.constraint_handling import FEASIBILITY, ConstraintHandling, Deb, Rule, mark_failed
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, BatchObjective, CallingSearch, Ended
+from metaheuristics.interface import Algorithm, BatchObjective, CallingSearch, Ended, History, Interrupted, Result
 from metaheuristics.preparation import (
     check_helpers,
     check_limits,
@@ -25,7 +25,6 @@ from metaheuristics.preparation import (
     prepare_start,
     seed_sequence,
 )
-from metaheuristics.result import History, Interrupted, Result
 
 
 def limit_blas_threads() -> AbstractContextManager[object]:

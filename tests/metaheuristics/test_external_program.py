@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from metaheuristics.errors import SearchError
+from metaheuristics.interface import Result
 from metaheuristics.minimize import minimize
-from metaheuristics.result import Result
 from metaheuristics.user_algorithm import ExternalProgram
 from nlp_gait.backends.kernel.compiler import find_compiler
 
