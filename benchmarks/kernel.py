@@ -14,8 +14,8 @@ from benchmarks.by_hand import ARM_SWING, ByHand, pinocchio_model
 from benchmarks.casadi_code import compiled_functions
 from benchmarks.floor import floor_s, operation_counts, operation_times
 from benchmarks.rows import Array, Row, ratio, side_by_side
+from nlp_gait.backends.kernel.compiled import NativeKernel
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
-from nlp_gait.backends.kernel.evaluators import NativeKernel
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links, load_nao

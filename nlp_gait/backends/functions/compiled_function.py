@@ -13,9 +13,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.kernel.compiled import CHECK_POINTS, RowThreads, check_agreement, check_parallelism
+from nlp_gait.backends.kernel.compiled import CHECK_POINTS, RowThreads, check_agreement, check_parallelism, get_address
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, read_native_source
-from nlp_gait.backends.kernel.evaluators import get_address
 from nlp_gait.backends.kernel.kernel_source import generate_lane_code
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import InputError, format_value, unknown

@@ -154,7 +154,7 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     before = read_objective("nao-ssp")
     X = candidates(problem, 40)
     f, violation = before(X)
-    monkeypatch.setattr("nlp_gait.backends.kernel.evaluators.load_library", None)  # would raise if it were called
+    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.load_library", None)  # would raise if it were called
     strict = compile_objective(problem.with_values(torque_change_limit_Nm=0.1, heat_loss_W_per_Nm2=0.05), threads=1)
     strict_f, strict_violation = strict(X)
     assert (strict_f > f).all() and (strict_violation > violation).all()
@@ -209,7 +209,7 @@ def test_interpreted_gives_the_same(monkeypatch: pytest.MonkeyPatch, caplog: pyt
 def test_the_sanitizer_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Undefined behaviour, misaligned access included, ends the process; the address sanitizer needs a run by hand."""
     flags = ("-std=c++17", "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-fvisibility=hidden", "-w")
-    monkeypatch.setattr("nlp_gait.backends.kernel.evaluators.BASE_FLAGS", flags)
+    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.BASE_FLAGS", flags)
     try:
         objective = compile_objective(toy(corner), require_compiler=True)
     except nlp_gait.GaitError:
