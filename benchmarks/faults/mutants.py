@@ -68,7 +68,6 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "compare/study/import_runs.py": ("tests/compare/study/test_import_runs.py",),
     "compare/study/store.py": ("tests/compare/study/test_store.py",),
     "compare/logs.py": ("tests/compare/test_logs.py",),
-    "compare/study/store.py": ("tests/compare/questions/test_resuming.py",),
 }
 OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Add: (ast.Sub,),
