@@ -9,7 +9,7 @@ import numpy as np
 
 from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import FLAGS, write_array, write_nlp_source
-from nlp_gait.backends.derivatives.operations import format_number
+from nlp_gait.backends.derivatives.plan import format_number
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
