@@ -9,7 +9,7 @@ from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, map_motion, parabola_lift, stack
+from nlp_gait.symbolic.splines import Motion, constant_motion, cubic, map_motion, parabola_lift, stack
 
 # Positions, velocities and times of order one in double precision.
 TOLERANCE = 1e-10
