@@ -80,6 +80,6 @@ def test_a_killed_worker_changes_nothing(cluster: tuple[str, list[subprocess.Pop
 
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.study.workers.CONNECT_TIMEOUT", "1s")
+    monkeypatch.setattr("compare.study.run_study.CONNECT_TIMEOUT", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         run_study(Study(tasks=STUDY.tasks(), folder=tmp_path, scheduler="tcp://127.0.0.1:9"))

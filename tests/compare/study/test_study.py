@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-import compare.study.workers
+import compare.study.run_study
 from compare.study.record import read_record
 from compare.study.record_files import locate_record, read_records
 from compare.study.run_study import Study, run_study
@@ -86,7 +86,7 @@ def test_a_polished_run_carries_the_search_before_it(undisturbed: Path) -> None:
 
 
 def test_finished_runs_are_kept_and_not_run_again(undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compare.study.workers, "try_task", lambda *_: pytest.fail("run twice"))
+    monkeypatch.setattr(compare.study.run_study, "try_task", lambda *_: pytest.fail("run twice"))
     kept: list[int] = []
     records = run_study(Study(tasks=SMALL.tasks(), folder=undisturbed), on_stored=kept.append)
     assert kept == [8] and [r.run for r in records] == [task.run for task in SMALL.tasks()]
@@ -295,7 +295,7 @@ def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
             return try_task(*job)
 
     before = signal.getsignal(signal.SIGINT)
-    monkeypatch.setattr(compare.study.workers, "try_task", swallowing)
+    monkeypatch.setattr(compare.study.run_study, "try_task", swallowing)
     with pytest.raises(KeyboardInterrupt):
         run_study(Study(tasks=(Task(problem=SSP, solver="pso", stop=Stop(evaluations=100)),), folder=tmp_path))
     assert not list(tmp_path.rglob("*.json")) and signal.getsignal(signal.SIGINT) is before
