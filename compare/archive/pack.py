@@ -16,8 +16,7 @@ from typing import Any
 
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
 from compare.study.manifest import FILE, Manifest, read_manifest
-from compare.study.origin import format_now, hash_installed_code
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, format_now, hash_installed_code
 from compare.study.record_files import RECORDS
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import FILES, HASH, SOURCE

@@ -17,8 +17,7 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.study.definition import select_shared
-from compare.study.origin import Origin, hash_installed_code
-from compare.study.record import RunRecord, Verdict, load_problem
+from compare.study.record import Origin, RunRecord, Verdict, hash_installed_code, load_problem
 from compare.study.record_files import read_each
 from compare.study.references import SAME_VALUE, find_reference
 from nlp_gait.backends.exact import build_exact_model

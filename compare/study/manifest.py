@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.study.origin import describe_processor, describe_system, format_now, hash_installed_code
+from compare.study.record import describe_processor, describe_system, format_now, hash_installed_code
 from compare.study.settings import StudySettings, parse_settings
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes

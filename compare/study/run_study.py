@@ -12,8 +12,7 @@ from typing import Any
 
 from compare.study.definition import describe_differences
 from compare.study.evidence import check_records
-from compare.study.origin import hash_installed_code
-from compare.study.record import RunRecord, check_readable, make_frame
+from compare.study.record import RunRecord, check_readable, hash_installed_code, make_frame
 from compare.study.record_files import find_record, locate_record, write_record
 from compare.study.run_task import PLANNED_RUNS, Run, run_task, try_task
 from compare.study.task import Task, check_task
