@@ -142,7 +142,7 @@ def prices(
 
     Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
     """
-    from compare.questions.prices.prices import Prices
+    from compare.questions.prices import Prices
 
     output.answer(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks))
 

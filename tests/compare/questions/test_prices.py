@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.questions.prices.prices import AGREEMENT, Prices
+from compare.questions.prices import AGREEMENT, Prices
 from compare.questions.question import Work, find
 from compare.study.store import Store
 from nlp_gait import load, make_solver

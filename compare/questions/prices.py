@@ -1,4 +1,4 @@
-"""What each limit costs the optimum, and which error of the robot's data would change it most."""
+"""What each limit costs the optimum, and which error of the robot data would change it most, verified by solving again."""
 
 from __future__ import annotations
 
