@@ -1,4 +1,4 @@
-"""Protocols of objectives and algorithms for the loop in `minimize.py`.
+"""Protocols of objectives and algorithms for the loop in `minimize.py`, and the result of a run.
 
 The loop owns everything that must be equal for all algorithms: the starting points, the count of evaluations, the
 marking of failed evaluations, the constraint handling and the record. An algorithm only proposes points (`ask`) and

@@ -1,4 +1,7 @@
-"""User code as an algorithm: settings, a class or function that makes them, or a plain function."""
+"""User code as an algorithm: settings, a class or function that makes them, a plain function, or a program in any language.
+
+A program proposes points and receives their values as lines of JSON.
+"""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 CPU_TIMES, CPU_MORE_S, WALL_TIMES, WALL_MORE_S = 4, 10, 8, 60
 # Tests that stand for a module, by its path: those of the formulas and of what came after the first run.
 BELONGING: dict[str, tuple[str, ...]] = {
-    "nlp_gait/symbolic/splines.py": ("tests/symbolic/test_splines.py", "tests/gaits/nao/test_curves.py"),
+    "nlp_gait/symbolic/trajectories.py": ("tests/symbolic/test_splines.py", "tests/gaits/nao/test_curves.py"),
     "nlp_gait/symbolic/quantised.py": ("tests/symbolic/test_quantised.py", "tests/gaits/stairs/test_track.py"),
     "nlp_gait/gaits/stairs/planned_motion.py": ("tests/gaits/stairs/test_planned_motion.py",),
     "nlp_gait/gaits/stairs/leg_network.py": ("tests/gaits/stairs/test_leg_network.py",),

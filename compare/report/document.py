@@ -1,4 +1,4 @@
-"""Documents for studies, papers and questions: text, tables, figures and sections of them."""
+"""Documents for studies, papers and questions: text, tables, figures, sections; also from a Markdown text with fields."""
 
 from __future__ import annotations
 

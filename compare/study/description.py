@@ -1,4 +1,4 @@
-"""Settings of a solver with defaults, meaning and source, from its docstring."""
+"""Settings of a solver from its docstring; and what to cite: the software, the suite, papers (entries in ``citations.toml``)."""
 
 from __future__ import annotations
 

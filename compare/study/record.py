@@ -1,4 +1,4 @@
-"""One finished run: as plain data, as a JSON file, and as a row of a table."""
+"""One finished run: as plain data, as a JSON file, and as a row of a table, with the code and the machine that it comes from."""
 
 from __future__ import annotations
 

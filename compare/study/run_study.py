@@ -1,4 +1,4 @@
-"""A study: solvers x problems x runs, one record for each finished run."""
+"""A study: solvers x problems x runs, one record for each finished run, in this process, in workers, or on a Dask cluster."""
 
 from __future__ import annotations
 

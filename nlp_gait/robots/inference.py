@@ -1,4 +1,4 @@
-"""Feet of a robot whose file does not state them: their links and soles, and the forward direction."""
+"""Feet of a robot whose file does not state them: links, soles, forward direction; and repair of faulty links and joints."""
 
 from __future__ import annotations
 

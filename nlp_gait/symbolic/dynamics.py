@@ -1,4 +1,4 @@
-"""Inverse dynamics of a tree of bodies by the recursive Newton-Euler algorithm."""
+"""Inverse dynamics of a tree of bodies by the recursive Newton-Euler algorithm, and Lagrange's equations of a mechanism."""
 
 from __future__ import annotations
 

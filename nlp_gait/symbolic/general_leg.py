@@ -19,7 +19,7 @@ from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
 from nlp_gait.symbolic.kinematics import rotation_matrix
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

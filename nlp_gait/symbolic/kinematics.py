@@ -10,7 +10,7 @@ from casadi import DM, SX
 
 from nlp_gait.robots.tree import Body
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, stack
+from nlp_gait.symbolic.trajectories import Motion, stack
 
 
 class Pose(NamedTuple):

@@ -1,4 +1,7 @@
-"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, as printed and linearly implicit."""
+"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, as printed and linearly implicit.
+
+Contacts have springs, dampers and Coulomb friction; the implicit form is stable at every stiffness and gain.
+"""
 
 from __future__ import annotations
 

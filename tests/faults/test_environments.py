@@ -61,7 +61,7 @@ SHORTAGES = [
 def test_a_shortage_at_the_start_of_workers_is_one_sentence(
     error: Exception, sentence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """joblib hides it behind an error of its own."""
+    """Joblib hides it behind an error of its own."""
 
     def start(self: object) -> None:
         try:

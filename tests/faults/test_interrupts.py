@@ -200,11 +200,11 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
 @pytest.mark.slow
 def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
-    from nlp_gait.simulation import robustness
+    from nlp_gait.simulation import simulate
 
     gait = tmp_path / "gait.json"
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": DSP_X}))
-    monkeypatch.setattr(robustness, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(simulate, "measure_robustness", lambda *_: signal.raise_signal(signal.SIGINT))
     done = run("simulate", str(gait), "--robustness", "--out", str(tmp_path))
     assert f"interrupted in the tests of robustness; the simulation is stored in {tmp_path}" in done.stderr
     assert {"report.json", "model.xml", "simulation.npz"} <= {path.name for path in tmp_path.iterdir()}

@@ -136,7 +136,7 @@ def test_polygon_soles_carry_too(simulated):
 
 def test_robustness_finds_the_first_fall(simulated, monkeypatch):
     """The sweep itself, against a fake robot that falls beyond known limits."""
-    from nlp_gait.simulation import robustness as module
+    from nlp_gait.simulation import simulate as module
 
     class FakeTrace:
         def __init__(self, fell):

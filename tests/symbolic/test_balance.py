@@ -55,7 +55,7 @@ def points(vertical: tuple[float, float] = (0.0, 0.0)) -> tuple[DM, SX, SX]:
 
 @pytest.mark.parametrize("static_load", [False, True])
 def test_point_masses_in_level_motion(static_load: bool) -> None:
-    """g = 10: x = (3 * 4 * 10 - 3 * 2) / 40, y = (10 - 3 * 2) / 40."""
+    """G = 10: x = (3 * 4 * 10 - 3 * 2) / 40, y = (10 - 3 * 2) / 40."""
     assert numbers(zmp_of_point_masses(*points(), 10.0, static_load=static_load)) == pytest.approx([2.85, 0.1])
 
 

@@ -22,7 +22,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion, sample_flat_foot_poses
 from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics, leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 from tests.robots.crooked import crooked
 
 POSES = 50

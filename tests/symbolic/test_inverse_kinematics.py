@@ -15,7 +15,7 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics, leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact, Lifted, Nonsmooth
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 
 THIGH, TIBIA, MARGIN = 0.1, 0.1029, 0.01
 # Positions of 0.2 m through sines and an arc cosine whose slope is at most 1 / sqrt(2 * MARGIN) here.

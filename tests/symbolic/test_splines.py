@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from nlp_gait.symbolic.splines import DEGREE, count_coefficients, fit_spline, refine_spline, spline, tabulate_basis
+from nlp_gait.symbolic.trajectories import DEGREE, count_coefficients, fit_spline, refine_spline, spline, tabulate_basis
 
 # The third derivative of 16 spans reaches 1e5; double precision leaves 1e-11 of it.
 TOLERANCE, DERIVATIVE_SHARE = 1e-12, 1e-11

@@ -9,7 +9,7 @@ from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nlp_gait.symbolic.splines import Motion, constant_motion, cubic, map_motion, parabola_lift, stack
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, map_motion, parabola_lift, stack
 
 # Positions, velocities and times of order one in double precision.
 TOLERANCE = 1e-10
@@ -79,7 +79,7 @@ def test_a_path_off_the_origin_is_lifted_between_its_own_ends() -> None:
 
 
 def test_a_function_of_a_motion_by_the_chain_rule() -> None:
-    """f = (a^2 b, sin b) at a = 2 + 3 t + 5 t^2 and b = 1 - t + t^2 / 2, at t = 0."""
+    """F = (a^2 b, sin b) at a = 2 + 3 t + 5 t^2 and b = 1 - t + t^2 / 2, at t = 0."""
     motion = Motion(SX([2.0, 1.0]), SX([3.0, -1.0]), SX([10.0, 1.0]))
     position, velocity, acceleration = (
         [float(v) for v in ca.vertsplit(part)]

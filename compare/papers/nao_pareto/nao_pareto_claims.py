@@ -4,101 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
 from compare.analysis.statistics.inference import rank_sum
 from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
-from compare.papers.paper_runs import Effort, make_computation
-from compare.questions.pareto.competing import MARGINS, CompetingObjective, make_competing_objective
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Case, ParetoEffort, Run
+from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
 from compare.questions.pareto.pareto_front import SEARCH_NAMES
-from compare.questions.pareto.searches import REFERENCE, Challenge, PowerAndCompeting, Scale
-from compare.study.store import Computation
-from compare.study.task import ProblemSpec
+from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
 from metaheuristics.array import Array
-from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
-from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.formulation import GaitProblem
-
-ALGORITHMS = tuple(FRONT_ALGORITHMS)
-PHASES = ("nao-ssp", "nao-dsp")
-CRITERION = MARGINS[0]  # the mean lateral margin; the abstract does not say what measures stability
-LOOKS_PER_DECADE = 6
-FIRST_LOOK = 100  # evaluations, one generation
-
-
-@dataclass(frozen=True, kw_only=True)
-class ParetoEffort(Effort):
-    """Effort of the reproduction of power against stability."""
-
-    runs: int = 11  # of each search, as in the paper
-    # Evaluations, rising; each has separate runs, since DCNSGA-III plans for its budget. The first is that of the same authors'
-    # paper of 2023; the abstract gives none.
-    budgets: tuple[int, ...] = (10_000,)
-    points: int = 40  # of the true front
-    starts: int = 5  # random starts at some of its points
-    intervals: int = 10  # between the samples of a phase, as in the paper of 2023
-
-
-Case = tuple[str, int]
-"""A search and its budget."""
-
-Run = Sequence[Snapshot]
-"""Looks at a run, in the order of their evaluations; only the last one, the end, has points."""
-
-
-def make_spec(phase: str, effort: ParetoEffort) -> ProblemSpec:
-    """Return a phase as in the paper of 2023."""
-    return ProblemSpec(name=phase, options={"intervals": effort.intervals})
-
-
-def choose_looks(budget: int) -> list[int]:
-    """Return the evaluations after which a run is looked at: whole generations, evenly spread over their logarithm."""
-    count = 1 + round(LOOKS_PER_DECADE * np.log10(budget / FIRST_LOOK))
-    generations = np.rint(np.geomspace(1, budget // FIRST_LOOK, max(count, 1))).astype(int)
-    return [int(g) * FIRST_LOOK for g in np.unique([*generations, budget // FIRST_LOOK])]
-
-
-def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> dict[Case, list[Computation]]:
-    """Return all runs by search and budget; ``make_run`` takes the result of one."""
-    spec, ends = make_spec(phase, effort), [[end.value, end.power_W] for end in (front[0], front[-1])]
-
-    def make_search(name: str, budget: int, run: int) -> Computation:
-        title, search = f"{phase}-{name.lower()}-{budget}-{run:02d}", partial(run_search, spec)
-        return make_computation(title, spec, search, ends=ends, algorithm=name, budget=budget, seed=run)
-
-    return {
-        (name, budget): [make_search(name, budget, run) for run in range(effort.runs)]
-        for budget in effort.budgets
-        for name in ALGORITHMS
-    }
-
-
-def run_search(
-    spec: ProblemSpec, ends: Sequence[Sequence[float]], algorithm: str, budget: int, seed: int
-) -> list[dict[str, Any]]:
-    """Return a run as plain data; ``ends`` are criterion and power at those of the front, whose ranges count as 1."""
-    problem = spec.load()
-    criterion = make_competing_objective(CRITERION, problem)
-    scale = Scale(
-        [FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=()) for value, power in ends]
-    )
-    objectives = PowerAndCompeting(compile_objective(criterion.drop_demand(problem), threads=1), criterion, scale)
-    snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=seed)
-    points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
-    return [
-        {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()} for snapshot, X in zip(snapshots, points, strict=True)
-    ]
-
-
-def make_run(looks: Sequence[Mapping[str, Any]]) -> Run:
-    """Return the run of a computation's result."""
-    return [Snapshot(**{**look, "X": np.array(look["X"]), "F": np.array(look["F"]).reshape(-1, 2)}) for look in looks]
-
 
 EVEN_POINTS = 200  # of the true front, which distances are measured from
 NAMES = {**SEARCH_NAMES, "CMOEAD": "CMOEA/D"}  # as the paper writes them

@@ -13,17 +13,15 @@ from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_
 from compare.papers.claims import Verdict
 from compare.papers.nao_pareto import nao_pareto_runs as runs
 from compare.papers.nao_pareto.nao_pareto_claims import (
-    ALGORITHMS,
     CHECKS,
-    CRITERION,
     EVEN_POINTS,
     NAMES,
     NEAR,
-    ParetoEffort,
     ParetoFindings,
     PhaseFindings,
     collect_points,
 )
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, CRITERION, ParetoEffort
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
 from compare.questions.pareto.pareto_front import SEARCH_COLOURS, ParetoFront

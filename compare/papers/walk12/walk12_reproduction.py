@@ -350,7 +350,7 @@ def _list_second_optima(findings: Walk12Findings, weight: float) -> Rows:
 
 
 def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
-    """f of the paper's gait and of every solver under one normalisation."""
+    """F of the paper's gait and of every solver under one normalisation."""
     rows = []
     for row, of_printed_gait in zip(TABLE_3, findings.f_of_printed_gaits(label), strict=True):
         cells: list[Value] = [row.weight, row.f, of_printed_gait]

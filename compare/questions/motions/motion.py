@@ -22,7 +22,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.biped.curves import SPANS
 from nlp_gait.gaits.capabilities import FITTED_STARTS, resolve
-from nlp_gait.symbolic.splines import refine_spline
+from nlp_gait.symbolic.trajectories import refine_spline
 
 PHASES = ("nao-ssp", "nao-dsp")
 INTERVALS = 10  # of the papers

@@ -1,4 +1,7 @@
-"""An NLP with functions and derivatives in native code, for any solver of CasADi's ``nlpsol``."""
+"""An NLP with functions and derivatives in native code, for any solver of CasADi's ``nlpsol``.
+
+The C++ source has the plan's tables, functions of one sample over lanes, and the code that executes the steps.
+"""
 
 from __future__ import annotations
 
@@ -127,7 +130,8 @@ def _write_calls(found: NlpPlan) -> str:
 
 # -O1: more optimisation takes the compiler 50 % longer, without a measurable gain.
 FLAGS = ("-std=c++17", "-O1", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
-VALUES, DERIVATIVES = ("nlp_f", "nlp_g"), {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
+NLP_VALUES = ("nlp_f", "nlp_g")
+DERIVATIVES = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
 # Keeps IPOPT from deriving further functions, such as derivatives by the parameters.
 NO_OTHERS: Mapping[str, bool] = {"no_nlp_grad": True, "calc_lam_p": False}
 # Detects a wrong library, not rounding: derivatives are compared with differences over this step.
@@ -146,7 +150,7 @@ class CompiledNlp:
     def __init__(self, nlp: Mapping[str, MX], p: Array, *, second: bool = True) -> None:
         """Build the library or load it, and check it at parameter values p (k,); CompilerError if the NLP cannot be compiled."""
         lanes = native_lanes()
-        names = [*VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
+        names = [*NLP_VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
         graph = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]]).serialize()
         # The library is found without generating its source, by what the source depends on.
         loaded, _ = load_library(

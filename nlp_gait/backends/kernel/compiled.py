@@ -1,4 +1,7 @@
-"""A problem's exact functions as an objective for searches, for many candidates at once: compiled, or interpreted."""
+"""A problem's exact functions as an objective for searches, for many candidates at once: compiled, or interpreted.
+
+Rows of a batch are divided among threads where that is worth it; without a compiler CasADi's virtual machine evaluates them.
+"""
 
 from __future__ import annotations
 

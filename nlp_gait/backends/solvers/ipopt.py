@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NLP_VALUES, CompiledNlp
 from nlp_gait.backends.nlp import WIDTHS, build_nlp
 from nlp_gait.backends.solvers.solver import REASONS, IterationWatch, Solver, count_evaluations, judge_point
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
@@ -161,7 +161,7 @@ class Ipopt(Solver):
             native = CompiledNlp(nlp, np.append(problem.p, model.widths[0]), second=settings.hessian == "exact")
             nlp, options = native.nlp, options | native.options
         all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
-        names = (*VALUES, *DERIVATIVES.values())
+        names = (*NLP_VALUES, *DERIVATIVES.values())
         functions = {name: all_rows.get_function(name) for name in names if all_rows.has_function(name)}
         functions = native.functions if self.compiled else functions
         warm_options: dict[str, Any] = {

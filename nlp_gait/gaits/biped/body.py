@@ -20,7 +20,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, add_motions, constant_motion, cubic, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
 
 PhaseName: TypeAlias = Literal["ssp", "dsp"]
 TIMES: dict[PhaseName, str] = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}

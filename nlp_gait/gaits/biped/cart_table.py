@@ -29,7 +29,7 @@ from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 
 PREVIEW_S = 1.6
 ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6

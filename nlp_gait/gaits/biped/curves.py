@@ -15,7 +15,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
-from nlp_gait.symbolic.splines import Motion, add_motions, count_coefficients, cubic, spline, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, count_coefficients, cubic, spline, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
 SPANS: dict[str, int] = dict(zip(get_args(Trajectory), (0, 1, 2, 4, 8, 16), strict=True))

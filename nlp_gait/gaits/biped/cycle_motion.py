@@ -18,7 +18,7 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.single_support import swing_foot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, cubic, stack
+from nlp_gait.symbolic.trajectories import Motion, cubic, stack
 
 SWITCHES = ("lift_off", "touch_down")
 # Ranges of the hip's place ahead of the left foot as shares of a leg's length, and of the step: generous, so that reach and

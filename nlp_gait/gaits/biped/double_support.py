@@ -18,7 +18,7 @@ from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_pro
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import resting_point
+from nlp_gait.symbolic.trajectories import resting_point
 
 # Section 4.2: least mean margins of 0.08 m, in the box of 0.21 m by 0.18 m around NAO's soles.
 MEAN_DBM_SHARES = (8 / 21, 4 / 9)

@@ -1,4 +1,4 @@
-"""Real motors in the problems of a phase: their limits and their power.
+"""What a phase minimises: mean electrical power, torques or smoothness; and real motors, with their limits and their power.
 
 An option lists the features that are taken into account, in addition to the paper's model or in place of it:
 

@@ -17,9 +17,9 @@ from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign, tree_from
-from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.simplification import simplify
+from nlp_gait.symbolic.trajectories import Motion as Trajectory
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -172,7 +172,7 @@ def make_instant_function(body: Body, loads: Loader) -> ca.Function:
     joints, support = body.joints, SX(DM(body.support))
     q, qd, qdd = (SX.sym(name, len(joints)) for name in ("q", "qd", "qdd"))
     torso, hip, ankle, corners, _ = make_places_function(body)(q)
-    motions = {name: trajectories.Motion(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
+    motions = {name: Trajectory(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
     found = loads(Instant(joints=motions, hip=torso, ankles={"L": support, "R": ankle}))
     torque = ca.vertcat(*(found.torques[name] for name in joints))
     angles = dict(zip(joints, ca.vertsplit(q), strict=True))

@@ -12,7 +12,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 
 BOTH_FEET = {"L": "left", "R": "right"}
 LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite

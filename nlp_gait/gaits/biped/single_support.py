@@ -18,7 +18,7 @@ from nlp_gait.gaits.biped.samples import Instant, Loader
 from nlp_gait.robots import Foot
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, add_motions, constant_motion, cubic, parabola_lift, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, parabola_lift, stack
 
 # Section 4.1: least mean margins of 0.05 m and 0.02 m, on NAO's sole of 0.15 m by 0.08 m.
 MEAN_DBM_SHARES = (1 / 3, 1 / 4)

@@ -31,7 +31,7 @@ from nlp_gait.symbolic.general_leg import (
 )
 from nlp_gait.symbolic.kinematics import axis_rotation
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
-from nlp_gait.symbolic.splines import Motion, constant_motion
+from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
 GRAVITY = 9.81  # [m/s^2]
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than

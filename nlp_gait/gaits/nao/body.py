@@ -32,7 +32,7 @@ from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import partner, point_masses, weld
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, constant_motion, cubic
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
 
 Arms = Literal["carried", "separate", "held"]
 

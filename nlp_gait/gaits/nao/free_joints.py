@@ -37,7 +37,7 @@ from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JO
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
-from nlp_gait.symbolic.splines import Motion, add_motions, constant_motion, cubic, fit_spline
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, fit_spline
 
 YAW_PITCH = "HipYawPitch"  # curve of both hips
 CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING["ssp"])

@@ -30,7 +30,7 @@ from nlp_gait.gaits.nao.joints import (
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.kinematics import axis_rotation, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, add_motions, constant_motion, map_motion, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, map_motion, stack
 
 UP = (0.0, 0.0, 1.0)
 LEAN = ("torso_roll", "torso_pitch")

@@ -11,7 +11,7 @@ from casadi import SX
 from nlp_gait.gaits.stairs.planar_biped import Rod
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, add_motions, constant_motion, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
 
 PHASES = ("heel rises", "sole rises", "catch the cycloid", "track the cycloid")
 LEAST_DURATION = 1e-3  # [s]

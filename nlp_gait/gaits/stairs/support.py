@@ -10,7 +10,7 @@ from casadi import SX
 
 from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, Rod, centres, direction, sum_along_links
 from nlp_gait.gaits.stairs.planned_motion import Posture, StairPlan, StepKind, landing_share
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 
 _FOOT, _SWING = ("A'S'", "S'T'"), ("HK", "KA", "AS", "ST")
 # Of each joint: its point, the links on the side away from the stance toe, and whether its torque turns these clockwise.

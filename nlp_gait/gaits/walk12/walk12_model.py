@@ -20,7 +20,7 @@ from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
 from nlp_gait.symbolic.balance import zmp_of_point_masses
 from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.splines import Motion, constant_motion, map_motion, stack
+from nlp_gait.symbolic.trajectories import Motion, constant_motion, map_motion, stack
 
 GRAVITY = 9.81  # [m/s^2]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from compare.questions import prices
 from compare.questions import real_motors as motors
 from compare.questions.pareto import front as pareto_front
-from compare.questions.prices import prices
 from compare.questions.robust import robust_gait as robust
 from nlp_gait.backends.solvers.solver import IterationWatch
 from tests.compare.cli.calls import nlp_gait, one_sentence

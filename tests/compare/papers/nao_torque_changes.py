@@ -12,7 +12,7 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joints import JOINTS, YAW_PITCHES
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 
 LEFT, RIGHT = (0.06, 0.05), (0.12, -0.05)  # feet in double support [m], section 4.2
 

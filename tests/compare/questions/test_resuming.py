@@ -15,8 +15,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from compare.questions import local_optima, real_motors
-from compare.questions.prices import prices
+from compare.questions import local_optima, prices, real_motors
 from compare.study.store import Store, parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.solve import run_starts

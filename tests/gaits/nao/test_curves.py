@@ -14,7 +14,7 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.biped.curves import SPANS
-from nlp_gait.symbolic.splines import refine_spline
+from nlp_gait.symbolic.trajectories import refine_spline
 from tests.backends.toys import row_violations
 from tests.evaluation import evaluated
 

@@ -14,7 +14,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.splines import Motion
+from nlp_gait.symbolic.trajectories import Motion
 from tests.gaits.nao.torque_bounds import enclose_sample, upright_frames, world_frame_dynamics
 
 SEED = 11

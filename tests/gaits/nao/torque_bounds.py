@@ -27,7 +27,7 @@ from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.splines import Motion, add_motions, cubic_of_sums, resting_point, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 
 STEP_M, PHASE, REACH_MARGIN = 0.06, 0.3, 0.01
 

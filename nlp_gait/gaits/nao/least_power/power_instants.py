@@ -30,7 +30,7 @@ from nlp_gait.gaits.nao.least_power.world_frame import (
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.balance import ground_load
 from nlp_gait.symbolic.dynamics import Wrench
-from nlp_gait.symbolic.splines import Motion, add_motions, cubic_of_sums, resting_point, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 
 # First of each pair of velocities at both ends: z, x, y.
 PAIRS = (1, 3, 5)

@@ -16,7 +16,7 @@ from casadi import DM, SX
 
 from nlp_gait.robots.robot import Joint, Link
 from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine
-from nlp_gait.symbolic.splines import Motion, map_motion
+from nlp_gait.symbolic.trajectories import Motion, map_motion
 
 
 class Frame(NamedTuple):

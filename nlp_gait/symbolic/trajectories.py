@@ -1,4 +1,9 @@
-"""Trajectories with analytic first and second time derivatives."""
+"""Trajectories with analytic first and second time derivatives, and quintic splines that a richer one adds to a cubic.
+
+Splines do not change the ends of a curve, and their spaces are nested: every spline is also one with twice as many spans. With one
+span it is a polynomial of degree five. A cubic through given end positions and velocities plus such a spline is any spline of
+degree five with these ends; zero coefficients leave the cubic.
+"""
 
 from __future__ import annotations
 
