@@ -1,7 +1,7 @@
 """Trajectories with analytic first and second time derivatives, and quintic splines that a richer one adds to a cubic.
 
-Splines do not change the ends of a curve, and their spaces are nested: every spline is also one with twice as many spans. With one
-span it is a polynomial of degree five. A cubic through given end positions and velocities plus such a spline is any spline of
+Splines do not change the ends of a curve, and their spaces are nested: every spline is also one with twice as many spans. With
+one span it is a polynomial of degree five. A cubic through given end positions and velocities plus such a spline is any spline of
 degree five with these ends; zero coefficients leave the cubic.
 """
 
