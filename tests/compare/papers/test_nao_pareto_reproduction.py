@@ -11,17 +11,9 @@ import pytest
 
 from compare.papers.claims import Verdict
 from compare.papers.nao_pareto import nao_pareto_reproduction
-from compare.papers.nao_pareto.nao_pareto_claims import (
-    ALGORITHMS,
-    PHASES,
-    Measures,
-    ParetoEffort,
-    ParetoFindings,
-    PhaseFindings,
-    choose_looks,
-    spread_evenly,
-)
+from compare.papers.nao_pareto.nao_pareto_claims import Measures, ParetoFindings, PhaseFindings, spread_evenly
 from compare.papers.nao_pareto.nao_pareto_reproduction import REPRODUCTION
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, PHASES, ParetoEffort, choose_looks
 from compare.papers.paper_runs import Runner
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 
