@@ -56,6 +56,7 @@ PROBLEMS.update(
     }
 )
 FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
+FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
 FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 
 __all__ = [

@@ -8,6 +8,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -17,10 +18,13 @@ from typing import Any
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics.interface import Algorithm
+from nlp_gait import gaitbench
 from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_file, replace_nan
+from nlp_gait.gaitbench.definitions import Subset
+from nlp_gait.gaitbench.generated import make_id
 
 # Rules: the same runs, budget and seeds for all solvers.
 RUNS = 15
@@ -28,7 +32,39 @@ EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
 SEED = 0
 BASELINE = tuple("random pso ga aco aco-grid cma de pymoo:GA pymoo:DE pymoo:ISRES slsqp ipopt".split())
 FOLDER = Path(__file__).with_name("records")
+SEEDS = re.compile(r"([0-9]{1,12}):([0-9]{1,12})")
+MOST_SEEDS = 1000
 DIGITS = 12  # of numbers in the histories
+
+
+def choose_instances(
+    suite: Subset, instances: str | None = None, families: str | None = None, seeds: str = "0:5"
+) -> tuple[str, ...]:
+    """Return the ids of instances: of a suite, or those of a list, or those that families draw by seeds; both as texts.
+
+    Raises:
+        InputError: seeds that are not FIRST:LAST or numbers with commas.
+        UnknownNameError: no such instance or family.
+    """
+    chosen = () if instances is None else tuple(name.strip() for name in instances.split(","))
+    if families is not None:
+        drawn = parse_seeds(seeds)
+        chosen += tuple(make_id(family.strip(), seed) for family in families.split(",") for seed in drawn)
+    chosen = chosen or gaitbench.names(suite)
+    for id in chosen:
+        gaitbench.load(id)  # raises for unknown ids
+    return chosen
+
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """Return the seeds of ``0:15`` (15 is not among them) or ``3,5,8``; raises InputError."""
+    match = SEEDS.fullmatch(text)
+    seeds = tuple(range(int(match[1]), int(match[2]))) if match else ()
+    if not match and all(part.strip().isdecimal() for part in text.split(",")):
+        seeds = tuple(int(part) for part in text.split(","))
+    if not 0 < len(seeds) <= MOST_SEEDS:
+        raise InputError(f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {text!r}")
+    return seeds
 
 
 def make_bench_tasks(
@@ -43,14 +79,14 @@ def make_bench_tasks(
 ) -> tuple[Task, ...]:
     """Return every run of a solver on some instances."""
     task = Task(
-        problem=ProblemSpec(name="gaitbench"),
+        problem=ProblemSpec(name=instances[0]),
         solver=solver,
         settings=settings or {},
         label=label,
         stop=Stop(evaluations=evaluations, time_limit_s=time_limit_s),
         seed=SEED,
     )
-    specs = [ProblemSpec(name="gaitbench", options={"instance": id}, label=id) for id in instances]
+    specs = [ProblemSpec(name=id) for id in instances]
     return tuple(replace(task, problem=spec, run=run) for spec in specs for run in range(runs))
 
 

@@ -89,9 +89,14 @@ class Leaderboard:
         ]
 
 
-def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = ()) -> Leaderboard:
-    """Rank the solvers of the baseline and of further records; raises InputError for an instance without baseline."""
-    everything = [record for id in instances for record in (*load_baseline(id), *records) if record.problem == id]
+def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = (), *, shipped: bool = True) -> Leaderboard:
+    """Rank the solvers of records, and of the baseline if ``shipped``; raises InputError for an instance without baseline."""
+    everything = [
+        record
+        for id in instances
+        for record in (*(load_baseline(id) if shipped else ()), *records)
+        if record.problem == id
+    ]
     comparisons = tuple(compare_problems(everything))
     return Leaderboard(comparisons=comparisons, standings=tuple(_standings(comparisons)))
 

@@ -17,10 +17,12 @@ from nlp_gait import gaitbench
 PER_INSTANCE_TARGET = 1e-3
 
 
-def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) -> Document:
+def make_leaderboard_page(
+    board: Leaderboard, solver: str | None, suite: str, own_runs: int = RUNS, evaluations: int = EVALUATIONS
+) -> Document:
     """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
     count_of = len(board.comparisons)
-    title = f"GaitBench 1, {suite}: {count_of} instances, {len(board.standings)} solvers"
+    title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",
         verdict=() if solver is None else make_verdict(board, solver),
@@ -38,7 +40,8 @@ def make_leaderboard_page(board: Leaderboard, solver: str | None, suite: str) ->
             Section(
                 title="How it was measured",
                 parts=(
-                    f"Each solver makes {RUNS} runs on each instance with {EVALUATIONS} evaluations each, run k with the seed k; "
+                    f"The baseline's solvers make {RUNS} runs on each instance with {EVALUATIONS} evaluations each, others "
+                    f"{own_runs} with {evaluations}, run k with the seed k; "
                     "IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within "
                     "60 s. What counts is the exact functions' verdict. The mean rank is "
                     "that of the expected running time over all instances and the targets "

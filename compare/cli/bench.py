@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from compare.bench.baseline import BASELINE, RUNS, make_bench_tasks
+from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_tasks
 from compare.cli.command import command
 from compare.cli.common import (
     describe_command,
@@ -13,7 +13,6 @@ from compare.cli.common import (
     print_result,
     print_table,
     progress_bar,
-    say,
     stdout,
     until_interrupted,
 )
@@ -21,23 +20,33 @@ from compare.cli.options import parse_names
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
+# Solvers that run beside yours on instances or with a budget for which no baseline is shipped.
+RIVALS = "random,pso,de,cma"
+
 
 @command
 def bench(
     algorithm: str | None = None,
     suite: Literal["small", "full"] = "small",
     instances: str | None = None,
+    families: str | None = None,
+    seeds: str = "0:5",
+    against: str = RIVALS,
     label: str = "",
     runs: int = RUNS,
+    evaluations: int = EVALUATIONS,
     out: Path = Path("bench"),
     jobs: int | None = None,
+    scheduler: str | None = None,
     as_json: bool = False,
 ) -> None:
-    """Run an algorithm on GaitBench and rank it with the shipped baseline.
+    """Run an algorithm on GaitBench and rank it with the shipped baseline, or with others that run beside it.
 
-    Every run has 10 000 evaluations; run k has the seed k, like the baseline.
+    Run k has the seed k. The baseline has 10 000 evaluations; with another budget, and on instances without one, the solvers of
+    --against run, too.
 
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
+    `nlp-gait bench --algorithm my.py:MyAlgo --families walk12-long,ssp --seeds 0:5 --out DIR`,
     `nlp-gait bench --algorithm pso --label pso-again`
     """
     from compare.bench.baseline import list_instances
@@ -47,48 +56,38 @@ def bench(
     from compare.report.writing import write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
-    from nlp_gait import gaitbench
     from nlp_gait.backends.kernel.compiled import available_cores
 
-    chosen = gaitbench.names(suite) if instances is None else tuple(parse_names(instances))
-    for id in chosen:
-        gaitbench.load(id)  # raises for unknown ids
-    known = list_instances()
-    missing = [id for id in chosen if id not in known]
-    if missing and (instances is not None or len(missing) == len(chosen)):
-        raise InputError(
-            f"no baseline records of {', '.join(missing)} are shipped; choose others with --instances, for example "
-            f"--instances {','.join(known)}"
-        )
-    if missing:
-        say(f"skipped (no baseline records shipped): {', '.join(missing)}")
-        chosen = tuple(id for id in chosen if id in known)
+    chosen = choose_instances(suite, instances, families, seeds)
+    shipped = evaluations == EVALUATIONS and set(chosen) <= set(list_instances())
+    label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
+    solvers = {} if shipped else dict.fromkeys(parse_names(against), "")
+    if algorithm is not None:
+        solvers[algorithm] = label
     make_writable_folder(out)
     records: list[RunRecord] = []
     name: str | None = None
-    if algorithm is not None:
-        label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
-        study = Study(
-            tasks=make_bench_tasks(chosen, algorithm, label=label, runs=runs),
-            folder=out,
-            jobs=jobs or available_cores(),
-        )
-        name = study.tasks[0].title
+    if solvers:
+        tasks = [
+            task
+            for solver, own in solvers.items()
+            for task in make_bench_tasks(chosen, solver, label=own, runs=runs, evaluations=evaluations)
+        ]
+        study = Study(tasks=tuple(tasks), folder=out, jobs=jobs or available_cores(), scheduler=scheduler)
+        name = study.tasks[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         check_study(study)
-        with progress_bar(f"{name} runs", len(study.tasks)) as advance:
+        with progress_bar(f"{name or 'all'} runs", len(study.tasks)) as advance:
             records, stopped = until_interrupted(
                 lambda: run_study(study, progress=lambda task, _: advance(task.problem.title)), nothing=""
             )
         if stopped:
             end_interrupted(f"{stopped}; finished runs are stored in {out}; rerun the command to continue")
-    board = rank_solvers(chosen, records)
-    suite_name = (
-        f"suite {suite}{f' without {len(missing)}' * bool(missing)}" if instances is None else "chosen instances"
-    )
+    board = rank_solvers(chosen, records, shipped=shipped)
+    suite_name = "chosen instances" if instances or families else f"suite {suite}"
     page = add_session(
-        make_leaderboard_page(board, name, suite_name),
+        make_leaderboard_page(board, name, suite_name, runs, evaluations),
         describe_command(),
         [{"name": "gaitbench", "options": {"instance": id}} for id in chosen],
         str(jobs or available_cores()),
@@ -97,7 +96,7 @@ def bench(
 
     def tables() -> None:
         print_table(
-            f"GaitBench 1, {suite_name}: {len(chosen)} instances",
+            f"GaitBench, {suite_name}: {len(chosen)} instances",
             ("rank", "solver", "mean rank", "targets solved", "runs feasible"),
             [
                 (str(k), s.solver, f"{s.mean_rank:.2f}", f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %")
@@ -110,7 +109,6 @@ def bench(
     data = {
         "suite": suite_name,
         "instances": list(chosen),
-        "skipped": missing,
         "solver": name,
         "rank": None if name is None else board.place(name),
         "standings": [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -60,15 +60,16 @@ class CycleOptions:
 
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
+        named = ProblemSpec(name=name)
         options: dict[str, Any] = {k: value for k, value in vars(self).items() if k in FLAGS and value is not None}
-        known = inspect.signature(find_maker(name)).parameters
+        known = inspect.signature(find_maker(named.address)).parameters
         for key, text in _parse_pairs(self.option, "--option"):
             if key not in known:
                 raise unknown(f"option of {name}", key, known)
             options[key] = _parse_option(key, text, known[key].default)
-        problem = ProblemSpec(name=name, options=options, values=parse_values(self.values, "--set")).load()
-        fixed = problem.fix(**parse_values(self.fix, "--fix"))
-        return ProblemSpec(name=name, options=options, values=dict(fixed.values))
+        named = replace(named.with_options(**options), values=parse_values(self.values, "--set"))
+        fixed = named.load().fix(**parse_values(self.fix, "--fix"))
+        return replace(named, values=dict(fixed.values))
 
 
 @dataclass(frozen=True, kw_only=True)

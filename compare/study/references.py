@@ -10,6 +10,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH
 from nlp_gait.decoding import decode
@@ -18,6 +19,7 @@ from nlp_gait.formulation import Objective, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
+from nlp_gait.gaitbench.generated import is_generated
 from nlp_gait.proofs.certificate import load_certificates, proven_bound
 from nlp_gait.providers import PROBLEMS
 
@@ -93,6 +95,9 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
     """
     shipped = _index_by_hash().get(str(problem.get(HASH, ""))) or _find_by_settings(json.dumps(problem, sort_keys=True))
     if shipped is None:
+        instance = str(problem.get("options", {}).get("instance", ""))
+        if is_generated(instance) and not problem.get("parameters"):
+            return _find_generated(instance)
         known = any(entry.problem.name == problem.get("name") for entry in load_shipped())
         return Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
     proven_as = shipped.proven_as or shipped.problem.sha256
@@ -106,6 +111,15 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
         if bound is None
         else f"shipped, proven to {describe_gap(bound, shipped.objective)}",
     )
+
+
+@cache
+def _find_generated(id: str) -> Reference:
+    """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
+    instance = gaitbench.load(id)
+    sign = instance.gait_problem.objective.sign
+    source = f"generated with {instance.evidence}"
+    return Reference(objective=sign * instance.best_known, x=tuple(instance.best_x.tolist()), source=source)
 
 
 def describe_gap(bound: float, objective: float) -> str:

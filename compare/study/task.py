@@ -22,7 +22,7 @@ from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solv
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load
+from nlp_gait.formulation.registry import check_options, find_maker, hash_files, load, resolve_name
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import (
     check_reference,
@@ -53,12 +53,22 @@ def list_solvers() -> tuple[str, ...]:
 class ProblemSpec:
     """A problem as plain data."""
 
-    #: As in ``nlp-gait list``, or user code (see ``nlp_gait.formulation.registry.find_maker``), or a ``GaitProblem``
+    #: As in ``nlp-gait list``, or the id of an instance of GaitBench, which is replaced by its problem, or user code (see
+    #: ``nlp_gait.formulation.registry.find_maker``), or a ``GaitProblem``
     name: str | GaitProblem
     #: That differ from the defaults; none for a ``GaitProblem``
     options: Mapping[str, str | int | float | bool] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)  #: parameters that differ from the defaults
     label: str = ""  #: its name in a study; empty for ``name``, without file or module
+
+    def __post_init__(self) -> None:
+        """Take the id of an instance of GaitBench for its problem, its option and its label."""
+        if isinstance(self.name, str):
+            name, instance = resolve_name(self.name)
+            if instance:
+                object.__setattr__(self, "label", self.label or self.name)  # it is frozen
+                object.__setattr__(self, "name", name)
+                object.__setattr__(self, "options", {**instance, **self.options})
 
     @property
     def address(self) -> str:

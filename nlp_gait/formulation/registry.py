@@ -20,7 +20,7 @@ from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
-from nlp_gait.providers import FILE_HASHES, PROBLEMS, import_object
+from nlp_gait.providers import FILE_HASHES, FUNCTIONS, PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.user_code import (
     allow_code,
@@ -187,12 +187,24 @@ def _choices(make: Maker) -> dict[str, tuple[str, ...]]:
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Return a problem by name, see ``find_maker``, built with the given options; the others keep their defaults.
 
+    An instance of GaitBench is a problem, too: ``load("ssp-v5")``, ``load("gb2:ssp:3")``.
+
     Raises:
         UnknownNameError: no such problem or option.
         InputError: a value that the option does not allow, or user code that fails.
     """
     check_name("problem", name)
-    return find_maker(name)(**options)
+    name, instance = resolve_name(name)
+    return find_maker(name)(**{**instance, **options})
+
+
+def resolve_name(name: str) -> tuple[str, dict[str, str]]:
+    """Return a name for ``find_maker`` and the options that it stands for: those of an instance, none for other names."""
+    if name in PROBLEMS:
+        return name, {}
+    resolve: Callable[[str], dict[str, str]] = import_object(FUNCTIONS["resolve_instance"])  # type: ignore[assignment]
+    options = resolve(name)
+    return ("gaitbench", options) if options else (name, {})
 
 
 def check_mathematics(problem: GaitProblem) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Protocol
 
 import numpy as np
 
+from nlp_gait.backends.identity import HASH, identify_problem
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
@@ -18,7 +18,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, load_facts
-from nlp_gait.gaitbench.generated import parse_id
+from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
@@ -49,11 +49,12 @@ def find_facts(instance: Judged) -> Facts:
     """
     if instance.id in load_facts():
         return load_facts()[instance.id]
-    path = find_cache_folder() / "gaitbench" / version("nlp-gait") / f"{instance.id.replace(':', '-')}.json"
+    digest = str(identify_problem(instance.gait_problem)[HASH])
+    path = find_cache_folder() / "gaitbench" / f"{instance.id.replace(':', '-')}-{digest[:16]}.json"
     try:
         return read_dataclass(Facts, path, "stored best known point", error=InputError)
     except InputError:
-        facts = compute_facts(instance, parse_id(instance.id)[0].starts)
+        facts = compute_facts(instance, parse_id(instance.id)[0].starts if is_generated(instance.id) else STARTS)
     make_folder(path.parent)
     write_json(path, replace_nan(asdict(facts)))
     return facts

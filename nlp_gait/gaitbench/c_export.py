@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -34,7 +35,7 @@ def export_objective(instance: Instance, folder: Path) -> list[Path]:
 
 def make_prefix(id: str) -> str:
     """Return the prefix of all C names, such as ``gaitbench_ssp_v5``."""
-    return f"gaitbench_{id.replace('-', '_')}"
+    return f"gaitbench_{re.sub('[^a-z0-9]', '_', id)}"
 
 
 def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:

@@ -24,14 +24,17 @@ import numpy as np
 
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_count, unknown
-from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaitbench.definitions import Definition, get_definition
+from nlp_gait.formulation import GaitProblem, load
+from nlp_gait.gaitbench.definitions import BY_ID, Definition, get_definition
 from nlp_gait.gaitbench.transform import AffineMap
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.perturbation import perturbed_name
 
 PREFIX = "gb2"
 ID = re.compile(rf"{PREFIX}:([a-z0-9-]+):(0|[1-9][0-9]{{0,11}})")
 Range = tuple[float, float]
+MOST_VARIABLES = 400  # of a problem that becomes an instance by its name, if equations tie them
+STARTS = 20  # of IPOPT, for the best known point of such an instance
 # Training seeds are below, test seeds follow from a date: TEST_SEEDS * YYYYMMDD + number.
 TEST_SEEDS = 1000
 LEAST_TEST_SEED = TEST_SEEDS * 10_000_000
@@ -128,8 +131,25 @@ def is_generated(id: str) -> bool:
     return id.startswith(f"{PREFIX}:")
 
 
+def resolve_instance(name: str) -> dict[str, str]:
+    """Return the option of the problem ``gaitbench`` for the id of an instance, {} for another name; raises as ``define``."""
+    if is_generated(name):
+        parse_id(name)
+    return {"instance": name} if is_generated(name) or name in BY_ID else {}
+
+
 def define(id: str) -> Definition:
-    """Return what an instance of either suite is made from; raises UnknownNameError, and InputError for a malformed id."""
+    """Return what an instance is made from: one of either suite, or a problem by its name, with its defaults.
+
+    Raises:
+        UnknownNameError: no such instance, family or problem.
+        InputError: a malformed id, or a problem that no search can solve.
+    """
+    if id in PROBLEMS and id not in BY_ID:
+        problem = load(id)
+        if not problem.searchable and len(problem.names) > MOST_VARIABLES:
+            raise InputError(f"{id} has {len(problem.names)} variables tied by equations, which no search can satisfy")
+        return Definition(id=id, what=problem.title, problem=id, difficulty="medium", source="see nlp-gait cite")
     return draw_definition(id) if is_generated(id) else get_definition(id)
 
 

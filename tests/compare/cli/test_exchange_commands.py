@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.bench.baseline import BASELINE, list_instances
+from compare.bench.baseline import BASELINE
+from nlp_gait import gaitbench
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -103,22 +104,37 @@ def test_bench_shows_the_baseline_alone(tmp_path: Path) -> None:
         (("--algorithm", "psoo", "--instances", ID), "unknown algorithm 'psoo'"),
         (("--algorithm", "pso", "--label", "pso", "--instances", ID), "is a solver of the baseline"),
         (("--instances", "ssp-v55"), "unknown instance of GaitBench 'ssp-v55'"),
+        (("--families", "ssp", "--seeds", "5:3"), "--seeds takes FIRST:END"),
     ],
 )
 def test_bench_refuses_in_one_sentence(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
     assert words in one_sentence("bench", *arguments, "--out", tmp_path / "out")
 
 
-def test_an_instance_without_baseline_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.bench.baseline.list_instances", lambda: ("walk12-w100",))
-    assert "no baseline records of walk12-w015 are shipped" in one_sentence(
-        "bench", "--instances", ID, "--out", tmp_path
+def test_bench_runs_others_where_no_baseline_is_shipped(mine: Path, tmp_path: Path) -> None:
+    """On instances by seed; another budget has no baseline either."""
+    call = ("--algorithm", f"{mine}:Steps", "--runs", "2", "--evaluations", "200", "--jobs", "1")
+    found = as_json(
+        "bench", *call, "--families", "walk12-long", "--seeds", "3:5", "--against", "random,pso", "--out", tmp_path
     )
-    assert list_instances()
-    done = nlp_gait("bench", "--suite", "small", "--out", tmp_path, "--json")
-    assert "skipped (no baseline records shipped): walk12-w015, ssp-v5," in done.stderr
-    found = json.loads(done.stdout)
-    assert found["instances"] == ["walk12-w100"] and len(found["skipped"]) == 9
+    assert found["instances"] == ["gb2:walk12-long:3", "gb2:walk12-long:4"]
+    assert {s["solver"] for s in found["standings"]} == {"random", "pso", found["solver"]}
+    shown = (tmp_path / "leaderboard.md").read_text(encoding="utf-8")
+    assert "gb2:walk12-long:4" in shown and "2 with 200, run k" in shown
+
+
+def test_instances_are_problems_everywhere(tmp_path: Path) -> None:
+    """One name space: a problem, an instance of GaitBench and a generated one."""
+    drawn = "gb2:walk12-long:3"
+    assert as_json("list", drawn)["variables"][0]["name"] == "z1"
+    x = ",".join(map(repr, gaitbench.load(ID).best_x.tolist()))
+    assert as_json("evaluate", ID, "--x", x)["feasible"]
+    solved = as_json("solve", drawn, "--starts", "2", "--out", tmp_path / "best.json")
+    assert solved["objective"] == pytest.approx(-gaitbench.load(drawn).best_known, rel=1e-5)
+    assert as_json("evaluate", tmp_path / "best.json")["feasible"]
+    found = as_json("export-objective", drawn, "--to", tmp_path / "c")
+    assert any(name.endswith("gaitbench_gb2_walk12_long_3.h") for name in found["files"])
+    assert "unknown family of GaitBench 2" in one_sentence("compare", "gb2:absent:3", "--out", tmp_path / "s")
 
 
 def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:
