@@ -56,6 +56,13 @@ def compare_pairs(comparison: Comparison) -> list[Pair]:
     ]
 
 
+def find_leaders(comparison: Comparison) -> set[str]:
+    """Return the solver with the best median and those that do not differ from it significantly; empty without any test."""
+    leader = comparison.solvers[0].name
+    p_values = {pair.second: pair.rank_sum for pair in compare_pairs(comparison) if pair.first == leader}
+    return {leader, *(name for name, p in p_values.items() if p >= SIGNIFICANT)} if p_values else set()
+
+
 def _paired_costs(a: SolverRuns, b: SolverRuns) -> tuple[list[float], list[float]]:
     """Return the costs of runs with equal seeds, which share their starting points; gradient methods do not."""
     first = {r.seed: cost for r, cost in zip(a.records, a.costs, strict=True) if _shares_start(r)}

@@ -90,6 +90,11 @@ class Document:
     verdict: Sequence[str] = ()  #: summary in at most three sentences; may be empty
     parts: Sequence[Part]  #: the rest, in order
 
+    @property
+    def sections(self) -> list[Section]:
+        """Sections of the first level."""
+        return [part for part in self.parts if isinstance(part, Section)]
+
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", prose: bool = False) -> Table:
     """Return a table of texts, sortable by the number at the beginning of a cell."""

@@ -8,7 +8,7 @@ from statistics import mean, stdev
 from compare.analysis.comparison import Comparison
 from compare.analysis.solver_table import summarise
 from compare.analysis.units import heading, join_words, with_unit
-from compare.analysis.verdict import SIGNIFICANT, compare_pairs
+from compare.analysis.verdict import SIGNIFICANT, compare_pairs, find_leaders
 from nlp_gait.files import make_file_name
 
 HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "gap", "$p$")
@@ -22,7 +22,7 @@ def format_latex_table(comparison: Comparison) -> str:
     """Return the table of one problem: a row for each solver, the best median over all runs first."""
     leader = comparison.solvers[0].name
     p_values = {pair.second: pair.rank_sum for pair in compare_pairs(comparison) if pair.first == leader}
-    best = {leader, *(name for name, p in p_values.items() if p >= SIGNIFICANT)} if p_values else set()
+    best = find_leaders(comparison)
     lines = [" & ".join(HEADER) + r" \\"]
     for solver, summary in zip(comparison.solvers, summarise(comparison), strict=True):
         values = [comparison.value(cost) for cost in solver.feasible]

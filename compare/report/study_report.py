@@ -7,11 +7,12 @@ from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
 from compare.analysis.published import write_better_points
+from compare.analysis.overview import write_overall_verdict
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import write_verdict
-from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
-from compare.report.document import Document, Figure, Section, text_table
+from compare.report.document import Document, Section, text_table
+from compare.report.overview_section import make_overview
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import (
     TERMS,
@@ -64,14 +65,14 @@ def make_study_document(
     """Return the document of a study's records, of their best gaits simulated in the engine, and of excluded records."""
     comparisons = compare_problems(records, weighting)
     sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
-    if len(comparisons) > 1 and list_expected_costs(comparisons):
-        sections.append(_over_problems(comparisons))
+    many = len(comparisons) > 1
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
-        verdict=write_verdict(comparisons),
+        verdict=write_overall_verdict(comparisons) if many else write_verdict(comparisons),
         parts=(
             *_list_excluded(excluded),
             TERMS,
+            *((make_overview(comparisons),) if many else ()),
             *sections,
             *(() if simulated else (HOW,)),
             _make_method_section(comparisons, manifest, weighting),
@@ -93,15 +94,6 @@ def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
             ),
         ),
     )
-
-
-def _over_problems(comparisons: Sequence[Comparison]) -> Section:
-    figure = Figure(
-        name="performance-profile",
-        caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected evaluations.",
-        drawing=plot_performance_profile(comparisons),
-    )
-    return Section(title="Over all problems", parts=(figure,))
 
 
 def _make_method_section(comparisons: Sequence[Comparison], manifest: Manifest, weighting: Weighting) -> Section:

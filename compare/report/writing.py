@@ -48,6 +48,7 @@ def html(document: Document, drawings: Sequence[str]) -> str:
     }
     environment = _environment(page=True)
     environment.filters["html"] = _html_of
+    environment.filters["anchor"] = _make_anchor
     return environment.get_template("report.html.j2").render(document=document, svg=svg)
 
 
@@ -73,6 +74,11 @@ def _environment(*, page: bool) -> Environment:
 
 def _kind(part: Part) -> str:
     return type(part).__name__
+
+
+def _make_anchor(title: str) -> str:
+    """Id of a section within the page, unlike the ids within figures."""
+    return "section-" + re.sub(r"\W+", "-", title).strip("-").lower()
 
 
 def _html_of(markdown: str) -> Markup:
