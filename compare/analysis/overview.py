@@ -29,7 +29,7 @@ class Ranking:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class Score:
     """Number of problems on which a solver differs from another one by the rank-sum test, Holm-corrected on each problem."""
 
     other: str
@@ -62,7 +62,7 @@ def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
     )
 
 
-def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Record]:
+def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     """Return how often a solver is significantly better or worse than each other one that has as many runs to test."""
     tested: dict[str, list[Pair]] = {}
     for comparison in comparisons:
@@ -73,7 +73,7 @@ def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Record]:
     for other, pairs in tested.items():
         wins = sum(pair.rank_sum < SIGNIFICANT and pair.first == solver for pair in pairs)
         losses = sum(pair.rank_sum < SIGNIFICANT and pair.first == other for pair in pairs)
-        records.append(Record(other=other, wins=wins, ties=len(pairs) - wins - losses, losses=losses))
+        records.append(Score(other=other, wins=wins, ties=len(pairs) - wins - losses, losses=losses))
     return records
 
 

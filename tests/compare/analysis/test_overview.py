@@ -1,0 +1,63 @@
+"""Ranks over problems, Friedman's test and the critical difference as computed by hand; wins, and the verdict in five lines."""
+
+from __future__ import annotations
+
+import pytest
+from scipy.stats import friedmanchisquare
+
+from compare.analysis.comparison import Comparison, compare_problems
+from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems, write_overall_verdict
+from compare.report.document import Table
+from compare.report.overview_section import make_overview
+from tests.compare.records import record
+
+MEDIANS = {"walk": (1.0, 2.0, 3.0), "run": (1.0, 3.0, 2.0), "climb": (1.0, 2.0, 2.0)}
+SOLVERS = ("ipopt", "mine", "pso")
+
+
+@pytest.fixture(scope="module")
+def comparisons() -> list[Comparison]:
+    from dataclasses import replace
+
+    records = []
+    for problem, values in MEDIANS.items():
+        for solver, value in zip(SOLVERS, values, strict=True):
+            for run in range(8):
+                made = record(solver, run, [(10, value + 1e-3 * run)])
+                definition = dict(made.definition)
+                if solver == "mine":
+                    definition["solver"] = {"name": "my.py:mine", "source_sha256": "0" * 64}
+                records.append(replace(made, problem=problem, definition=definition))
+    return compare_problems(records)
+
+
+def test_ranks_and_tests_are_those_computed_by_hand(comparisons: list[Comparison]) -> None:
+    ranking = rank_over_problems(comparisons)
+    assert ranking.mean_ranks == pytest.approx({"ipopt": 1.0, "mine": 7.5 / 3, "pso": 7.5 / 3})
+    assert ranking.friedman == pytest.approx(friedmanchisquare(*zip(*MEDIANS.values(), strict=True)).pvalue)
+    # Demsar (2006), table 5: q = 2.343 for three solvers.
+    assert ranking.critical_difference == pytest.approx(2.343 * (3 * 4 / (6 * 3)) ** 0.5, abs=1e-3)
+
+
+def test_two_solvers_have_ranks_without_tests(comparisons: list[Comparison]) -> None:
+    two = [r for c in comparisons for r in c.records if r.solver != "pso"]
+    ranking = rank_over_problems(compare_problems(two))
+    assert ranking.mean_ranks == {"ipopt": 1.0, "mine": 2.0}
+    assert ranking.friedman is None and ranking.critical_difference is None
+
+
+def test_wins_ties_and_losses_of_the_users_solver(comparisons: list[Comparison]) -> None:
+    assert list_user_solvers(comparisons) == ["mine"]
+    found = {r.other: (r.wins, r.ties, r.losses) for r in count_wins(comparisons, "mine")}
+    assert found == {"ipopt": (0, 0, 3), "pso": (1, 1, 1)}
+
+
+def test_the_verdict_has_at_most_five_lines_and_the_matrix_marks_the_best(comparisons: list[Comparison]) -> None:
+    verdict = write_overall_verdict(comparisons)
+    assert len(verdict) <= 5 and verdict[0].startswith("Mean rank of the medians over 3 problems: ipopt 1.00")
+    assert any("1-1-1 against pso" in sentence for sentence in verdict)
+    matrix = next(part for part in make_overview(comparisons).parts if isinstance(part, Table))
+    assert list(matrix.columns) == ["problem", "ipopt", "mine", "pso"]
+    rows = {str(row[0]): row[1:] for row in matrix.rows}
+    assert str(rows["walk"][0]).endswith("*") and "*" not in f"{rows['walk'][1]}{rows['walk'][2]}"
+    assert rows["mean rank"] == ("1.00", "2.50", "2.50")
