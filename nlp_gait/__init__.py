@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from nlp_gait.backends.functions.compiled_function import CompiledFunction, compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
+    from nlp_gait.backends.onboard.replanner import Replan, Replanner, replanner
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
     from nlp_gait.backends.solvers.registry import make_solver
@@ -35,6 +36,9 @@ _LAZY = {
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt:IpoptSettings",
     "Solution": "nlp_gait.formulation.solution:Solution",
     "solve": "nlp_gait.backends.solve:solve",
+    "Replan": "nlp_gait.backends.onboard.replanner:Replan",
+    "Replanner": "nlp_gait.backends.onboard.replanner:Replanner",
+    "replanner": "nlp_gait.backends.onboard.replanner:replanner",
     "make_solver": "nlp_gait.backends.solvers.registry:make_solver",
 }
 # What lower packages use of higher ones, by name.
@@ -65,11 +69,14 @@ __all__ = [
     "GaitError",
     "GaitProblem",
     "IpoptSettings",
+    "Replan",
+    "Replanner",
     "Solution",
     "compile_function",
     "compile_objective",
     "load",
     "problem_names",
+    "replanner",
     "solve",
     "make_solver",
 ]

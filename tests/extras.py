@@ -12,7 +12,7 @@ PACKAGES = {
     "algorithms": ("cma", "pymoo"),
     "bayes": ("egobox",),
     "cluster": ("dask", "distributed"),
-    "qp": ("clarabel",),
+    "qp": ("clarabel", "daqp"),
     "sim": ("mujoco",),
     "suites": ("pymoo", "cma", "ioh", "optuna", "optunahub", "nevergrad", "pygmo"),
     "urdf": ("urdf_parser_py", "lxml"),

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 from casadi import MX
+from numpy.typing import NDArray
 
 from nlp_gait.errors import InputError, LiftedSenseError
 from nlp_gait.formulation import Array, GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
+IntArray = NDArray[np.intp]
 # Sigmoid widths of the stages in which a jump is approached, in units of the switch (metres for a balance margin).
 WIDTHS = (1e-2, 5e-4)
 # The sense of the lifting is checked at these fractions of the default ranges; a derivative below the tolerance is zero.
@@ -40,6 +42,9 @@ class NlpModel:
     lifted: int  #: number of lifted variables
     #: Upper bounds of the rows that tie them, the last rows of g: infinite, or 0 for an equation; the lower is 0
     tie_upper: Array
+    tie_owner: IntArray  #: number of the lifted variable that each of these rows ties
+    #: (lifted,) 1 for a lifted variable that is its exact value or more, -1 for one that is it or less, 0 for one equal to it
+    lift_sense: Array
     smoothed: bool  #: whether a jump is smoothed, so that the width matters
     build_s: float  #: time of the construction [s]
 
@@ -113,6 +118,10 @@ def _build(problem: GaitProblem) -> NlpModel:
         lift_start=_build_lift_start(ops.lifts, [z, p, width]),
         lifted=lifted.shape[0],
         tie_upper=_repeat_per_row(ops.lifts, [0.0 if lift.tight else np.inf for lift in ops.lifts]),
+        tie_owner=_list_owners(ops.lifts),
+        lift_sense=np.concatenate(
+            [np.zeros(0), *(np.full(lift.variable.shape[0], _sense(lift)) for lift in ops.lifts)]
+        ),
         smoothed=ops.smoothed,
         build_s=time.perf_counter() - started,
     )
@@ -120,6 +129,17 @@ def _build(problem: GaitProblem) -> NlpModel:
 
 def _repeat_per_row(lifts: list[Lift], values: list[float]) -> Array:
     return np.repeat(np.array(values, dtype=float), [lift.rows.shape[0] for lift in lifts])
+
+
+def _sense(lift: Lift) -> float:
+    return 0.0 if lift.tight else 1.0 if lift.from_above else -1.0
+
+
+def _list_owners(lifts: list[Lift]) -> IntArray:
+    """Return the lifted variable of each row that ties one: rows of a lift repeat the order of its variables."""
+    first = np.cumsum([0, *(lift.variable.shape[0] for lift in lifts)])
+    rows = [np.arange(lift.rows.shape[0]) % max(1, lift.variable.shape[0]) for lift in lifts]
+    return np.concatenate([np.zeros(0, np.intp), *(start + row for start, row in zip(first, rows, strict=False))])
 
 
 def _build_lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:

@@ -1,0 +1,119 @@
+"""An NLP's values and derivatives in arrays that are allocated once."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
+from nlp_gait.backends.nlp import build_nlp
+from nlp_gait.errors import CompilerError
+from nlp_gait.formulation import Array, GaitProblem
+
+LOG = logging.getLogger("nlp_gait")
+
+
+class NlpFunctions:
+    """Values at a point (w, p) after ``evaluate``, derivatives there after ``differentiate``."""
+
+    def __init__(self, problem: GaitProblem) -> None:
+        """Compile the functions, or interpret them with a warning if that fails."""
+        self.model = model = build_nlp(problem)
+        size, n = model.nlp["x"].shape[0], model.variables
+        rows = model.nlp["g"].shape[0]
+        self.w, self.p = np.zeros(size), np.append(problem.p, model.widths[-1])
+        self.cost, self.g = np.zeros(1), np.zeros(rows)
+        self.gradient, self.multipliers = np.zeros(size), np.zeros(rows)
+        self.row_lower, self.row_upper = np.zeros(len(model.row_names)), np.zeros(len(model.row_names))
+        self._own_p = np.zeros(len(problem.p))
+        functions = _make_functions(problem)
+        jacobian, hessian = functions["nlp_jac_g"].sparsity_out(1), functions["nlp_hess_l"].sparsity_out(0)
+        self._jacobian, self._hessian = np.zeros(jacobian.nnz()), np.zeros(hessian.nnz())
+        self._run = {
+            name: _bind(functions[name], inputs, outputs)
+            for name, inputs, outputs in (
+                ("nlp_f", (self.w, self.p), (self.cost,)),
+                ("nlp_g", (self.w, self.p), (self.g,)),
+                ("nlp_grad_f", (self.w, self.p), (None, self.gradient)),
+                ("nlp_jac_g", (self.w, self.p), (None, self._jacobian)),
+                ("nlp_hess_l", (self.w, self.p, np.ones(1), self.multipliers), (self._hessian,)),
+            )
+        }
+        p = ca.MX.sym("p", len(problem.p))
+        bounds = ca.Function("dense_bounds", [p], [ca.densify(bound) for bound in model.row_bounds(p)])
+        self._run_bounds = _bind(bounds, (self._own_p,), (self.row_lower, self.row_upper))
+        row, column = (np.array(part, dtype=int) for part in jacobian.get_triplet())
+        of_z = column < n
+        self._of_z, self._place = np.flatnonzero(of_z), row[of_z] * n + column[of_z]
+        #: (m, n) Jacobian by the problem's variables
+        self.rows_by_z = np.zeros((rows, n))
+        of_s = np.flatnonzero(~of_z)
+        order = np.lexsort((column[of_s], row[of_s]))
+        self._of_s = of_s[order]
+        starts = np.searchsorted(row[self._of_s], np.arange(rows + 1))
+        #: (m, lifted) Jacobian by the lifted variables
+        self.rows_by_s = sparse.csr_array((np.zeros(len(of_s)), column[self._of_s] - n, starts), shape=(rows, size - n))
+        row, column = (np.array(part, dtype=int) for part in hessian.get_triplet())
+        above = np.flatnonzero(row < column)
+        self._both = np.concatenate([np.arange(len(row)), above])
+        #: (N, N) Hessian of the Lagrangian
+        self.hessian = sparse.coo_array(
+            (
+                np.zeros(len(self._both)),
+                (np.concatenate([row, column[above]]), np.concatenate([column, row[above]])),
+            ),
+            shape=(size, size),
+        )
+
+    def set_parameters(self, p: Array) -> None:
+        """Set the problem's parameters (k,), and the bounds of its rows."""
+        self.p[:-1] = self._own_p[:] = p
+        self._run_bounds()
+
+    def evaluate(self, w: Array) -> None:
+        """Compute the cost and the rows at w."""
+        self.w[:] = w
+        self._run["nlp_f"]()
+        self._run["nlp_g"]()
+
+    def differentiate(self, multipliers: Array) -> None:
+        """Compute all derivatives at the last point; multipliers (m,) of the rows are those of the Lagrangian."""
+        self.multipliers[:] = multipliers
+        self._run["nlp_grad_f"]()
+        self._run["nlp_jac_g"]()
+        self._run["nlp_hess_l"]()
+        self.rows_by_z.ravel()[self._place] = self._jacobian[self._of_z]
+        self.rows_by_s.data[:] = self._jacobian[self._of_s]
+        self.hessian.data[:] = self._hessian[self._both]
+
+
+def _make_functions(problem: GaitProblem) -> dict[str, ca.Function]:
+    model = build_nlp(problem)
+    try:
+        return CompiledNlp(model.nlp, np.append(problem.p, model.widths[-1])).functions
+    except CompilerError as error:
+        LOG.warning("the functions of %s are interpreted, which is slower: %s", problem.name, error)
+        solver = ca.nlpsol("functions", "ipopt", dict(model.nlp))
+        return {name: solver.get_function(name) for name in (*VALUES, *DERIVATIVES.values())}
+
+
+def _bind(function: ca.Function, inputs: tuple[Array, ...], outputs: tuple[Array | None, ...]) -> Callable[[], None]:
+    """Return a call of a function that reads and writes the given arrays."""
+    buffer: Any
+    buffer, call = function.buffer()
+    for i, array in enumerate(inputs):
+        buffer.set_arg(i, array.data)
+    for i, result in enumerate(outputs):
+        if result is not None and result.size:
+            buffer.set_res(i, result.data)
+    keep = (function, buffer, inputs, outputs)  # the buffer stores addresses only
+
+    def run(_: object = keep) -> None:
+        call()
+
+    return run

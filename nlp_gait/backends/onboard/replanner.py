@@ -1,0 +1,277 @@
+"""Solve a problem again after its parameters changed, within milliseconds, by sequential quadratic programming."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
+from nlp_gait.backends.onboard.reduced_qp import StepSolver
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, load
+from nlp_gait.formulation.locking import lock_casadi
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue, Guess, Outcome, Solution
+
+# A step is the last one if it misses the predicted cost by less than this share, violates less than this total, and is shorter
+# than this share of the variables' ranges.
+COST_ERROR, VIOLATION, SHORT = 1e-7, 1e-8, 1e-3
+SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays
+SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step that are tried
+PRICE_FACTOR = 2.0  # weight of the violation in the merit, in units of the largest multiplier
+MEMORY = 3  # a step may raise the merit above that of the last point, not above all of so many
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Replan:
+    """Result of ``Replanner.solve``."""
+
+    x: Array  #: (n,) decision variables: the optimum, else the best feasible point, else the last one
+    objective: float  #: at x, in the problem's sense
+    feasible: bool  #: whether x satisfies all constraints, judged by the exact functions if that was requested
+    converged: bool  #: whether x is a local optimum
+    iterations: int  #: steps, and IPOPT's iterations
+    time_s: float  #: wall time [s]
+    solver: str  #: that found x: ``"sqp"`` or ``"ipopt"``
+    note: str  #: why it did not converge, or why IPOPT was used; else empty
+    violated: tuple[ConstraintValue, ...]  #: violated constraints and by how much, worst first
+
+
+def replanner(
+    problem: GaitProblem | str, *, near: Solution | None = None, starts: int | None = None, seed: int = 0
+) -> Replanner:
+    """Return a solver for one problem with changing parameters; it is built once, and continues from its last optimum.
+
+    Args:
+        problem: with the parameter values to begin with; a name is loaded with its defaults.
+        near: solution by IPOPT to begin from; None to solve the problem.
+        starts: number of start points for that; None for the problem's default.
+        seed: of the start points.
+
+    Raises:
+        InputError: DAQP is not installed, ``near`` has no multipliers, or no start converges.
+    """
+    problem = load(problem) if isinstance(problem, str) else problem
+    if near is None:
+        count = problem.hints.starts if starts is None else starts
+        near = solve(problem, starts=count, seed=seed)
+    return Replanner(problem, min(near.starts, key=lambda outcome: outcome.rank))
+
+
+class Replanner:
+    """Steps of sequential quadratic programming from the last optimum and its multipliers; made by ``replanner``."""
+
+    def __init__(self, problem: GaitProblem, near: Outcome) -> None:
+        """Use ``replanner`` instead."""
+        if near.guess is None or not near.converged:
+            raise InputError(
+                f"{problem.name}: planning again needs an optimum by IPOPT to begin from; it {near.status}"
+            )
+        self.problem = problem
+        self._functions = NlpFunctions(problem)
+        self._steps = StepSolver(self._functions)
+        self._exact = build_exact_model(problem)
+        self._scale = self._exact.row_scales[: len(self._functions.model.row_names)]
+        self._ipopt = IpoptSettings().prepare(problem, solves=SOLVES)
+        self._threads = ThreadpoolController()
+        self._near, self._guess = near, near.guess
+
+    @lock_casadi
+    def solve(
+        self,
+        p: Mapping[str, float] | Sequence[float] | Array | None = None,
+        x0: Sequence[float] | Array | Mapping[str, float] | None = None,
+        *,
+        iterations: int = 20,
+        time_limit_s: float = math.inf,
+        judge: bool = False,
+    ) -> Replan:
+        """Return the optimum for other parameter values.
+
+        If a limit is reached, the best feasible point so far is returned, or the last point with the violated constraints. If the
+        steps fail within the limits, IPOPT solves the problem, and ``note`` says so.
+
+        Args:
+            p: values by name, others as in the replanner's problem; or all of them (k,), in the order of ``problem.parameters``.
+            x0: start point; None for the last result.
+            iterations: limit of steps; IPOPT is not limited by it.
+            time_limit_s: limit of wall time, checked after each step; with a limit IPOPT is not used.
+            judge: whether the exact functions judge x, which takes about a millisecond.
+
+        Raises:
+            UnknownNameError, InputError: a parameter or x0 is not allowed.
+        """
+        started = time.perf_counter()
+        problem = self._change(p)
+        guess = self._guess
+        if x0 is not None:
+            primal = self._functions.model.start(problem, problem.check_x(x0), guess.width)
+            guess = replace(guess, primal=primal)
+        with self._threads.limit(limits=1):
+            run = _Run(problem, self._functions, self._steps, self._scale, guess)
+            run.improve(iterations, started + time_limit_s)
+        found = run.result()
+        if run.converged or found.feasible:
+            self._guess = run.guess()
+        if not run.converged and math.isinf(time_limit_s):
+            found = self._solve_by_ipopt(problem, found)
+        if judge:
+            values = self._exact.at(found.x, problem.p)
+            found = replace(
+                found,
+                objective=problem.objective.sign * values.cost,
+                feasible=values.violation <= FEASIBILITY_TOLERANCE and math.isfinite(values.cost),
+                violated=self._exact.find_violated(values),
+            )
+        return replace(found, time_s=time.perf_counter() - started)
+
+    def _change(self, p: Mapping[str, float] | Sequence[float] | Array | None) -> GaitProblem:
+        if p is None:
+            return self.problem
+        if not isinstance(p, Mapping):
+            names = [parameter.name for parameter in self.problem.parameters]
+            if len(p) != len(names):
+                raise InputError(f"p must be values by name, or all {len(names)} in order, got {len(p)}")
+            p = dict(zip(names, np.asarray(p, dtype=float).tolist(), strict=True))
+        return self.problem.with_values(**p)
+
+    def _solve_by_ipopt(self, problem: GaitProblem, found: Replan) -> Replan:
+        near = replace(self._near, guess=self._guess, x=found.x)
+        outcome = self._ipopt.run_from(problem, near)
+        if outcome is None or not outcome.converged:
+            cold = self._ipopt.run(problem, np.clip(found.x, problem.lower, problem.upper))
+            outcome = cold if outcome is None else min(outcome, cold, key=lambda each: each.rank)
+        note = f"{found.note}; IPOPT {outcome.status}"
+        if outcome.converged and outcome.guess is not None:
+            self._guess, self._near = outcome.guess, outcome
+        elif found.feasible:
+            return replace(found, note=note, iterations=found.iterations + outcome.iterations)
+        return Replan(
+            x=outcome.x,
+            objective=outcome.objective,
+            feasible=outcome.feasible,
+            converged=outcome.converged,
+            iterations=found.iterations + outcome.iterations,
+            time_s=0.0,
+            solver="ipopt",
+            note=note,
+            violated=self._exact.find_violated(self._exact.at(outcome.x, problem.p)),
+        )
+
+
+class _Run:
+    """Steps from a guess to the optimum of a problem."""
+
+    def __init__(self, problem: GaitProblem, at: NlpFunctions, steps: StepSolver, scale: Array, guess: Guess) -> None:
+        self._problem, self._at, self._steps, self._scale = problem, at, steps, scale
+        model = at.model
+        at.set_parameters(problem.p)
+        ties = len(model.tie_upper)
+        self._lower = np.concatenate([at.row_lower, np.zeros(ties)])
+        self._upper = np.concatenate([at.row_upper, model.tie_upper])
+        self._z_lower, self._z_upper = (
+            (bound - model.offset) / model.scale for bound in (problem.lower, problem.upper)
+        )
+        self._n, self._width, self._multipliers = model.variables, guess.width, guess.rows
+        self.iterations, self.converged, self.note = 0, False, ""
+        self._go_to(guess.primal.copy())
+        self._best: tuple[float, Array] | None = None
+        self._keep_best()
+        steps.begin(guess.rows)
+
+    def improve(self, iterations: int, deadline: float) -> None:
+        """Take steps until one converges or a limit is reached."""
+        merits: list[float] = []
+        while not self.converged:
+            if self.iterations >= iterations or time.perf_counter() >= deadline:
+                self.note = f"stopped at the limit after {self.iterations} steps"
+                return
+            at, n = self._at, self._n
+            w, cost = self._w, at.cost[0]
+            at.differentiate(self._multipliers)
+            step = self._steps.solve(
+                self._lower - at.g, self._upper - at.g, self._z_lower - w[:n], self._z_upper - w[:n]
+            )
+            self.iterations += 1
+            if step is None:
+                self.note = f"the quadratic program of step {self.iterations} failed"
+                return
+            weight = PRICE_FACTOR * np.abs(step.multipliers[: len(self._scale)] * self._scale).max(initial=0.0)
+            merits = [*merits[1 - MEMORY :], cost + weight * self._violation]
+            for share in SHARES:
+                self._go_to(w + share * step.w)
+                if at.cost[0] + weight * self._violation <= max(merits) + 1e-12 * abs(cost):
+                    break
+            self._multipliers = self._multipliers + share * (step.multipliers - self._multipliers)
+            self._keep_best()
+            error = abs(at.cost[0] - cost + step.decrease)
+            length = np.abs(step.w[:n]).max(initial=0.0)
+            accurate = error <= COST_ERROR * max(abs(cost), 1e-9) and length <= SHORT
+            self.converged = share == 1.0 and accurate and self._violation <= VIOLATION and not step.relaxed
+
+    def guess(self) -> Guess:
+        """Return the last point with its multipliers."""
+        return Guess(primal=self._w, bounds=np.zeros(len(self._w)), rows=self._multipliers, width=self._width)
+
+    def result(self) -> Replan:
+        """Return the optimum, else the best feasible point, else the last one with its violated rows."""
+        at = self._at
+        if not self.converged and self._best is not None:
+            self._go_to(self._best[1])
+        feasible = self._violation <= FEASIBILITY_TOLERANCE and math.isfinite(at.cost[0])
+        return Replan(
+            x=np.clip(at.model.point(self._w), self._problem.lower, self._problem.upper),
+            objective=self._problem.objective.sign * float(at.cost[0]),
+            feasible=feasible,
+            converged=self.converged,
+            iterations=self.iterations,
+            time_s=0.0,
+            solver="sqp",
+            note=self.note,
+            violated=() if feasible else self._list_violated(),
+        )
+
+    def _go_to(self, w: Array) -> None:
+        """Evaluate the functions at z within its bounds and the exact values of the lifted variables."""
+        at, n, first = self._at, self._n, len(self._scale)
+        w[:n] = np.clip(w[:n], self._z_lower, self._z_upper)
+        at.evaluate(w)
+        for _ in range(3):  # a lift may contain others
+            change = at.model.lift_sense * at.g[self._steps.choose_ties(at.g)]
+            if not np.abs(change).max(initial=0.0) > 1e-13:
+                break
+            w[n:] -= change
+            at.evaluate(w)
+        rows = at.g[:first]
+        self._w = w
+        self._violations = np.maximum(np.maximum(self._lower[:first] - rows, rows - self._upper[:first]), 0.0)
+        violation = float(np.sum(self._violations / self._scale))
+        self._violation = violation if math.isfinite(violation) else math.inf
+
+    def _keep_best(self) -> None:
+        cost = float(self._at.cost[0])
+        if self._violation <= FEASIBILITY_TOLERANCE and (self._best is None or cost < self._best[0]):
+            self._best = cost, self._w.copy()
+
+    def _list_violated(self) -> tuple[ConstraintValue, ...]:
+        names, units, g = self._at.model.row_names, build_exact_model(self._problem).row_units, self._at.g
+        order = np.argsort(-self._violations / self._scale)
+        return tuple(
+            ConstraintValue(
+                name=names[i],
+                value=float(g[i]),
+                lower=float(self._lower[i]) if math.isfinite(self._lower[i]) else None,
+                upper=float(self._upper[i]) if math.isfinite(self._upper[i]) else None,
+                violation=float(self._violations[i]),
+                unit=units[i],
+            )
+            for i in order
+            if self._violations[i] > 0.0
+        )
