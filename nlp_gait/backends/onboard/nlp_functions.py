@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from nlp_gait.backends.derivatives.compiled import DERIVATIVES, VALUES, CompiledNlp
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NLP_VALUES, CompiledNlp
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array, GaitProblem
@@ -99,7 +99,7 @@ def _make_functions(problem: GaitProblem) -> dict[str, ca.Function]:
     except CompilerError as error:
         LOG.warning("the functions of %s are interpreted, which is slower: %s", problem.name, error)
         solver = ca.nlpsol("functions", "ipopt", dict(model.nlp))
-        return {name: solver.get_function(name) for name in (*VALUES, *DERIVATIVES.values())}
+        return {name: solver.get_function(name) for name in (*NLP_VALUES, *DERIVATIVES.values())}
 
 
 def _bind(function: ca.Function, inputs: tuple[Array, ...], outputs: tuple[Array | None, ...]) -> Callable[[], None]:
