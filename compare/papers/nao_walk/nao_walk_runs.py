@@ -22,7 +22,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.nao.joints import YAW_PITCHES
-from nlp_gait.gaits.nao.recorded import make_nao_cycles
+from nlp_gait.gaits.nao.problems import make_nao_cycles
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import planned_distance, walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan

@@ -10,7 +10,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.cart_table import JERK_WEIGHT, Footsteps, PreviewController, Walker, plan_cart_table_walk
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
-from nlp_gait.gaits.nao.recorded import make_nao_cycles
+from nlp_gait.gaits.nao.problems import make_nao_cycles
 
 STEPS = Footsteps(step_m=0.05, single_s=0.6, double_s=0.4, hip_height_m=0.3, lift_m=0.015)
 

@@ -18,7 +18,7 @@ from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.joints import JOINTS
-from nlp_gait.gaits.nao.recorded import make_recorded_gait
+from nlp_gait.gaits.nao.problems import make_recorded_gait
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import mirror_sign, partner
 from tests.pinocchio_oracle import floating_model, stand
