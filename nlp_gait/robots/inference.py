@@ -10,9 +10,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import GaitError, RobotDataError
-from nlp_gait.robots.inertia import Array, Mass, combine_masses
 from nlp_gait.robots.leg import LEG_JOINT_COUNT
-from nlp_gait.robots.tree import are_mirror_images
+from nlp_gait.robots.tree import Array, Mass, are_mirror_images, combine_masses
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")

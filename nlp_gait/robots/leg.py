@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.robots.inertia import Array
 from nlp_gait.robots.robot import Robot
+from nlp_gait.robots.tree import Array
 
 LEG_JOINT_COUNT = 6
 # Axes this close to a point pass through it; smaller than the rounding of published origins.

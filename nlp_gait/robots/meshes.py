@@ -16,9 +16,9 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.files import read_bytes
-from nlp_gait.robots.inertia import Array, rotate
 from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.robot import are_plausible
+from nlp_gait.robots.tree import Array, rotate
 
 PACKAGE = "package://"
 FOLDER_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")

@@ -19,11 +19,11 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import protect_input, read_bytes
-from nlp_gait.robots.inertia import Array, Mass, combine_masses
 from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import box_points, cylinder_points
 from nlp_gait.robots.mjcf_counts import check_counts
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
+from nlp_gait.robots.tree import Array, Mass, combine_masses
 
 LOG = logging.getLogger("nlp_gait")
 UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits

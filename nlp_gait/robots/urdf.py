@@ -17,9 +17,9 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
-from nlp_gait.robots.inertia import Array, Mass, combine_masses, point_inertia
 from nlp_gait.robots.meshes import box_points, cylinder_points, find_mesh, make_pose, mesh_points, parse_xml
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
+from nlp_gait.robots.tree import Array, Mass, combine_masses, point_inertia
 
 # Elements that are read; shapes, transmissions and plugins are removed before parsing.
 READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}

@@ -10,7 +10,7 @@ import pytest
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import Link, load_robot, robot_names
-from nlp_gait.robots.inertia import check_inertias, compute_joint_ratio, shift_to_com
+from nlp_gait.robots.tree import check_inertias, compute_joint_ratio, shift_to_com
 from tests.robots.custom import about_joints, humanoid, nao, six
 from tests.robots.files import written
 

@@ -30,9 +30,8 @@ from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
 from nlp_gait.robots import Foot, Joint, Link, Robot
-from nlp_gait.robots.inertia import inertia_moments, point_inertia
 from nlp_gait.robots.robot import Vector
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import inertia_moments, point_inertia, tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 
 SPHERE_RADIUS = 0.02  # of a mass [m]: half the width of NAO's limbs
