@@ -52,8 +52,7 @@ def bench(
     from compare.bench.baseline import list_instances
     from compare.bench.leaderboard import rank_solvers
     from compare.bench.page import make_leaderboard_page, make_verdict
-    from compare.report.session_section import add_session
-    from compare.report.writing import write_document
+    from compare.report.writing import add_session, write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
     from nlp_gait.backends.kernel.compiled import available_cores

@@ -19,9 +19,8 @@ from compare.report.provenance import (
     format_settings,
     make_solver_table,
 )
-from compare.report.session_section import make_citation_section, make_session_section
 from compare.report.study_files import FurtherFiles
-from compare.report.writing import write_document
+from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence
 from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord

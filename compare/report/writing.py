@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, TypeVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg, save
-from compare.report.document import Document, Figure, Part, Table, iterate_leaves
+from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, text_table
+from compare.study.description import cite_problems
+from compare.study.manifest import Session
 from nlp_gait.files import format_csv, write_text
 
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
@@ -90,3 +94,32 @@ def _literal(text: str) -> str:
     """Text as Markdown shows it literally, on one line."""
     escaped = MARKDOWN_SPECIAL.sub(r"\\\1", " ".join(text.split()))
     return escaped.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+D = TypeVar("D", bound=Document)
+
+
+def make_session_section(number: int, session: Session) -> Section:
+    """Return the command, machine and versions of a session."""
+    rows = [
+        ("command", session.command),
+        ("started", session.started),
+        *session.machine.items(),
+        ("workers", session.jobs),
+        ("compiled objective", session.kernel),
+        ("versions", ", ".join(f"{name} {version}" for name, version in session.versions.items())),
+    ]
+    return Section(title=f"Session {number}", parts=(text_table(("what", "value"), rows, prose=True),))
+
+
+def make_citation_section(problems: Iterable[Mapping[str, Any]]) -> Section:
+    """Return how to cite the software and the sources of problems, given by name and options."""
+    words = "The software and the papers whose problems are used here; `nlp-gait cite` prints these entries:"
+    entries = f"```bibtex\n{cite_problems(problems)}\n```"
+    return Section(title="How to cite", parts=(Prose(f"{words}\n\n{entries}"),))
+
+
+def add_session(document: D, command: str, problems: Iterable[Mapping[str, Any]], jobs: str = "1") -> D:
+    """Return a document with the session that makes it (this command, machine and versions) and what to cite."""
+    ending = (make_session_section(1, Session.begin(command, jobs)), make_citation_section(problems))
+    return replace(document, parts=(*document.parts, *ending))

@@ -85,7 +85,7 @@ class Output:
         Raises:
             OutputError: a file cannot be written; the answer is printed nevertheless.
         """
-        from compare.report.session_section import add_session
+        from compare.report.writing import add_session
 
         written: list[Path] = []
         with defer_interrupts() as pressed:
