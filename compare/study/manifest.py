@@ -19,7 +19,6 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import convert_errors, read_json, write_json
 
-SCHEMA = 1
 FILE = "study.json"
 REMEDY = "delete it; the records stay valid"
 PACKAGES = ("nlp-gait", "casadi", "numpy", "scipy", "joblib", "cma", "pymoo", "distributed")
@@ -71,7 +70,7 @@ class _File:
 def write_manifest(folder: Path, settings: StudySettings, session: Session) -> None:
     """Add a session to the manifest of a folder, with the latest settings; raises InputError if the manifest is damaged."""
     sessions: Sequence[Session] = read_manifest(folder).sessions
-    data = {"schema": SCHEMA, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
+    data = {"schema": 1, "study": settings.to_json(), "sessions": [asdict(s) for s in (*sessions, session)]}
     write_json(folder / FILE, data)
 
 
