@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
-from compare.study.manifest import FILE, Manifest, read_manifest
 from compare.study.record import RunRecord, format_now, hash_installed_code
 from compare.study.record_files import RECORDS
 from compare.study.references import find_reference
+from compare.study.settings import FILE, Manifest, read_manifest
 from nlp_gait.backends.identity import FILES, HASH, SOURCE
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file

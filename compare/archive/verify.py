@@ -16,8 +16,8 @@ from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import markdown_page
 from compare.study.evidence import name_record, read_evidence
-from compare.study.manifest import FILE, Manifest, read_manifest
 from compare.study.record import RunRecord, hash_installed_code, load_problem
+from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.simulations import load_simulations
 from nlp_gait.backends.identity import FILES, SOURCE
 from nlp_gait.errors import GaitError, InputError

@@ -28,7 +28,7 @@ def archive(
     from compare.archive import pack_study
     from compare.report import write_report
     from compare.study.evidence import read_evidence
-    from compare.study.manifest import read_manifest
+    from compare.study.settings import read_manifest
 
     name_all(code)
     target = output_file(out)

@@ -92,8 +92,8 @@ def compare(
     """
     from compare.report import FurtherFiles, write_report
     from compare.study.import_runs import read_imported_records
-    from compare.study.manifest import Session, read_manifest, write_manifest
     from compare.study.run_study import Study, check_study, run_study
+    from compare.study.settings import Session, read_manifest, write_manifest
     from nlp_gait.backends.kernel.compiled import available_cores
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import load_mujoco

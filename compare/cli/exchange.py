@@ -50,8 +50,8 @@ def import_results(
     from compare.report import FurtherFiles, write_report
     from compare.study.evidence import read_evidence
     from compare.study.import_runs import import_runs
-    from compare.study.manifest import read_manifest
     from compare.study.record_files import write_record
+    from compare.study.settings import read_manifest
     from nlp_gait.files import make_writable_folder
 
     spec = problem.spec()

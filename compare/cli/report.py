@@ -87,7 +87,7 @@ def report(
     from compare.analysis.statistics.run_length import Weighting
     from compare.report import FurtherFiles, write_report
     from compare.study.evidence import read_evidence
-    from compare.study.manifest import read_manifest
+    from compare.study.settings import read_manifest
 
     if not engine and drive_options != DriveOptions():
         raise InputError("the drive applies to simulated gaits: add --engine")

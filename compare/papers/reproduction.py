@@ -36,7 +36,7 @@ from compare.papers.paper_runs import Effort, Runner
 from compare.report.document import Rows, Section, Table, fill_template, text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section, write_document, write_parts
-from compare.study.manifest import Session
+from compare.study.settings import Session
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.decoding import decode, decode_value
 from nlp_gait.errors import InputError

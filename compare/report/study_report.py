@@ -22,8 +22,8 @@ from compare.report.provenance import (
 from compare.report.study_files import FurtherFiles
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence
-from compare.study.manifest import Manifest, read_manifest
 from compare.study.record import RunRecord
+from compare.study.settings import Manifest, read_manifest
 from compare.study.simulations import SimulatedGait, load_simulations
 
 REPORT_ALONE = FurtherFiles()

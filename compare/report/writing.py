@@ -15,7 +15,7 @@ from markupsafe import Markup
 from compare.drawing.figures import inline_svg, save
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, text_table
 from compare.study.description import cite_problems
-from compare.study.manifest import Session
+from compare.study.settings import Session
 from nlp_gait.files import format_csv, write_text
 
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.study.manifest import Session, write_manifest
 from compare.study.record_files import locate_record, write_record
 from compare.study.run_study import Study, run_study
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
 from compare.study.store import Store
 from compare.study.task import ProblemSpec, Stop, Task
 from nlp_gait.backends.kernel import library_cache

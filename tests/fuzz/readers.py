@@ -15,10 +15,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from compare.study.manifest import FILE, read_manifest
 from compare.study.record import read_record
 from compare.study.run_study import Study, check_study
-from compare.study.settings import StudySettings, read_settings
+from compare.study.settings import FILE, StudySettings, read_manifest, read_settings
 from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError

@@ -18,8 +18,7 @@ from compare.drawing.figures import inline_svg, new_figure, render_svg, style
 from compare.report.document import Figure, iterate_leaves
 from compare.report.study_report import make_study_document
 from compare.report.writing import html, markdown_page
-from compare.study.manifest import Manifest, Session
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.settings import Manifest, Session, SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
 from nlp_gait.robots import load_robot
 from nlp_gait.simulation.drive import Drive

@@ -15,10 +15,9 @@ from compare.archive.pack import _collect_robot, write_archive
 from compare.archive.verify import _check_code_files
 from compare.cli import app
 from compare.study.evidence import read_evidence
-from compare.study.manifest import Session, write_manifest
 from compare.study.record_files import read_records
 from compare.study.run_study import Study, run_study
-from compare.study.settings import SolverSpec, StudySettings
+from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.proofs.certificate import load_certificates

@@ -13,8 +13,8 @@ from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import summarise
 from compare.analysis.statistics.run_length import Weighting
 from compare.report import FurtherFiles, rebuild_report, write_report
-from compare.study.manifest import Manifest, Session
 from compare.study.record_files import write_record
+from compare.study.settings import Manifest, Session
 from nlp_gait.errors import InputError
 from tests.compare.records import FAST_X, judged, record, study
 

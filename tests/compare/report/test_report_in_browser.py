@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from compare.report import write_report
-from compare.study.manifest import Manifest
+from compare.study.settings import Manifest
 from tests.compare.records import study
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
