@@ -1,4 +1,4 @@
-"""Documents written as a self-contained HTML page and as Markdown, with figures and tables beside them."""
+"""Documents written as a self-contained HTML page and as Markdown, with figures and tables, session and citations at the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study as plain settings: from a command line, a TOML file or a study's manifest."""
+"""A study as plain settings (command line, TOML file), and its manifest ``study.json``: settings, commands, machines, versions."""
 
 from __future__ import annotations
 

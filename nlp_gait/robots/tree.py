@@ -1,4 +1,4 @@
-"""Trees of a robot's links from any fixed link, robots with locked, turned or reversed joints, and mirror images of joints."""
+"""Links of a robot: masses and inertias; trees from any fixed link, locked, turned or reversed joints, mirror images of joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Position drives of the simulated robot: stiffness, torque limits, set-points, and feed-forward."""
+"""Position drives of the simulated robot: stiffness, torque limits, set-points, feed-forward; and their balance feedback.
+
+The feedback is a virtual spring between the torso and its planned place, with sensor noise and delay.
+"""
 
 from __future__ import annotations
 

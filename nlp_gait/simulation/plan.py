@@ -1,4 +1,4 @@
-"""Planned motion and torques of a gait as functions of time."""
+"""Planned motion and torques of a gait as functions of time, and primitive shapes of the robot's links."""
 
 from __future__ import annotations
 

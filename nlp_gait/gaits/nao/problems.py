@@ -1,4 +1,4 @@
-"""The NAO problems: the published phases, both with free joints, and the walking cycle; options are in ``gaits.nao``."""
+"""The NAO problems: published phases, both with free joints, the walking cycle, and recorded gaits; options are in ``gaits.nao``."""
 
 from __future__ import annotations
 
