@@ -1,4 +1,4 @@
-"""A study as plain settings (command line, TOML file), and its manifest ``study.json``: settings, commands, machines, versions."""
+"""A study as plain settings (command line, TOML file), and its manifest ``study.json``: settings, commands, machine, versions."""
 
 from __future__ import annotations
 

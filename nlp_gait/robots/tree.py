@@ -1,4 +1,4 @@
-"""Links of a robot: masses and inertias; trees from any fixed link, locked, turned or reversed joints, mirror images of joints."""
+"""A robot's links: masses and inertias; trees from any fixed link, locked, turned or reversed joints, mirror images of joints."""
 
 from __future__ import annotations
 

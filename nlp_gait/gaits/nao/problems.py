@@ -1,4 +1,4 @@
-"""The NAO problems: published phases, both with free joints, the walking cycle, and recorded gaits; options are in ``gaits.nao``."""
+"""The NAO problems: published phases, with free joints too, walking cycle, recorded gaits; options are in ``gaits.nao``."""
 
 from __future__ import annotations
 
