@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from compare.papers.claims import (
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
+from compare.papers.paper_runs import compute_range
 
 # A solution that costs this share more than the optimum is as good for a walker.
 NEARLY_OPTIMAL = 0.01
@@ -35,42 +37,42 @@ RIPPLE = 1e-3
 RANK_SUM = "rank-sum test"
 
 
-def _check_better(phase: PhaseFindings, swarm: str) -> Check:
-    pso, ga = phase.final_powers(swarm), phase.final_powers("ga")
-    test, effect, of_pso, of_ga = phase.test(swarm), a12(pso, ga), np.median(pso), np.median(ga)
-    printed = {name: phase.paper.optima[name].power_W for name in ALGORITHMS}
-    printed_lead, lead = (1000 * (b - a) for a, b in ((printed["pso"], printed["ga"]), (of_pso, of_ga)))
-    check = compare_changes(
-        printed_lead,
-        lead,
-        swarm=NAMES[swarm],
-        test=test,
-        effect=effect,
-        wins=100 * effect,
-        pso=of_pso,
-        ga=of_ga,
-        best=phase.best,
-        best_run=min(pso + ga),
-        printed_lead=printed_lead,
-        lead=lead,
-        share=100 * (of_ga / of_pso - 1),
-        survival=phase.test(swarm, "ga-generational").p_two_sided,
-        penalty=phase.test(f"{swarm}-penalty", "ga-penalty").p_two_sided,
-        more=phase.test(f"{swarm}-more", "ga-more").p_two_sided,
-        pairs=len(phase.final_powers("ga-more")),
-    )
+def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
+    """Check a swarm's lead over GA [mW]; ``kind`` is how the names of other runs of both end."""
+    pso, ga = (phase.final_powers(f"{name}{kind}") for name in (swarm, "ga"))
+    test, of_pso, of_ga = phase.test(f"{swarm}{kind}", f"ga{kind}"), float(np.median(pso)), float(np.median(ga))
+    printed_lead = 1000 * (phase.paper.optima["ga"].power_W - phase.paper.optima["pso"].power_W)
+    values: dict[str, Any] = {"swarm": NAMES[swarm], "test": test, "p": test.p_two_sided, "effect": a12(pso, ga)}
+    values |= {"pso": of_pso, "ga": of_ga, "best": phase.best, "best_run": min(pso + ga), "pairs": len(pso)}
+    values |= {"printed_lead": printed_lead, "lead": 1000 * (of_ga - of_pso), "share": 100 * (of_ga / of_pso - 1)}
+    values["generational"] = phase.test(swarm, "ga-generational").p_two_sided
+    for name in ("penalty", "more"):
+        values[name] = phase.test(f"{swarm}-{name}", f"ga-{name}").p_two_sided
+    check = compare_changes(printed_lead, values["lead"], **values, wins=100 * values["effect"])
     return require_significance(check, RANK_SUM, test.p_two_sided)
 
 
-def _check_more_pairs(phase: PhaseFindings) -> Check:
-    """Check damped PSO's lead over GA [mW] over the further initial populations."""
-    pso, ga = (phase.final_powers(f"{name}-more") for name in ALGORITHMS)
-    printed = 1000 * (phase.paper.optima["ga"].power_W - phase.paper.optima["pso"].power_W)
-    lead, p = 1000 * float(np.median(ga) - np.median(pso)), phase.test("pso-more", "ga-more").p_two_sided
-    check = compare_changes(
-        printed, lead, swarm=NAMES["pso"], printed_lead=printed, lead=lead, pairs=len(pso), p=p, wins=100 * a12(pso, ga)
-    )
-    return require_significance(check, RANK_SUM, p)
+def _check_each_run(phase: PhaseFindings, swarm: str) -> Check:
+    pairs = list(zip(phase.final_powers(swarm), phase.final_powers("ga"), strict=True))
+    won = sum(pso < ga for pso, ga in pairs)
+    return decide(won == len(pairs), swarm=NAMES[swarm], won=won, pairs=len(pairs))
+
+
+def _check_near_least(phase: PhaseFindings) -> Check:
+    """Check whether GA's average is nearer to its least power than PSO's, with both weights [%]."""
+    ends = {name: phase.final_powers(name) for name in phase.searches}
+    above = {name: 100 * (float(np.mean(powers)) / min(powers) - 1) for name, powers in ends.items()}
+    words = ", ".join(f"{NAMES[name]} {share:.2f} %" for name, share in above.items())
+    return decide([above["ga"] < share for name, share in above.items() if name != "ga"], found=words)
+
+
+def _check_alike(phase: PhaseFindings, swarm: str) -> Check:
+    """Check whether a swarm's and GA's median solutions differ by no more than the printed ones: of the ranges [%]."""
+    printed = [np.array(phase.paper.optima[name].x) for name in ALGORITHMS]
+    ours = [np.array(list(phase.median(name).x.values())) for name in (swarm, "ga")]
+    width = phase.problem.upper - phase.problem.lower
+    apart = [100 * float((np.abs(a - b) / width).max()) for a, b in (printed, ours)]
+    return decide(apart[1] <= apart[0], swarm=NAMES[swarm], printed=apart[0], ours=apart[1])
 
 
 def _check_statistic(phase: PhaseFindings) -> Check:
@@ -79,7 +81,7 @@ def _check_statistic(phase: PhaseFindings) -> Check:
     z = (printed.rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(variance)
     p = math.erfc(abs(z) / math.sqrt(2))
     both = [printed.z, printed.p_two_sided, printed.p_less]
-    return compare_levels(both, [z, p, p / 2], test=printed, z=z, p=p, p_less=p / 2)
+    return compare_levels(both, [z, p, p / 2], test=printed, z=z, p_both=p, p_less=p / 2)
 
 
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
@@ -93,7 +95,9 @@ def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
 
 def _check_same_optimum(phase: PhaseFindings, swarm: str) -> Check:
     gaps = 100 * (np.array(phase.final_powers(swarm)) / phase.best - 1)
-    return decide(bool(np.all(gaps <= 100 * NEARLY_OPTIMAL)), swarm=NAMES[swarm], low=gaps.min(), high=gaps.max())
+    within = gaps <= 100 * NEARLY_OPTIMAL
+    ends = {"low": gaps.min(), "high": gaps.max(), "within": within.sum(), "runs": len(gaps)}
+    return decide(bool(within.all()), swarm=NAMES[swarm], **ends)
 
 
 def _check_falling(phase: PhaseFindings, over: Literal["hip", "time"]) -> Check:
@@ -115,15 +119,8 @@ def _check_torque_change(phase: PhaseFindings, swarm: str) -> Check:
     ours = _compute_lead({"pso": float(np.median(pso)), "ga": float(np.median(ga))})
     middle = [phase.median(name).verdict.indexes["torque_change_Nm"] for name in (swarm, "ga")]
     p = rank_sum_normal(pso, ga).p_two_sided
-    values = {
-        "pso": np.median(pso),
-        "ga": np.median(ga),
-        "printed_lead": printed,
-        "lead": ours,
-        "middle": middle,
-        "p": p,
-    }
-    return require_significance(compare_changes(printed, ours, swarm=NAMES[swarm], **values), RANK_SUM, p)
+    values = {"swarm": NAMES[swarm], "pso": np.median(pso), "ga": np.median(ga), "middle": middle, "p": p}
+    return require_significance(compare_changes(printed, ours, printed_lead=printed, lead=ours, **values), RANK_SUM, p)
 
 
 def _compute_lead(values: dict[str, float]) -> float:
@@ -135,7 +132,21 @@ def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -
     low, high = findings.swing_power(0.015), findings.swing_power(height_m)
     printed = 100 * (SWING_POWER_W[algorithm][height_m] / SWING_POWER_W[algorithm][0.015] - 1)
     ours = 100 * (high / low - 1)
-    return compare_changes(printed, ours, low=low, high=high, rise=ours, printed_rise=printed)
+    rises = _describe_rises(findings, height_m)
+    return compare_changes(printed, ours, low=low, high=high, rise=ours, printed_rise=printed, rises=rises)
+
+
+def _describe_rises(findings: NaoFindings, height_m: float) -> str:
+    """Return how much more than near 0.015 m the cheapest solution near a height costs, in words by search and runs."""
+    rises = []
+    for name in SEARCHES:
+        for words, run in (("all runs", None), ("median run", findings.ssp.median_run(name))):
+            low, high = (
+                findings.ssp.points[name].cheapest_near(SWING_HEIGHT, at, 5e-4, run) for at in (0.015, height_m)
+            )
+            rise = "none found" if math.isnan(high / low) else f"{100 * (high / low - 1):+.1f} %"
+            rises.append(f"{NAMES[name]}, {words} {rise}")
+    return "; ".join(rises)
 
 
 def _check_swing_rise(findings: NaoFindings, algorithm: str) -> Check:
@@ -144,53 +155,32 @@ def _check_swing_rise(findings: NaoFindings, algorithm: str) -> Check:
     steeper, ours_steeper = (
         (power[0.028] - power[0.024]) / (power[0.024] - power[0.015]) * 9 / 4 for power in (printed, ours)
     )
-    rises = []
-    for name in SEARCHES:
-        for words, run in (("all runs", None), ("median run", findings.ssp.median_run(name))):
-            low, high = (findings.ssp.points[name].cheapest_near(SWING_HEIGHT, at, 5e-4, run) for at in (0.015, 0.028))
-            rise = "none found" if math.isnan(high / low) else f"{100 * (high / low - 1):+.0f} %"
-            rises.append(f"{NAMES[name]}, {words} {rise}")
-    return require_change(
-        100 * (ours_steeper - 1),
-        rise=100 * (printed[0.028] / printed[0.015] - 1),
-        steeper=steeper,
-        ours=ours_steeper,
-        found=100 * (ours[0.028] / ours[0.015] - 1),
-        rises="; ".join(rises),
-    )
+    rise, found = (100 * (power[0.028] / power[0.015] - 1) for power in (printed, ours))
+    values = {"rise": rise, "found": found, "steeper": steeper, "rises": _describe_rises(findings, 0.028)}
+    return require_change(100 * (ours_steeper - 1), ours=ours_steeper, **values)
 
 
 def _check_swing_heights(phase: PhaseFindings, swarm: str) -> Check:
-    """Check that a swarm's cheapest solution near each swing height needs less than GA's, in the histories of all runs."""
-    powers = {
-        at: [phase.points[name].cheapest_near(SWING_HEIGHT, at, 5e-4) for name in (swarm, "ga")]
-        for at in PAPER.swing_heights_m
-    }
-    leads = ", ".join(
-        f"{'none found' if math.isnan(ga / pso) else f'{100 * (ga / pso - 1):+.1f} %'} at {at:.3f} m"
-        for at, (pso, ga) in powers.items()
-    )
-    return decide(all(pso < ga for pso, ga in powers.values()), swarm=NAMES[swarm], leads=leads)
+    """Check how much more GA's cheapest solution near each swing height needs than a swarm's, over all runs [%]."""
+    leads = []
+    for at in PAPER.swing_heights_m:
+        pso, ga = (phase.points[name].cheapest_near(SWING_HEIGHT, at, 5e-4) for name in (swarm, "ga"))
+        leads.append(100 * (ga / pso - 1))
+    words = ["none found" if math.isnan(lead) else f"{lead:+.1f} %" for lead in leads]
+    found = ", ".join(f"{word} at {at:.3f} m" for word, at in zip(words, PAPER.swing_heights_m, strict=True))
+    return require_change(leads, swarm=NAMES[swarm], leads=found)
 
 
 def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
     """Check GA's power at 0.024 m above PSO's, as read off the histories of all runs."""
     printed = 100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1)
-    pso, ga = (phase.points[name].cheapest_near(SWING_HEIGHT, 0.024, 5e-4) for name in (swarm, "ga"))
-    middle = [
-        phase.points[name].cheapest_near(SWING_HEIGHT, 0.024, 5e-4, phase.median_run(name)) for name in (swarm, "ga")
-    ]
-    cheapest = ["none" if math.isnan(power) else f"{power:.4f} W" for power in (pso, ga, *middle)]
-    values = {
-        "swarm": NAMES[swarm],
-        "pso": cheapest[0],
-        "ga": cheapest[1],
-        "printed_lead": printed,
-        "middle": cheapest[2:],
-    }
-    if "none" in cheapest:
+    sources = [(name, run) for run in (None, phase.median_run) for name in (swarm, "ga")]
+    powers = [phase.points[at].cheapest_near(SWING_HEIGHT, 0.024, 5e-4, run and run(at)) for at, run in sources]
+    words = ["none" if math.isnan(power) else f"{power:.4f} W" for power in powers]
+    values = {"swarm": NAMES[swarm], "pso": words[0], "ga": words[1], "middle": words[2:]}
+    if "none" in words:
         return decide(Verdict.UNTESTABLE, **values)
-    return compare_changes(printed, 100 * (ga / pso - 1), **values)
+    return compare_changes(printed, 100 * (powers[1] / powers[0] - 1), **values)
 
 
 def _check_swing_range(phase: PhaseFindings, algorithm: str, printed_mm: float) -> Check:
@@ -200,43 +190,33 @@ def _check_swing_range(phase: PhaseFindings, algorithm: str, printed_mm: float) 
     cheap = own & (points.power_W <= 1.03 * points.power_W[own].min())
     start = phase.median(algorithm).x["swing_height_m"]
     ours = 1000 * (float(points.x[cheap, SWING_HEIGHT].max()) - start)
-    return compare_changes(
-        printed_mm, round(ours, 1), search=NAMES[algorithm], ours=ours, start=start, printed=printed_mm
-    )
+    values = {"search": NAMES[algorithm], "ours": ours, "start": start, "printed": printed_mm}
+    return compare_changes(printed_mm, round(ours, 1), **values)
 
 
 def _check_velocity(phase: PhaseFindings, name: str) -> Check:
     printed = PAPER.velocity_ranges[name]
-    symbols = [f"x{i + 1}" for i in printed.variables]
-    names = [phase.problem.names[i] for i in printed.variables]
-    optimum = np.array([phase.optimum.x[name] for name in names])
-    ends = {
-        title: np.array([[run.x[name] for name in names] for run in runs]) for title, runs in phase.searches.items()
-    }
+    symbols = {i: f"x{i + 1}" for i in printed.variables}
+    chosen = list(printed.variables)
+    ends = {title: np.array([[*run.x.values()] for run in runs])[:, chosen] for title, runs in phase.searches.items()}
     inside = {title: (printed.low <= values) & (values <= printed.high) for title, values in ends.items()}
     outside = [
         f"{search.upper()} {symbol} = {optimum.x[i]}"
         for search, optimum in phase.paper.optima.items()
-        for symbol, i in zip(symbols, printed.variables, strict=True)
+        for i, symbol in symbols.items()
         if not printed.low <= optimum.x[i] <= printed.high
     ]
-    near = [
-        f"{symbol} = {best:z.4f} ({f'{low:z.4f} to {high:z.4f}' if math.isfinite(low) else 'no point of the sweep'})"
-        for symbol, best, (low, high) in zip(
-            symbols, optimum, (phase.range_within(i, NEARLY_OPTIMAL) for i in printed.variables), strict=True
-        )
-    ]
-    return decide(
-        bool(np.mean(list(inside.values())) >= MOST),
-        symbols=" and ".join(symbols),
-        low=printed.low,
-        high=printed.high,
-        nearly=100 * NEARLY_OPTIMAL,
-        near=", ".join(near),
-        ends=(min(values.min() for values in ends.values()), max(values.max() for values in ends.values())),
-        within=", ".join(f"{NAMES[title]} {100 * values.mean():.0f} %" for title, values in inside.items()),
-        outside=f" (but {', '.join(outside)} in print)" if outside else "",
-    )
+    near = []
+    for i, symbol in symbols.items():
+        low, high = phase.range_within(i, NEARLY_OPTIMAL)
+        cheap = f"{low:z.4f} to {high:z.4f}" if math.isfinite(low) else "no point of the sweep"
+        near.append(f"{symbol} = {[*phase.optimum.x.values()][i]:z.4f} ({cheap})")
+    within = (f"{NAMES[title]} {100 * values.mean():.0f} %" for title, values in inside.items())
+    texts = {"symbols": " and ".join(symbols.values()), "near": ", ".join(near), "within": ", ".join(within)}
+    texts["outside"] = f" (but {', '.join(outside)} in print)" if outside else ""
+    found = compute_range(np.concatenate(list(ends.values())).ravel())
+    values = {"low": printed.low, "high": printed.high, "nearly": 100 * NEARLY_OPTIMAL, "ends": found}
+    return decide(bool(np.mean(list(inside.values())) >= MOST), **texts, **values)
 
 
 def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
@@ -251,14 +231,16 @@ def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
     return require_significance(check, RANK_SUM, p)
 
 
-def _check_wider(findings: NaoFindings, ranges: Sequence[str], position: int) -> Check:
+def _check_wider(findings: NaoFindings, position: int, ranges: Sequence[str] = ()) -> Check:
+    """Check how much wider a velocity's range of cheap optima is in double support [%]; ``ranges`` are the printed ones."""
     share, printed = 5 * NEARLY_OPTIMAL, [PAPER.velocity_ranges[name] for name in ranges]
     ssp, dsp = (float(np.ptp(phase.range_within(position, share))) for phase in findings.phases)
-    factors = ((printed[1].high - printed[1].low) / (printed[0].high - printed[0].low), dsp / ssp if ssp else math.inf)
-    before, after = (100 * (factor - 1) for factor in factors)
-    return compare_changes(
-        before, after, share=100 * share, ssp=ssp, dsp=dsp, factor=1 + after / 100, printed=1 + before / 100
-    )
+    values = {"share": 100 * share, "ssp": ssp, "dsp": dsp, "factor": dsp / ssp if ssp else math.inf}
+    after = 100 * (values["factor"] - 1)
+    if not printed:
+        return require_change(after, **values)
+    factor = (printed[1].high - printed[1].low) / (printed[0].high - printed[0].low)
+    return compare_changes(100 * (factor - 1), after, **values, printed=factor)
 
 
 def _check_gaps(phase: PhaseFindings) -> Check:
@@ -268,11 +250,10 @@ def _check_gaps(phase: PhaseFindings) -> Check:
     missing = [point.at for point in durations if not point.feasible]
     inside = [at for at in missing if min(feasible) < at < max(feasible)]
     short = [f"{at:.2f}" for at in missing if at < min(feasible)]
-    found = (
-        f"none found at {', '.join(f'{at:.2f}' for at in inside) or 'no duration'} s between {min(feasible):.2f} and "
-        f"{max(feasible):.2f} s ({len(durations)} durations); below, none at {', '.join(short) or 'no duration'} s of the sweep"
-    )
-    return decide(bool(inside), found=found)
+    held = np.sort(np.concatenate([points.x[:, phase.paper.duration] for points in phase.points.values()]))
+    ends = {"first": min(feasible), "last": max(feasible), "count": len(durations), "gap": float(np.diff(held).max())}
+    words = [", ".join(texts) or "none" for texts in ([f"{at:.2f}" for at in inside], short)]
+    return decide(bool(inside), inside=words[0], short=words[1], least=held[0], **ends)
 
 
 def _check_average_speed(phase: PhaseFindings) -> Check:
@@ -323,16 +304,20 @@ def _check_near_zero(phase: PhaseFindings) -> Check:
 
 def _check_positive(phase: PhaseFindings) -> Check:
     """Check how much more the cheapest solutions with a positive lateral velocity cost than the best [%]."""
-    found = {name: points.power_W[points.x[:, 5] > 0] for name, points in phase.points.items()}
-    cheapest = min((float(power.min()) for power in found.values() if len(power)), default=math.nan)
-    share = sum(map(len, found.values())) / sum(len(points.power_W) for points in phase.points.values())
-    change = 100 * (cheapest / phase.best - 1)
-    words = f"the cheapest costs {change:.0f} % more" if share else "none"
-    return require_change(change if share else -math.inf, words=words, share=100 * share)
+    x, power = (
+        np.concatenate([getattr(points, name) for points in phase.points.values()]) for name in ("x", "power_W")
+    )
+    positive = power[x[:, 5] > 0]
+    change = 100 * (positive.min() / phase.best - 1) if len(positive) else -math.inf
+    words = f"the cheapest costs {change:.0f} % more" if len(positive) else "none"
+    return require_change(change, words=words, share=100 * len(positive) / len(power))
 
 
 def _check_faster(findings: NaoFindings) -> Check:
-    """Check how much faster the hip moves forwards in the shortest feasible duration of double than of single support [%]."""
+    """Check how much faster the hip moves forwards in the shortest feasible duration of double than of single support [%].
+
+    There is no verdict if the shortest duration of single support is its bound, not the robot's.
+    """
     speeds, ranges = [], []
     for phase in findings.phases:
         times = [point.at for point in phase.sweeps[phase.paper.duration] if point.feasible]
@@ -340,7 +325,10 @@ def _check_faster(findings: NaoFindings) -> Check:
         speeds.append(float(hip[-1, 0] - hip[0, 0]) / min(times))
         ranges.append(max(times) / min(times))
     change = 100 * (speeds[1] / speeds[0] - 1)
-    return require_change(change, speeds=speeds, ranges=ranges, change=change)
+    check, ssp = require_change(change, speeds=speeds, ranges=ranges, change=change), findings.ssp
+    shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
+    bound = 1.001 * ssp.problem.lower[ssp.paper.duration]
+    return check if shortest > bound else replace(check, verdict=Verdict.UNTESTABLE)
 
 
 def _check_same_median(phase: PhaseFindings, swarm: str) -> Check:

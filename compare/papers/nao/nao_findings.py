@@ -82,10 +82,6 @@ class PhaseFindings:
         """Return the run of median power."""
         return self.searches[algorithm][self.median_run(algorithm)]
 
-    def median_index(self, algorithm: str, name: str) -> float:
-        """Return the median of a performance figure over the final solutions of all runs."""
-        return float(np.median([run.verdict.indexes[name] for run in self.searches[algorithm]]))
-
     @cached_property
     def printed_here(self) -> dict[str, Mapping[str, float]]:
         """Performance figures of the paper's solutions, by search."""
@@ -102,6 +98,11 @@ class PhaseFindings:
     def optimum_with(self, choice: str) -> RunRecord | None:
         """Return IPOPT's best start with another choice; None if it was not solved."""
         return choose_best(self.choice_starts[choice]) if choice in self.choice_starts else None
+
+    @property
+    def lowest_hip_m(self) -> float:
+        """Lowest hip of the sweep for which IPOPT finds a gait [m]."""
+        return min(point.at for point in self.sweeps[0] if point.feasible)
 
     def evaluate_printed(self, **changes: float) -> Mapping[str, float]:
         """Return the performance figures of the paper's PSO solution with other values of some variables, by name."""
@@ -131,6 +132,14 @@ class PhaseFindings:
         found = self.optimum.verdict.objective
         return found if known is None else min(found, known)
 
+    def compute_least_speed(self, x: Mapping[str, float]) -> float:
+        """Return the least forward velocity of the hip in a gait, between the samples too [m/s]."""
+        hip = self.problem.signals(self.problem.check_x(list(x.values()))).arrays["hip"][:, 0]
+        first, last = x["hip_vx_start_m_s"], x["hip_vx_end_m_s"]
+        mean, t = (hip[-1] - hip[0]) / x[self.problem.names[self.paper.duration]], np.linspace(0.0, 1.0, 101)
+        bend = 3 * (first + last - 2 * mean)
+        return float((first + (last - first - bend) * t + bend * t**2).min())
+
     def share_below(self, position: int) -> float:
         """Return how far a feasible solution of a search lies below IPOPT's line at most, relative to it; 0 if none does.
 
@@ -155,6 +164,7 @@ class NaoFindings:
     dsp: PhaseFindings  # double support
     swing: Sequence[SweepPoint]  # IPOPT's optima of single support over the paper's swing heights
     durations: Sequence[SweepPoint]  # likewise over durations
+    other: NaoFindings | None = None  # on another robot
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:

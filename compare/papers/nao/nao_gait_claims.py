@@ -49,11 +49,9 @@ def describe_effect(phase: PhaseFindings, choice: str) -> str:
 
 
 def _check_power(phase: PhaseFindings) -> Check:
-    printed, here = (
-        [o.power_W for o in phase.paper.optima.values()],
-        [h["power_W"] for h in phase.printed_here.values()],
-    )
-    return compare_levels(printed, here, printed=printed, here=here, gap=np.subtract(printed, here))
+    here = [phase.printed_here[name]["power_W"] for name in ALGORITHMS]
+    printed = [phase.paper.optima[name].power_W for name in ALGORITHMS]
+    return compare_levels(printed, here, printed=printed, here=here)
 
 
 def _check_levels(phase: PhaseFindings, indexes: Sequence[str]) -> Check:
@@ -65,18 +63,16 @@ def _check_levels(phase: PhaseFindings, indexes: Sequence[str]) -> Check:
     return compare_levels(printed, here, **values, share=share.max(), gap_mm=1000 * gap.max())
 
 
-def _check_lead(phase: PhaseFindings, indexes: Sequence[str], sign: float) -> Check:
-    """Check by how much PSO's printed solution is above GA's, or below it for a negative sign [mm, to a tenth]."""
+def _check_lead(phase: PhaseFindings, indexes: Sequence[str], sign: float, level: bool = False) -> Check:
+    """Check by how much PSO's printed solution is above GA's, or below it for a negative sign [mm, to a tenth].
+
+    As a level, the sign does not count.
+    """
     optima, here = phase.paper.optima, phase.printed_here
     printed = [1000 * sign * (optima["pso"].indexes[i] - optima["ga"].indexes[i]) for i in indexes]
     ours = np.round([1000 * sign * (here["pso"][i] - here["ga"][i]) for i in indexes], 1)
-    return compare_changes(np.round(printed, 1), ours, printed=printed, ours=ours)
-
-
-def _check_close(phase: PhaseFindings) -> Check:
-    """Check that the least margins of both printed solutions are as near to each other as in print [mm]."""
-    values = _check_lead(phase, ("dbm_x_min_m", "dbm_y_min_m"), -1.0).values
-    return compare_levels(values["printed"], values["ours"], **values)
+    compare = compare_levels if level else compare_changes
+    return compare(np.round(printed, 1), ours, printed=printed, ours=ours)
 
 
 def _check_torque_lead(phase: PhaseFindings) -> Check:
@@ -101,26 +97,21 @@ def _check_more_stable(findings: NaoFindings) -> Check:
 
 
 def _check_lower_hip(findings: NaoFindings, axis: str) -> Check:
-    """Check how much larger a printed gait's least margin is with the hip at its lower bound [mm]."""
-    lowest = findings.ssp.problem.value("hip_height_m.lower")
-    index = f"dbm_{axis}_min_m"
-    ours = [
-        1000 * (phase.evaluate_printed(hip_height_m=lowest)[index] - phase.printed_here["pso"][index])
-        for phase in findings.phases
-    ]
-    return require_change(ours, ours=ours, lowest=lowest)
+    """Check how much larger a printed gait's least margin is with the lowest hip at which IPOPT finds a gait [mm]."""
+    lowest, changes = [], []
+    for phase in findings.phases:
+        lowest.append(phase.lowest_hip_m)
+        low, here = phase.evaluate_printed(hip_height_m=lowest[-1]), phase.printed_here["pso"]
+        changes.append([1000 * (low[index] - here[index]) for index in (f"dbm_{axis}_min_m", f"dbm_{axis}_mean_m")])
+    ours, means = zip(*changes, strict=True)
+    return require_change(ours, ours=ours, means=means, lowest=lowest)
 
 
 def _check_arms(findings: NaoFindings) -> Check:
     """Check how much larger the margins of printed gaits are with the arms' swing than with arms at rest [mm]."""
-    gains = [
-        [1000 * (phase.printed_here["pso"][m] - phase.printed_by_choice["held"]["pso"][m]) for m in MARGINS]
-        for phase in findings.phases
-    ]
-    cost = [
-        100 * (phase.printed_here["pso"]["power_W"] / phase.printed_by_choice["held"]["pso"]["power_W"] - 1)
-        for phase in findings.phases
-    ]
+    pairs = [(phase.printed_here["pso"], phase.printed_by_choice["held"]["pso"]) for phase in findings.phases]
+    gains = [[1000 * (here[index] - held[index]) for index in MARGINS] for here, held in pairs]
+    cost = [100 * (here["power_W"] / held["power_W"] - 1) for here, held in pairs]
     return require_change([max(gain) for gain in gains], gains=gains, cost=cost)
 
 
@@ -144,12 +135,8 @@ def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, floa
 
 def _check_straight(findings: NaoFindings) -> Check:
     """Check how much larger the least margins are without vertical motion of the hip [mm]."""
-    straight = [_straighten(phase) for phase in findings.phases]
-    ours = [
-        1000 * (found[m] - phase.printed_here["pso"][m])
-        for phase, found in zip(findings.phases, straight, strict=True)
-        for m in MARGINS[:2]
-    ]
+    pairs = [(_straighten(phase), phase.printed_here["pso"]) for phase in findings.phases]
+    ours = [1000 * (straight[index] - here[index]) for straight, here in pairs for index in MARGINS[:2]]
     return require_change(ours, ours=ours)
 
 
@@ -174,13 +161,12 @@ def _check_oscillation_torque(findings: NaoFindings) -> Check:
 
 
 def _check_relief(findings: NaoFindings) -> Check:
-    """Check how much less torque knees and ankles need with the hip at its upper than at its lower bound [%, rms]."""
+    """Check how much less torque knees and ankles need with the hip at its upper bound than with the lowest hip [%, rms]."""
     ours = []
     for phase in findings.phases:
         x, ends = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x)), []
-        for end in ("lower", "upper"):
-            at = x | {"hip_height_m": phase.problem.value(f"hip_height_m.{end}")}
-            signals = phase.problem.signals(np.array(list(at.values())))
+        for height in (phase.lowest_hip_m, phase.problem.upper[0]):
+            signals = phase.problem.signals(np.array(list((x | {"hip_height_m": height}).values())))
             kinds = [[name[1:].startswith(kind) for name in signals.joints] for kind in ("Knee", "Ankle")]
             ends.append([float(np.sqrt((signals.arrays["tau"][:, kind] ** 2).mean())) for kind in kinds])
         ours += [100 * (1 - high / low) for low, high in zip(*ends, strict=True)]
@@ -216,15 +202,17 @@ def _check_contradiction(findings: NaoFindings) -> Check:
 
 
 def _check_joints(findings: NaoFindings, kind: str) -> Check:
-    """Check whether a kind of joint has the largest share in the power of PSO's printed solution of single support."""
-    found = {p.paper.title: compute_joint_shares(p.problem, p.paper.optima["pso"].x) for p in findings.phases}
-    words = "; ".join(
-        f"{title}: {', '.join(f'{KINDS.get(k, k)} {100 * share:.0f} %' for k, share in shares.items())}"
-        for title, shares in found.items()
-    )
-    ssp, shares = findings.ssp, found[findings.ssp.paper.title]
-    work = compute_joint_shares(ssp.problem, ssp.paper.optima["pso"].x, heat=False)[kind]
-    return decide(max(shares, key=shares.__getitem__) == kind, shares=words, work=100 * work)
+    """Check whether a kind of joint has the largest share in the power of the printed solutions of single support."""
+    ssp, texts = findings.ssp, []
+    for phase in findings.phases:
+        shares = compute_joint_shares(phase.problem, phase.paper.optima["pso"].x)
+        words = ", ".join(f"{KINDS.get(name, name)} {100 * share:.0f} %" for name, share in shares.items())
+        texts.append(f"{phase.paper.title}: {words}")
+    others = [*(ssp.paper.optima[name].x for name in ALGORITHMS), [*ssp.optimum.x.values()]]
+    every = [compute_joint_shares(ssp.problem, x) for x in others]
+    work = compute_joint_shares(ssp.problem, others[0], heat=False)[kind]
+    values = {"shares": "; ".join(texts), "work": 100 * work, "each": [100 * shares[kind] for shares in every]}
+    return decide([max(shares, key=shares.__getitem__) == kind for shares in every], **values)
 
 
 def _check_stretched(findings: NaoFindings) -> Check:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from compare.analysis.statistics.inference import a12
-from compare.papers.claims import bind_checks
+from compare.analysis.statistics.inference import a12, holm
+from compare.papers.claims import SIGNIFICANT, bind_checks
 from compare.papers.nao import nao_claims, nao_gait_claims
 from compare.papers.nao import nao_runs as nao
 from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
@@ -27,11 +28,14 @@ from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, Task
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solvers import ipopt
+from nlp_gait.files import make_writable_folder
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.robots import load_robot
 from nlp_gait.simulation import simulate
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
 from nlp_gait.simulation.simulate import SETTLE_TIME
+
+MEANS = ("dbm_x_mean_limit_m", "dbm_y_mean_limit_m")
 
 
 def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
@@ -48,8 +52,12 @@ def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
         for phase in PHASES
     )
     special = _solve_sweeps(runner, nao.make_special_sweeps(effort))
+    other = None
+    if effort.other_robot:
+        folder = make_writable_folder(runner.folder / effort.other_robot)
+        other = run_nao(replace(runner, folder=folder), effort.on_other_robot())
     swing, durations = special[nao.SWING_SWEEP], special[nao.DURATION_SWEEP]
-    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations)
+    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations, other=other)
 
 
 def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
@@ -124,7 +132,7 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "nearest": list(findings.torque_changes_Nm)[int(misses.argmin())],
         "nearest_Nm": changes[misses.argmin()],
         "nearest_miss": misses.min(),
-        "candidates": len(changes),
+        "candidates": len(changes) - 1,  # the first is ours
         "bodies": len(load_robot(str(ssp.problem.options["robot"])).links),
         "masses_kg": [load_robot(robot).mass_kg for robot in ("nao-v5", "nao-v6")],
         "simulator": {
@@ -145,8 +153,48 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
             for name, optimum in dsp.paper.optima.items()
             for index in MARGINS
         ),
+        **_compare_verdicts(findings),
+        "bounds": {phase.problem.name[4:]: _list_bounds(phase) for phase in findings.phases},
+        "limits": [ssp.problem.value(name) for name in ("heat_loss_W_per_Nm2", "torque_change_limit_Nm", *MEANS)]
+        + [dsp.problem.value(name) for name in MEANS],
+        "backward": _count_backward(findings),
         "least_margin_mm": 1000 * min(min(m) for phase in findings.phases for m in _list_least_margins(phase)),
     }
+
+
+def _list_bounds(phase: PhaseFindings) -> list[str]:
+    return [f"{row.lower:g} to {row.upper:g} {row.unit}" for row in phase.problem.variables]
+
+
+def _compare_verdicts(findings: NaoFindings) -> dict[str, str]:
+    """Return the rows whose verdict differs on the other robot, and those that Holm's correction of all tests would change."""
+    checks, claims = REPRODUCTION.checks, REPRODUCTION.printed.claims
+    texts = {name: replace(claims[name], detail="") for name in checks}
+    here = {name: check(findings) for name, check in checks.items()}
+    rows = {name: check.apply(texts[name]) for name, check in here.items()}
+    p = {name: float(check.values["p"]) for name, check in here.items() if "p" in check.values}
+    corrected = dict(zip(p, holm([*p.values()]), strict=True))
+    lost = [f"{rows[name].text} (p = {p[name]:.2g})" for name in p if p[name] < SIGNIFICANT <= corrected[name]]
+    found = {"tests": f"{len(p)}", "level": f"{100 * SIGNIFICANT:.0f}", "holm": "; ".join(lost) or "none"}
+    if not findings.other:
+        return found | {"other": "not computed at this effort"}
+    there = {name: check(findings.other).apply(texts[name]) for name, check in checks.items()}
+    changed = [
+        f"{row.text}: {there[name].verdict} {there[name].detail}".rstrip() + f" instead of {row.verdict}"
+        for name, row in rows.items()
+        if there[name].verdict != row.verdict
+    ]
+    return found | {"other": f"{len(changed)} of {len(rows)} verdicts are others: {'; '.join(changed) or 'none'}"}
+
+
+def _count_backward(findings: NaoFindings) -> dict[str, float]:
+    """Count final solutions whose hip moves backwards somewhere; velocities in mm/s."""
+    ends, others = [], []
+    for phase in findings.phases:
+        printed = (phase.problem.by_name(phase.problem.check_x(optimum.x)) for optimum in phase.paper.optima.values())
+        others += [1000 * phase.compute_least_speed(x) for x in (*printed, phase.optimum.x)]
+        ends += [1000 * phase.compute_least_speed(run.x) for runs in phase.searches.values() for run in runs]
+    return {"runs": sum(v < 0 for v in ends), "count": len(ends), "most": max(0.0, -min(ends)), "others": min(others)}
 
 
 def _list_least_margins(phase: PhaseFindings) -> list[tuple[float, float]]:

@@ -60,6 +60,7 @@ class NaoEffort(Effort):
     choice_starts: int = 5  # of IPOPT for each of them
     intervals: int = 10  # between the samples of a phase, as in the paper
     robot: str = "nao-v5"
+    other_robot: str = "nao-v6"  # on which all verdicts are found again, see ``on_other_robot``; none if empty
     sweep_starts: int = 2  # at both ends of a sweep
     sweep_points: tuple[int, int] = (13, 10)  # over the range of all feasible solutions, and of the cheap ones
 
@@ -67,7 +68,14 @@ class NaoEffort(Effort):
     def steps(self) -> int:
         """Runs, two special sweeps and one over each variable, a simulation of each printed solution, and the report."""
         variables, solutions = sum(len(p.optima["pso"].x) for p in PHASES), sum(len(p.optima) for p in PHASES)
-        return len(make_tasks(self)) + 2 + variables + solutions + 1
+        other = self.on_other_robot().steps - 1 if self.other_robot else 0
+        return len(make_tasks(self)) + 2 + variables + solutions + 1 + other
+
+    def on_other_robot(self) -> NaoEffort:
+        """Return the effort on the other robot: all searches, fewer starts of IPOPT and points of its sweeps."""
+        chosen = replace(self, robot=self.other_robot, other_robot="", choices=("v6",), choice_starts=1)
+        fewer = min(3, self.variant_runs), min(8, self.starts)
+        return replace(chosen, variant_runs=fewer[0], starts=fewer[1], sweep_points=(5, 4))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Findings about NAO's walk, and checks of the claims of others against them, by id in ``nao_walk_claims.toml``."""
+"""Findings about NAO's walk, and checks of the claims of others against them: ``nao_walk_claims.toml`` names them."""
 
 from __future__ import annotations
 
@@ -226,15 +226,3 @@ def _list_energies(findings: NaoWalkFindings, energies: Sequence[float | None]) 
 
 def _list_stiffnesses(findings: NaoWalkFindings) -> str:
     return ", ".join(f"{share:g}" for share in findings.effort.stiffnesses)
-
-
-CHECKS = {
-    "knees": _check_knees,
-    "straight": _check_straight,
-    "heat": _check_heat,
-    "efficient": _check_efficient,
-    "robust": _check_robust,
-    "fast": _check_fast,
-    "speed": _check_speed,
-    "battery": _check_battery,
-}

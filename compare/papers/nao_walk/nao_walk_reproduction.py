@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import join_words
 from compare.drawing.figures import COLOURS, new_figure
+from compare.papers.claims import bind_checks
+from compare.papers.nao_walk import nao_walk_claims
 from compare.papers.nao_walk import nao_walk_runs as runs
-from compare.papers.nao_walk.nao_walk_claims import CHECKS, HEATS, NaoWalkFindings
+from compare.papers.nao_walk.nao_walk_claims import HEATS, NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_runs import KINDS, SPECS, SPEED_M_S, NaoWalkEffort, sum_energy
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
@@ -209,5 +211,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    checks=CHECKS,
+    checks=bind_checks("nao_walk/nao_walk_claims.toml", vars(nao_walk_claims)),
 )

@@ -15,7 +15,7 @@ from compare import judge
 from compare.papers.nao import nao_figures, nao_runs
 from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_paper import DSP, PAPER, PHASES, SSP
-from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12
+from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12, compute_values
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.study.record import RunRecord, read_record
 from compare.study.task import ProblemSpec
@@ -129,11 +129,23 @@ def test_an_interrupted_reproduction_continues(finished: Finished) -> None:
 
 def test_the_full_effort_counts_all_its_steps() -> None:
     searches, choices = len(PHASES) * ((3 + 8) * 11 + 3 * 44), 5 * (6 + 7)
-    assert REPRODUCTION.full.steps == searches + len(PHASES) * 20 + choices + 2 + 9 + 8 + 4 + 1
+    other = len(PHASES) * (3 * 11 + 8 * 3 + 3 * 44 + 8 + 1)  # on the other robot
+    assert REPRODUCTION.full.steps == searches + len(PHASES) * 20 + choices + other + 2 * (2 + 9 + 8 + 4) + 1
+
+
+def test_verdicts_on_another_robot_are_compared(finished: Finished) -> None:
+    findings = finished.findings
+    assert compute_values(findings)["other"] == "not computed at this effort"
+    same = compute_values(replace(findings, other=findings))["other"]
+    assert same == f"0 of {len(REPRODUCTION.checks)} verdicts are others: none"
+    lines = [with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0))]
+    changed = compute_values(replace(lines[0], other=lines[1]))["other"]
+    assert f"{REPRODUCTION.printed.claims['higher-hip-ssp'].text}: does not hold instead of holds" in changed
 
 
 def verdict(findings: NaoFindings, name: str) -> str:
-    claim = REPRODUCTION.checks[name](findings).apply(REPRODUCTION.printed.claims[name])
+    """Without the detail that the file gives."""
+    claim = REPRODUCTION.checks[name](findings).apply(replace(REPRODUCTION.printed.claims[name], detail=""))
     return f"{claim.verdict} {claim.detail}".rstrip()
 
 
