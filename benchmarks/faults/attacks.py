@@ -36,7 +36,7 @@ from compare.study.import_runs import import_runs
 from compare.study.record import read_record
 from compare.study.record_files import read_records, write_record
 from compare.study.run_task import try_task
-from compare.study.task import ProblemSpec
+from compare.study.task import ProblemSpec, list_solvers
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import format_csv, remove_leftovers
@@ -246,11 +246,12 @@ def attack_calls(draw: random.Random, folder: Path) -> Attack:
 def attack_limits(draw: random.Random, folder: Path) -> Attack:
     """Run with few files and little memory, and with strange variables of the environment: done, or one sentence."""
     run_program(folder, f"{COMPARE} first --runs 2 --jobs 1")
-    limits = [f"-n {draw.randrange(10, 60)}" for _ in range(6)] + [
-        f"-v {draw.randrange(100, 900) * 1000}" for _ in range(6)
+    limits = [f"-n {draw.randrange(10, 60)}" for _ in range(6)]
+    limits += [
+        f"-v {draw.randrange(least, most) * 1000}" for least, most in [(50, 1048), (1049, 2000)] for _ in range(4)
     ]
-    for limit in limits:
-        done = run_program(folder, f"{COMPARE} first --runs 12 --jobs {draw.randrange(1, 20)}", limit)
+    for number, limit in enumerate(limits):
+        done = run_program(folder, f"{COMPARE} first --runs {3 + number} --jobs {draw.randrange(1, 6)}", limit)
         kept = len(list(folder.glob("first/records/walk12/*.json"))) >= 2
         quiet = done.returncode == 0 or (done.returncode == 1 and done.stderr.count("\n") == 1 and not done.stdout)
         yield (
@@ -272,8 +273,28 @@ def run_program(folder: Path, line: str, limit: str = "", **variables: str) -> s
     """Run a command line in a folder, under a limit of the shell."""
     return subprocess.run(
         ["sh", "-c", f'{limit and f"ulimit {limit};"} exec "$@"', "sh", sys.executable, "-P", "-c", PROGRAM, *line.split()],
-        cwd=folder, env={**os.environ, **variables}, capture_output=True, text=True, errors="replace", timeout=300,
+        cwd=folder, env={**os.environ, **variables}, capture_output=True, text=True, errors="replace", timeout=900,
     )  # fmt: skip
+
+
+def attack_seeds(draw: random.Random, folder: Path) -> Attack:
+    """Run every solver with other jobs, threads and hash seeds, in fresh processes: the runs are equal to the last bit."""
+    seed, searches = draw.randrange(10**6), ",".join(name for name in list_solvers() if name not in ("ipopt", "bayes"))
+    for names, budget, starts in ((searches, 600, 2), ("bayes", 20, 0)):
+        found: list[dict[tuple[str, int], object]] = []
+        for jobs in (1, 2):
+            line = (
+                f"compare nao-ssp --algorithms {names} --starts {starts} --evaluations {budget} --runs 2 --seed {seed}"
+            )
+            threads = {name: str(draw.randrange(1, 5)) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+            run_program(
+                folder, f"{line} --jobs {jobs} --out {jobs}", **threads, PYTHONHASHSEED=str(draw.randrange(10**6))
+            )
+            records = read_records(folder / str(jobs))
+            found.append({(r.solver, r.run): (r.status, r.x, r.history, r.evaluations) for r in records})
+            shutil.rmtree(folder / str(jobs))
+        for key in found[0].keys() | found[1].keys():
+            yield None if found[0].get(key) == found[1].get(key) else f"{key}: {found[0].get(key)}, {found[1].get(key)}"
 
 
 def attack_robots(draw: random.Random, folder: Path) -> Attack:
@@ -336,6 +357,7 @@ ATTACKS: dict[str, Callable[[random.Random, Path], Attack]] = {
     "damaged files of 12 formats": attack_readers,
     "command lines": attack_lines,
     "Python calls and plug-ins": attack_calls,
+    "equal seeds of every solver (A3)": attack_seeds,
     "limits and environments (C5, D)": attack_limits,
     "robot files (B3)": attack_robots,
     "six processes in one folder, rounds (C2)": attack_folders,
