@@ -1,4 +1,4 @@
-"""Gaits as one figure: stick figures from the side, power and balance margin over time."""
+"""Gaits as one figure: the first one from the side, the deviation of the others from it, power and balance margin over time."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ SIDES = COLOURS | {TRUNK: INK}  # the page's ink, light or dark
 POSES = 6
 FAINTEST = 0.25  # opacity of the first pose; the last one has 1
 WIDTH_IN, ROW_IN = 7.4, 2.1
-MOST_BESIDE = 6  # gaits in a row of stick figures
-CURVES = {"power": "mechanical power [W]", "margin": "balance margin [mm]"}
+CURVES = {"deviation": "deviation [mm]", "power": "mechanical power [W]", "margin": "balance margin [mm]"}
 
 
 @lock_casadi
@@ -47,6 +46,7 @@ class GaitCurves:
     t: Array  #: (T,) [s]
     power: Array | None  #: (T,) sum of the joints' |torque x rate| [W]; None for a problem without torques
     margin: Array | None  #: (T,) of ``Skeleton.margin``, in millimetres; None where no instant has one
+    deviation: Array | None = None  #: (T,) see ``measure_deviation``; None for the gait from which the others deviate
 
 
 @lock_casadi
@@ -72,40 +72,48 @@ def plot_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -
 
 
 def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
-    """Plot stick figures of gaits by name and below them the curves of all; raises InputError if there is nothing to draw."""
-    figures = {name: gait.skeleton for name, gait in gaits.items() if gait.skeleton is not None}
-    curves = [c for c in CURVES if any(getattr(gait, c) is not None for gait in gaits.values())]
-    if not figures and not curves:
+    """Plot the first gait from the side, and curves of all by name, with their deviations from the first one.
+
+    Raises:
+        InputError: there is nothing to draw.
+    """
+    name, first = next(iter(gaits.items()))
+    compared = {
+        each: replace(gait, deviation=measure_deviation(gait.skeleton, first.skeleton))
+        if each != name and gait.skeleton is not None and first.skeleton is not None
+        else gait
+        for each, gait in gaits.items()
+    }
+    curves = [c for c in CURVES if any(getattr(gait, c) is not None for gait in compared.values())]
+    count = (first.skeleton is not None) + len(curves)
+    if not count:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
-    look = assign_looks(list(gaits))
+    columns = 2 if len(gaits) > 1 and count > 2 else count
+    rows = -(-count // columns)
     with style():
-        if len(gaits) == 1:
-            figure = new_figure(WIDTH_IN, ROW_IN)
-            axes = list(figure.subplots(1, len(figures) + len(curves), squeeze=False)[0])
-        else:
-            rows = _in_rows(figures)
-            figure = new_figure(WIDTH_IN, ROW_IN * (len(rows) + bool(curves)))
-            parts = figure.subfigures(len(rows) + bool(curves), 1, squeeze=False)[:, 0]
-            axes = []
-            for part, row in zip(parts, rows, strict=False):
-                beside = part.subplots(1, len(rows[0]), squeeze=False, sharey=True)[0]
-                axes += list(beside[: len(row)])
-                for empty in beside[len(row) :]:
-                    empty.set_axis_off()
-            axes += list(parts[-1].subplots(1, len(curves), squeeze=False)[0]) if curves else []
-        for axis, (name, skeleton) in zip(axes, figures.items(), strict=False):
-            _draw_poses(axis, skeleton, name)
-        for axis, curve in zip(axes[len(figures) :], curves, strict=True):
-            _draw_curves(axis, gaits, look, curve)
+        figure = new_figure(WIDTH_IN, ROW_IN * rows)
+        axes = list(figure.subplots(rows, columns, squeeze=False).flat)
+        if first.skeleton is not None:
+            _draw_poses(axes[0], first.skeleton, name)
+        look = assign_looks(list(gaits))
+        for axis, curve in zip(axes[count - len(curves) : count], curves, strict=True):
+            _draw_curves(axis, compared, look, curve)
+        for empty in axes[count:]:
+            empty.set_axis_off()
         if len(gaits) > 1 and curves:
-            add_legend_below(figure, axes[-1])
+            add_legend_below(figure, axes[count - 1])
     return figure
 
 
-def _in_rows(figures: Mapping[str, Skeleton]) -> list[list[str]]:
-    names = list(figures)
-    length = -(-len(names) // max(1, -(-len(names) // MOST_BESIDE)))
-    return [names[i : i + length] for i in range(0, len(names), length)] if names else []
+def measure_deviation(gait: Skeleton, reference: Skeleton) -> Array:
+    """Return (T,) the largest distance of a joint from its place in a reference gait after the same share of the time [mm]."""
+    drawn, planned = (np.concatenate([limb.points for limb in s.limbs], axis=1) for s in (gait, reference))
+    share, steps = ((s.t - s.t[0]) / (s.t[-1] - s.t[0]) for s in (gait, reference))
+    index = np.interp(share, steps, np.arange(len(steps)))
+    low = np.minimum(index.astype(int), len(steps) - 2)
+    weight = (index - low)[:, None, None]
+    expected = (1.0 - weight) * planned[low] + weight * planned[low + 1]
+    return 1000.0 * np.linalg.norm(drawn - expected, axis=2).max(axis=1)
 
 
 def _draw_poses(axes: Axes, skeleton: Skeleton, name: str) -> None:

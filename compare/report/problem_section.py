@@ -27,9 +27,10 @@ HOW = Prose(
     "that can be (extra `sim`) and adds their energy, fate and rank to this report."
 )
 CAPTION = (
-    "Best gait of each solver: six poses at equidistant times, later ones darker (left blue, right orange). Mechanical "
-    "power is the sum of |torque x rate| over the joints. The balance margin is the distance of the zero-moment point from the "
-    "nearest edge of the support polygon, negative outside of it."
+    "Best gait of all, six poses at equidistant times, later ones darker (left blue, right orange), and the best gait of each "
+    "solver beside it. The deviation is the largest distance of a joint from its place in the best gait after the same share of "
+    "the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin is the distance of the "
+    "zero-moment point from the nearest edge of the support polygon, negative outside of it."
 )
 
 
@@ -267,7 +268,7 @@ def engine_section(simulated: Sequence[SimulatedGait]) -> Section | None:
 
 def make_gaits_part(comparison: Comparison) -> Figure | str | None:
     """Return the best gait of each solver as a figure, a sentence if they cannot be drawn, or None without any gait."""
-    best = [solver.best for solver in comparison.solvers]
+    best = [comparison.best, *(solver.best for solver in comparison.solvers)]
     records = [record for record in best if record is not None]
     if not records:
         return None

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.drawing.gait_figure import CURVES
+from compare.drawing.gait_figure import CURVES, measure_deviation
 from compare.report.document import Figure
 from compare.report.problem_section import make_gaits_part
+from nlp_gait.formulation.display import Limb, Skeleton
 from tests.compare.records import DSP_X, record, study
 
 
@@ -21,12 +23,31 @@ def comparison(name: str, x: dict[str, float], *solvers: str) -> Comparison:
 
 
 @pytest.mark.slow
-def test_best_gait_of_each_solver_is_drawn() -> None:
+def test_the_best_gait_is_drawn_and_the_others_as_deviations_from_it() -> None:
     part = make_gaits_part(comparison("nao-dsp", DSP_X, "pso", "ga"))
     assert isinstance(part, Figure) and part.name == "dsp-gaits"
     axes = part.drawing.axes
-    assert {axis.get_title() for axis in axes} >= {"pso", "ga"}
-    assert [len(axis.lines) for axis in axes if axis.get_ylabel() in CURVES.values()] == [2, 2]
+    assert sum(axis.get_title() != "" for axis in axes) == 1
+    curves = {axis.get_ylabel(): axis.lines for axis in axes if axis.get_ylabel() in CURVES.values()}
+    assert [len(lines) for lines in curves.values()] == [1, 2, 2]
+    assert abs(curves[CURVES["deviation"]][0].get_ydata()).max() < 1e-9  # both have the same gait
+
+
+def test_a_gait_shifted_by_a_millimetre_deviates_by_a_millimetre_at_any_speed() -> None:
+    t = np.linspace(0.0, 1.0, 11)
+    points = np.stack([np.stack([t, 0.0 * t, 1.0 - t], axis=1), np.stack([2.0 * t, t, 1.0 + t], axis=1)], axis=1)
+    ground = np.zeros((2, 2))
+    planned = Skeleton(t=t, limbs=(Limb(side="left", points=points),), soles=(), ground=ground)
+    finer = np.interp(np.linspace(0.0, 10.0, 26), np.arange(11), t)
+    moved = np.stack(
+        [
+            np.stack([finer, 0.0 * finer + 1e-3, 1.0 - finer], axis=1),
+            np.stack([2.0 * finer, finer, 1.0 + finer], axis=1),
+        ],
+        axis=1,
+    )
+    slower = Skeleton(t=3.0 + 2.0 * finer, limbs=(Limb(side="left", points=moved),), soles=(), ground=ground)
+    np.testing.assert_allclose(measure_deviation(slower, planned), 1.0, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
