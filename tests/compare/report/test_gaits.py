@@ -11,6 +11,7 @@ from compare.analysis.comparison import Comparison, compare_problems
 from compare.drawing.gait_figure import CURVES, measure_deviation
 from compare.report.document import Figure
 from compare.report.problem_section import make_gaits_part
+from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Limb, Skeleton
 from tests.compare.records import DSP_X, record, study
 
@@ -34,19 +35,13 @@ def test_the_best_gait_is_drawn_and_the_others_as_deviations_from_it() -> None:
 
 
 def test_a_gait_shifted_by_a_millimetre_deviates_by_a_millimetre_at_any_speed() -> None:
-    t = np.linspace(0.0, 1.0, 11)
-    points = np.stack([np.stack([t, 0.0 * t, 1.0 - t], axis=1), np.stack([2.0 * t, t, 1.0 + t], axis=1)], axis=1)
-    ground = np.zeros((2, 2))
-    planned = Skeleton(t=t, limbs=(Limb(side="left", points=points),), soles=(), ground=ground)
-    finer = np.interp(np.linspace(0.0, 10.0, 26), np.arange(11), t)
-    moved = np.stack(
-        [
-            np.stack([finer, 0.0 * finer + 1e-3, 1.0 - finer], axis=1),
-            np.stack([2.0 * finer, finer, 1.0 + finer], axis=1),
-        ],
-        axis=1,
-    )
-    slower = Skeleton(t=3.0 + 2.0 * finer, limbs=(Limb(side="left", points=moved),), soles=(), ground=ground)
+    def walk(t: Array, begin: float, factor: float, shift: float) -> Skeleton:
+        ankle, hip = np.stack([t, 0.0 * t + shift, 1.0 - t], axis=1), np.stack([2.0 * t, t, 1.0 + t], axis=1)
+        limb = Limb(side="left", points=np.stack([ankle, hip], axis=1))
+        line = np.zeros((len(t), 2))
+        return Skeleton(t=begin + factor * t, limbs=(limb,), soles=(), ground=line, com=hip, zmp=line)
+
+    planned, slower = walk(np.linspace(0.0, 1.0, 11), 0.0, 1.0, 0.0), walk(np.linspace(0.0, 1.0, 26), 3.0, 2.0, 1e-3)
     np.testing.assert_allclose(measure_deviation(slower, planned), 1.0, rtol=1e-9)
 
 
