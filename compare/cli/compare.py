@@ -22,7 +22,7 @@ from compare.cli.common import (
     say_error,
     stdout,
 )
-from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
+from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.report import plain_simulations, print_simulations, simulate_best
 from compare.study.settings import SolverSpec, read_settings, resolve_user_code
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
@@ -47,9 +47,7 @@ SESSION_OPTIONS = ("config", "out", "resume", "jobs", "scheduler", "code", "engi
 def compare(
     *,
     context: typer.Context,
-    problems: Annotated[
-        list[str] | None, typer.Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
-    ] = None,
+    problems: list[str] | None = None,
     algorithms: Annotated[
         str,
         typer.Option(
@@ -59,26 +57,18 @@ def compare(
             f"search (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,
-    starts: Annotated[
-        int, typer.Option(min=0, max=100_000, help="Starts of IPOPT and other gradient methods; each is a run.")
-    ] = 20,
+    starts: int = 20,
     searches: SearchOptions,
     options: ProblemOptions,
-    config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead.")] = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for records, report and figures; finished runs in it are reused.")
-    ] = RESULTS,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out.")] = False,
-    jobs: Jobs = None,
-    code: Code = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
-    ] = None,
-    engine: Annotated[
-        bool, typer.Option("--engine", help="Also simulate every solver's best gait in MuJoCo (extra sim).")
-    ] = False,
-    as_csv: AsCsv = False,
-    as_json: AsJson = False,
+    config: Path | None = None,
+    out: Path = RESULTS,
+    resume: bool = False,
+    jobs: int | None = None,
+    code: list[str] | None = None,
+    scheduler: str | None = None,
+    engine: bool = False,
+    as_csv: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
 

@@ -3,44 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
-
-import typer
+from typing import Literal
 
 from compare.cli.command import command
 from compare.cli.common import end_if_excluded, print_result, say, stdout
 from compare.cli.compare import print_summaries, summarise_problems
-from compare.cli.options import RESULTS, AsCsv, AsJson, NamedProblem
-from nlp_gait.columns import MOST
+from compare.cli.options import RESULTS, NamedProblem
 
 
 @command
 def import_results(
     *,
     problem: NamedProblem,
-    finals: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FINALS.csv",
-            help="One row per run: the variables, and where known run, seed, objective, violation, evaluations, time_s.",
-        ),
-    ],
-    history: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.csv", help="Best so far: run, evaluations, objective and optionally time_s."),
-    ] = None,
-    label: Annotated[str, typer.Option("--as", help='Name in the report, for example "GA (MATLAB)".')],
-    evaluations: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            max=MOST,
-            help="Evaluations of every run, if neither file has them; leave it out if they are unknown.",
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of a new or existing study.")] = RESULTS,
-    as_csv: AsCsv = False,
-    as_json: AsJson = False,
+    finals: Path,
+    history: Path | None = None,
+    label: str,
+    evaluations: int | None = None,
+    out: Path = RESULTS,
+    as_csv: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Import results of other programs into a study, judged and reported like all others.
 
@@ -70,14 +51,10 @@ def import_results(
 
 @command
 def logs(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare` or `bench`.")
-    ],
-    to: Annotated[Path, typer.Option("--to", help="Folder for the logs.")],
-    form: Annotated[
-        Literal["ioh", "coco"], typer.Option("--format", help="IOHprofiler's JSON, or COCO-like data.")
-    ] = "ioh",
-    as_json: AsJson = False,
+    folder: Path,
+    to: Path,
+    form: Literal["ioh", "coco"] = "ioh",
+    as_json: bool = False,
 ) -> None:
     """Write a study's runs as logs that iohinspector and IOHanalyzer read.
 

@@ -6,9 +6,7 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import Handling, ProblemSpec, Stop
@@ -18,17 +16,6 @@ from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import allow_code, is_reference
 
-Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
-Code = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--code",
-        metavar="FILE.py:NAME",
-        help="Your code that the file refers to; it runs only if named here; repeatable.",
-    ),
-]
-AsCsv = Annotated[bool, typer.Option("--csv", help="Write all runs and all judged points as CSV files too.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 # Default folder of results.
 RESULTS = Path("results")
 # Options of problems with their own flag.

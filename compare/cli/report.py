@@ -23,7 +23,7 @@ from compare.cli.common import (
     say,
     stdout,
 )
-from compare.cli.options import AsCsv, AsJson, Code, name_all
+from compare.cli.options import name_all
 from compare.cli.simulation_options import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
 from nlp_gait.decoding import read_dataclass
@@ -44,33 +44,18 @@ ENGINE_TABLE = (
 @command
 def report(
     *,
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
-    gradient_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations counted for a first derivative (default n + 1).")
-    ] = None,
-    hessian_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations counted for a Hessian (default (n + 1)(n + 2)/2).")
-    ] = None,
-    engine: Annotated[
-        bool,
-        typer.Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored."),
-    ] = False,
-    latex: Annotated[
-        bool, typer.Option("--latex", help="Also write a table of each problem for papers (LaTeX, package booktabs).")
-    ] = False,
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Also write figures for papers, one column wide, and their captions in LaTeX.")
-    ] = False,
-    style: Annotated[
-        Path | None, typer.Option(metavar="FILE.mplstyle", help="Matplotlib style file for the figures of --pdf.")
-    ] = None,
-    parquet: Annotated[
-        bool, typer.Option("--parquet", help="Also write all runs as runs.parquet (extra parquet).")
-    ] = False,
-    code: Code = None,
+    folder: Path,
+    gradient_weight: float | None = None,
+    hessian_weight: float | None = None,
+    engine: bool = False,
+    latex: bool = False,
+    pdf: bool = False,
+    style: Path | None = None,
+    parquet: bool = False,
+    code: list[str] | None = None,
     drive_options: DriveOptions,
-    as_csv: AsCsv = False,
-    as_json: AsJson = False,
+    as_csv: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
@@ -111,16 +96,9 @@ def report(
 @command
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
-    out: Annotated[
-        Path, typer.Option(help="Folder for the report, its tables and figures; results stored in it are used again.")
-    ],
-    quick: Annotated[
-        bool, typer.Option("--quick", help="The least work that fills every table and figure, instead of the paper's.")
-    ] = False,
-    effort: Annotated[
-        Path | None,
-        typer.Option(help="JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."),
-    ] = None,
+    out: Path,
+    quick: bool = False,
+    effort: Path | None = None,
 ) -> None:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
