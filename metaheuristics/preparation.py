@@ -95,11 +95,7 @@ def fill_fixed(free: Array, lower: Array, upper: Array) -> Array:
 
 
 def check_limits(
-    algorithm: Algorithm,
-    evaluations: int,
-    target: float | None,
-    stagnation: int | None,
-    time_limit_s: float | None,
+    algorithm: Algorithm, evaluations: int, target: float | None, stagnation: int | None, time_limit_s: float | None
 ) -> None:
     """Raise SearchError unless the stopping criteria of `minimize` are allowed; the budget must hold the starting points."""
     if isinstance(algorithm, type) or not (

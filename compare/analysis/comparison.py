@@ -125,10 +125,7 @@ class Comparison:
         return 0.0 if -BETTER <= gap < 0.0 else gap
 
 
-def compare_problems(
-    records: Sequence[RunRecord],
-    weighting: Weighting = DEFAULT_WEIGHTING,
-) -> list[Comparison]:
+def compare_problems(records: Sequence[RunRecord], weighting: Weighting = DEFAULT_WEIGHTING) -> list[Comparison]:
     """Return one comparison per problem among records, in their order; InputError if runs disagree on a problem's objective.
 
     Gaps are measured from the shipped best known value of exactly this problem, else from the best of the records.

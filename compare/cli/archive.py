@@ -12,12 +12,7 @@ from nlp_gait.errors import InputError
 
 
 @command
-def archive(
-    *,
-    folder: Path,
-    out: Path = Path("study.zip"),
-    code: list[str] | None = None,
-) -> None:
+def archive(*, folder: Path, out: Path = Path("study.zip"), code: list[str] | None = None) -> None:
     """Pack a study for others: records, report, user code, robots, certificates, versions, hashes, and how to repeat it.
 
     All records are checked and the report is rewritten first. `nlp-gait verify FILE.zip` checks the archive on any machine.
@@ -39,13 +34,7 @@ def archive(
 
 
 @command
-def verify(
-    *,
-    study: Path,
-    rerun: str = "0%",
-    code: list[str] | None = None,
-    as_json: bool = False,
-) -> None:
+def verify(*, study: Path, rerun: str = "0%", code: list[str] | None = None, as_json: bool = False) -> None:
     """Check a study: evaluate every point again, check histories, hashes, sessions, certificates and, of an archive, the report.
 
     Prints what holds and what does not; the exit status is 1 if anything does not. User code runs only if named with --code.
@@ -81,10 +70,7 @@ def _parse_share(text: str) -> float:
 
 
 @command
-def cite(
-    name: str | None = None,
-    as_json: bool = False,
-) -> None:
+def cite(name: str | None = None, as_json: bool = False) -> None:
     """Print BibTeX for the software, and for the papers and the suite that a problem comes from.
 
     Examples: `nlp-gait cite`, `nlp-gait cite nao-ssp`, `nlp-gait cite ssp-v5`

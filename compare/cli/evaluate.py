@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING
 
 from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
-from compare.cli.common import (
-    fail,
-    print_json,
-    print_result,
-    print_rows,
-    print_table,
-    print_written,
-    stdout,
-)
+from compare.cli.common import fail, print_json, print_result, print_rows, print_table, print_written, stdout
 from compare.cli.options import AnyProblem, parse_values, parse_x
 from compare.cli.outputs import output_file
 from compare.judge import Evaluation

@@ -50,12 +50,7 @@ def import_results(
 
 
 @command
-def logs(
-    folder: Path,
-    to: Path,
-    form: Literal["ioh", "coco"] = "ioh",
-    as_json: bool = False,
-) -> None:
+def logs(folder: Path, to: Path, form: Literal["ioh", "coco"] = "ioh", as_json: bool = False) -> None:
     """Write a study's runs as logs that iohinspector and IOHanalyzer read.
 
     The logs contain the relative gap to the best known objective, and equivalent evaluations.

@@ -14,12 +14,7 @@ SHEET = ".png"  # suffix of a contact sheet
 
 
 @command
-def export(
-    stored: StoredGait,
-    format_: str,
-    out: Path | None = None,
-    period_ms: int = PERIOD_MS,
-) -> None:
+def export(stored: StoredGait, format_: str, out: Path | None = None, period_ms: int = PERIOD_MS) -> None:
     """Write a gait in a format of other tools.
 
     Example: `nlp-gait export best.json --format webots` after `nlp-gait solve nao-ssp --out best.json`
@@ -33,11 +28,7 @@ def export(
 
 
 @command
-def export_objective(
-    instance: str,
-    to: Path,
-    as_json: bool = False,
-) -> None:
+def export_objective(instance: str, to: Path, as_json: bool = False) -> None:
     """Write an instance of GaitBench as plain C++ with a C header, for C, MATLAB, Octave and Julia.
 
     The files need only libc and libm: source, header, build script, an example in C, and callers for the others.
@@ -52,13 +43,7 @@ def export_objective(
 
 
 @command
-def export_solver(
-    to: Path,
-    *,
-    problem: NamedProblem,
-    nl: bool = False,
-    as_json: bool = False,
-) -> None:
+def export_solver(to: Path, *, problem: NamedProblem, nl: bool = False, as_json: bool = False) -> None:
     """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
 
     The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
@@ -78,11 +63,7 @@ def export_solver(
 
 @command
 def animate(
-    stored: StoredGait,
-    out: Path | None = None,
-    frames_per_s: float = 12.5,
-    speed: float = 1.0,
-    poses: int = 6,
+    stored: StoredGait, out: Path | None = None, frames_per_s: float = 12.5, speed: float = 1.0, poses: int = 6
 ) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
 

@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
-from compare.cli.common import (
-    end_interrupted,
-    fail,
-    print_json,
-    print_table,
-    print_written,
-    progress_bar,
-    stdout,
-)
+from compare.cli.common import end_interrupted, fail, print_json, print_table, print_written, progress_bar, stdout
 from compare.cli.options import StoredGait
 from compare.cli.outputs import output_file
 from compare.cli.simulation_options import ConditionOptions, DriveOptions, FilmOptions

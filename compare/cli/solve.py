@@ -74,11 +74,7 @@ def solve(
         )
     proven = guarantee(loaded, loaded.check_x(solution.x)) if solution.feasible else None
     known = find_reference(identify_problem(loaded))
-    data = {
-        **solution.to_json(),
-        "guaranteed": None if proven is None else asdict(proven),
-        **known.to_json(),
-    }
+    data = {**solution.to_json(), "guaranteed": None if proven is None else asdict(proven), **known.to_json()}
     try:  # write before printing: a broken pipe must not lose the file
         if target is not None:
             write_json(target, replace_nan(data))

@@ -73,11 +73,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> 
         except GaitError as error:
             notes.append(f"not simulated: {error}")
     return JudgedGait(
-        recorded=gait,
-        evaluation=evaluate(gait.problem, gait.x),
-        optimum=optimum,
-        engine=engine,
-        notes=tuple(notes),
+        recorded=gait, evaluation=evaluate(gait.problem, gait.x), optimum=optimum, engine=engine, notes=tuple(notes)
     )
 
 

@@ -14,11 +14,7 @@ from compare.analysis.verdict import write_verdict
 from compare.report.document import Document, Section, text_table
 from compare.report.overview_section import make_overview
 from compare.report.problem_section import HOW, problem_section
-from compare.report.provenance import (
-    TERMS,
-    format_settings,
-    make_solver_table,
-)
+from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.study_files import FurtherFiles
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence

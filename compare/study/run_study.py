@@ -211,9 +211,7 @@ def _load_records(study: Study) -> tuple[dict[int, RunRecord], Counter[tuple[str
             outdated[task.problem.title, task.title, describe_differences(other.definition, task.definition())] += 1
     problems = {id(record): study.tasks[index].problem for index, record in records.items()}
     evidence = check_records(
-        list(records.values()),
-        find_problem=lambda record: problems[id(record)].load(),
-        between_samples="none",
+        list(records.values()), find_problem=lambda record: problems[id(record)].load(), between_samples="none"
     )
     for exclusion in evidence.excluded:
         assert exclusion.record is not None  # for the type checker

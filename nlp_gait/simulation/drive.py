@@ -286,7 +286,4 @@ def stall_torque(joint: Joint) -> float:
 
 
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
-DRIVES = {
-    "feed-forward": Drive(),
-    "held": Drive(period_s=0.04, interpolation="held", feed_forward="none"),
-}
+DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}

@@ -186,13 +186,7 @@ def _limit_soles(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any
 
 
 def _limit_rates(
-    plan: Plan,
-    support: Support,
-    instants: Instants,
-    sharing: Sharing,
-    t: Array,
-    knots: int,
-    place: Array,
+    plan: Plan, support: Support, instants: Instants, sharing: Sharing, t: Array, knots: int, place: Array
 ) -> Iterator[Limit]:
     """Yield the limits of the change of each foot's load between knots, and from zero at landing and to zero at lifting."""
     if not math.isfinite(sharing.load_rate_1_s):

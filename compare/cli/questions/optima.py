@@ -7,13 +7,7 @@ from pathlib import Path
 
 from compare.cli.command import command
 from compare.cli.common import print_json, progress_bar, stdout
-from compare.cli.options import (
-    AnyProblem,
-    NamedProblem,
-    NaoPhase,
-    name_all,
-    parse_names,
-)
+from compare.cli.options import AnyProblem, NamedProblem, NaoPhase, name_all, parse_names
 from compare.cli.questions.output import Output
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
@@ -113,13 +107,7 @@ def motions(
 
 
 @command
-def motors(
-    *,
-    starts: int = 10,
-    seed: int = 0,
-    problem: NaoPhase,
-    output: Output,
-) -> None:
+def motors(*, starts: int = 10, seed: int = 0, problem: NaoPhase, output: Output) -> None:
     """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat and rotor of each motor.
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
@@ -130,14 +118,7 @@ def motors(
 
 
 @command
-def prices(
-    *,
-    starts: int = 10,
-    seed: int = 0,
-    checks: int = 3,
-    problem: NamedProblem,
-    output: Output,
-) -> None:
+def prices(*, starts: int = 10, seed: int = 0, checks: int = 3, problem: NamedProblem, output: Output) -> None:
     """Compute what each limit costs the optimum, and which error of masses, lengths or soles would change it most.
 
     Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`

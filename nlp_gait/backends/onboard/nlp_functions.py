@@ -63,10 +63,7 @@ class NlpFunctions:
         self._both = np.concatenate([np.arange(len(row)), above])
         #: (N, N) Hessian of the Lagrangian
         self.hessian = sparse.coo_array(
-            (
-                np.zeros(len(self._both)),
-                (np.concatenate([row, column[above]]), np.concatenate([column, row[above]])),
-            ),
+            (np.zeros(len(self._both)), (np.concatenate([row, column[above]]), np.concatenate([column, row[above]]))),
             shape=(size, size),
         )
 

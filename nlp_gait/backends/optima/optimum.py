@@ -43,9 +43,7 @@ class KktFunctions:
         """(w, p, lam) to the Hessian of L in w, and the Jacobian of the rows in w."""
         w, p, lam = self._symbols()
         return ca.Function(
-            "matrices",
-            [w, p, lam],
-            [ca.jacobian(self.gradient(w, p, lam), w), ca.jacobian(self.values(w, p)[1], w)],
+            "matrices", [w, p, lam], [ca.jacobian(self.gradient(w, p, lam), w), ca.jacobian(self.values(w, p)[1], w)]
         )
 
     @cached_property

@@ -173,11 +173,7 @@ class Body(ABC):
         least, most = {"ssp": (0.4, 4.0), "dsp": (0.2, 2.0)}[phase]
         word = {"ssp": "from lift-off to touch-down", "dsp": "from touch-down to the next lift-off"}[phase]
         return Variable(
-            name=TIMES[phase],
-            unit="s",
-            lower=self.scale_time(least),
-            upper=self.scale_time(most),
-            description=word,
+            name=TIMES[phase], unit="s", lower=self.scale_time(least), upper=self.scale_time(most), description=word
         )
 
     @property

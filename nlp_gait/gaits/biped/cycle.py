@@ -128,10 +128,7 @@ class WalkingCycle:
         jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
         return Assembly(
             objective=mean if self.at_given_speed else energy / step,
-            constraints=(
-                *(row for part in found.values() for row in part.constraints),
-                *self._join(jumps, at),
-            ),
+            constraints=(*(row for part in found.values() for row in part.constraints), *self._join(jumps, at)),
             indexes={
                 "power_W": energy / period,
                 "energy_J_per_m": energy / step,

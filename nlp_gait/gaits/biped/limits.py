@@ -71,14 +71,7 @@ def make_rows(
 
 
 def make_rows_at_samples(
-    name: str,
-    unit: str,
-    values: MX,
-    names: Sequence[str],
-    lower: MX | None,
-    upper: MX | None = None,
-    *,
-    first: int = 0,
+    name: str, unit: str, values: MX, names: Sequence[str], lower: MX | None, upper: MX | None = None, *, first: int = 0
 ) -> Constraint:
     """Make rows of every instant from a matrix (k, n) with a column for each sample, the first of them number ``first``.
 
@@ -151,10 +144,7 @@ class DriveLimits(Limit):
         return (
             make_rows("effort", "Nm", torque, -strongest, strongest, joints, "instant", self._size),
             make_rows("joint_speed", "rad/s", rate, -fastest, fastest, moving, "instant"),
-        ), {
-            "effort_share": ca.mmax(ca.fabs(torque) / strongest),
-            "speed_share": ca.mmax(ca.fabs(rate) / fastest),
-        }
+        ), {"effort_share": ca.mmax(ca.fabs(torque) / strongest), "speed_share": ca.mmax(ca.fabs(rate) / fastest)}
 
 
 class TorqueChange(Limit):

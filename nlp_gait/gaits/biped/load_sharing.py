@@ -259,10 +259,7 @@ class FootLimits(Limit):
             *found,
             make_rows("load_rate", "1/s", ca.vec(ca.vertcat(*rates.values())), -limit, limit, names, "samples"),
             make_rows("switch_load", "1", ends, None, at["switch_load_limit"], feet, over="once"),
-        ), {
-            "load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))),
-            "switch_load": ca.mmax(ends),
-        }
+        ), {"load_rate_1_s": ca.mmax(ca.fabs(ca.vertcat(*rates.values()))), "switch_load": ca.mmax(ends)}
 
 
 ROWS = (("friction", "N", CORNERS), ("pressure", "Nm", CORNERS), ("turning", "Nm", TURNS))

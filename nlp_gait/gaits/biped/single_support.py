@@ -50,12 +50,7 @@ def plan_single_support(
 
 
 def make_single_support_phase(
-    body: Body,
-    step_m: float,
-    splines: Splines,
-    grid: Grid,
-    goal: Goal,
-    derivatives: Derivatives = "analytic",
+    body: Body, step_m: float, splines: Splines, grid: Grid, goal: Goal, derivatives: Derivatives = "analytic"
 ) -> Phase:
     """Return the phase from rest behind the standing foot to rest in front of it, with feet ``step_m`` apart."""
     stance, foot = place_stance(body, step_m), body.robot.feet["left"]

@@ -9,16 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Signals
-from nlp_gait.formulation.display import (
-    LEFT,
-    RIGHT,
-    TRUNK,
-    Limb,
-    Skeleton,
-    Sole,
-    make_flat_skeleton,
-    make_rectangle,
-)
+from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import forward_kinematics

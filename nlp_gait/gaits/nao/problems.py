@@ -15,12 +15,7 @@ from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
-from nlp_gait.gaits.biped.double_support import (
-    hip_ends,
-    make_double_support_phase,
-    place_soles,
-    plan_double_support,
-)
+from nlp_gait.gaits.biped.double_support import hip_ends, make_double_support_phase, place_soles, plan_double_support
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives

@@ -154,9 +154,7 @@ def stairs_ideal(
         assemble=model.assemble,
         grid=Grid(intervals=intervals),
         display=Display(
-            motion=motion,
-            skeleton=skeleton,
-            simulation_model=simulation_model(step_motion, repeats=ends == "rest"),
+            motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion, repeats=ends == "rest")
         ),
         hints=SolverHints(start=start, starts=3, searchable=False),
     )
