@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from nlp_gait.backends.functions.compiled_function import CompiledFunction, compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.onboard.replanner import Replan, Replanner, replanner
+    from nlp_gait.backends.plan_walk import WalkPlan, plan_walk
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
     from nlp_gait.backends.solvers.registry import make_solver
@@ -35,6 +36,8 @@ _LAZY = {
     "compile_function": "nlp_gait.backends.functions.compiled_function:compile_function",
     "IpoptSettings": "nlp_gait.backends.solvers.ipopt:IpoptSettings",
     "Solution": "nlp_gait.formulation.solution:Solution",
+    "WalkPlan": "nlp_gait.backends.plan_walk:WalkPlan",
+    "plan_walk": "nlp_gait.backends.plan_walk:plan_walk",
     "solve": "nlp_gait.backends.solve:solve",
     "Replan": "nlp_gait.backends.onboard.replanner:Replan",
     "Replanner": "nlp_gait.backends.onboard.replanner:Replanner",
@@ -46,12 +49,14 @@ PROBLEMS.update(
     {
         "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
         "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
+        "nao-walk": "nlp_gait.gaits.nao.problems:nao_walk",
         "nao-ssp-free": "nlp_gait.gaits.nao.problems:nao_ssp_free",
         "nao-dsp-free": "nlp_gait.gaits.nao.problems:nao_dsp_free",
         "nao-cycle": "nlp_gait.gaits.nao.problems:nao_cycle",
         "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
         "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
         "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
+        "humanoid-walk": "nlp_gait.gaits.humanoid.problems:humanoid_walk",
         "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
         "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
         "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
@@ -72,9 +77,11 @@ __all__ = [
     "Replan",
     "Replanner",
     "Solution",
+    "WalkPlan",
     "compile_function",
     "compile_objective",
     "load",
+    "plan_walk",
     "problem_names",
     "replanner",
     "solve",

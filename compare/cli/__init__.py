@@ -19,6 +19,7 @@ from compare.cli.evaluate import evaluate
 from compare.cli.exchange import import_results, logs
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
+from compare.cli.plan import plan
 from compare.cli.questions.optima import certainty, motions, motors, prices, robust, sweep
 from compare.cli.questions.pareto import pareto
 from compare.cli.questions.walk import walk
@@ -27,7 +28,7 @@ from compare.cli.simulate import simulate
 from compare.cli.solve import search, solve
 
 PANELS = {
-    "Problems, optima and searches": (list_problems, evaluate, solve, search),
+    "Problems, optima and searches": (list_problems, evaluate, solve, plan, search),
     "Comparison": (compare, import_results, report, reproduce, bench, verify, archive),
     "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
     "Show and share": (simulate, animate, export, logs, export_objective, export_solver, cite),

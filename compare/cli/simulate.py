@@ -84,7 +84,7 @@ def simulate(
         traces = _write_film(film, target, size, list(zip(titles, plans, players, strict=True)))
     else:
         traces = [show_in_window(players[0]) if viewer else players[0]()]
-    measured = [_measure(plan, trace, drive, steps) for plan, trace in zip(plans, traces, strict=True)]
+    measured = [_measure(plan, trace, drive) for plan, trace in zip(plans, traces, strict=True)]
     survival = None
     data = {"schema": 1, **_plain(*measured[0])}
     if film.beside is not None:
@@ -138,17 +138,20 @@ def _write_film(
     return [recording.simulation for recording in recordings]
 
 
-def _measure(plan: Plan, trace: Simulation, drive: Drive, steps: int | None) -> tuple[Measurements, Walk | None]:
+def _measure(plan: Plan, trace: Simulation, drive: Drive) -> tuple[Measurements, Walk | None]:
     from nlp_gait.simulation.measurements import measure, measure_walk
 
-    if steps is None:
+    if plan.steps is None:
         return measure(plan, trace, drive), None
-    walk = measure_walk(plan, trace, drive, steps)
+    walk = measure_walk(plan, trace, drive, plan.steps)
     return walk.measurements, walk
 
 
 def _plain(report: Measurements, walk: Walk | None) -> dict[str, Any]:
-    return {**asdict(report), **({} if walk is None else {"walk": walk.course()})}
+    if walk is None:
+        return asdict(report)
+    whole = {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
+    return {**asdict(report), **whole, "walk": walk.course()}
 
 
 def _print(report: Measurements, survival: Robustness | None) -> None:

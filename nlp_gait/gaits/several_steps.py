@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,11 +34,23 @@ def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.
     """
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
-    image = mirror(cycle, robot)
-    advance, period = np.array([step_length(cycle), 0.0, rise_m]), float(cycle.arrays["t"][-1])
-    parts = [_move(cycle if k % 2 == 0 else image, k * advance, k * period) for k in range(steps)]
-    arrays = {name: np.concatenate([parts[0][name], *(part[name][1:] for part in parts[1:])]) for name in parts[0]}
-    return replace(cycle, arrays=arrays)
+    return join_steps([cycle] * steps, robot, np.array([step_length(cycle), 0.0, rise_m]))
+
+
+def join_steps(steps: Sequence[Signals], robot: Robot, advance: Array) -> Signals:
+    """Return one walk of steps that all start on the left foot at x = 0: every second one is mirrored.
+
+    Each begins ``advance`` (x, y, z) [m] from the previous one, in the mirror image of the state in which that ended.
+    """
+    arrays: dict[str, list[Array]] = {name: [] for name in steps[0].arrays}
+    images: dict[int, Signals] = {}
+    begin = 0.0
+    for k, step in enumerate(steps):
+        side = step if k % 2 == 0 else images.setdefault(id(step), mirror(step, robot))
+        for name, values in _move(side, k * advance, begin).items():
+            arrays[name].append(values if k == 0 else values[1:])
+        begin += float(step.arrays["t"][-1])
+    return replace(steps[0], arrays={name: np.concatenate(parts) for name, parts in arrays.items()})
 
 
 def step_length(cycle: Signals) -> float:

@@ -231,6 +231,7 @@ class Walk:
     heading_deg: float | None  # direction of the torso at the end, positive to the left; None after a fall
     model_J_per_m: float  # energy by the model, mechanical and heat, per planned metre
     engine_J_per_planned_m: float | None  # energy of the drives; None after a fall
+    engine_J: float | None  # energy of the drives; None after a fall
     engine_J_per_m: float | None  # per metre walked; None after a fall or without progress
     measurements: Measurements
 
@@ -254,6 +255,7 @@ def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -
         heading_deg=math.degrees(float(simulation.heading[-1])) if fell is None else None,
         model_J_per_m=measurements.predicted.total_W * plan.duration_s / planned,
         engine_J_per_planned_m=energy / planned if fell is None else None,
+        engine_J=energy if fell is None else None,
         engine_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
         measurements=measurements,
     )

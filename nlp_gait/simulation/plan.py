@@ -130,6 +130,7 @@ class Plan:
     heat_loss: float  #: K [W/(Nm)^2]
     gravity: float  #: [m/s^2]
     ground: tuple[Tread, ...] = ()  #: stairs on the floor, which is at z = 0
+    steps: int | None = None  #: that the motion has; None for one phase or one cycle
     planar: bool = False  #: the robot's root stays in the plane y = 0
 
     @property
@@ -257,5 +258,6 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
         heat_loss=0.0 if model.heat_loss is None else problem.value(model.heat_loss),
         gravity=model.gravity,
         ground=() if model.ground is None else model.ground(at, steps or 1),
+        steps=steps or model.steps,
         planar=model.planar,
     )

@@ -22,6 +22,7 @@ from tests.evaluation import evaluated
 # Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle.
 OTHER: dict[str, Any] = {
     "robot": "nao-v6",
+    "steps": 4,
     "intervals": 12,
     "rotational_inertia": False,
     "step_length_m": 0.07,

@@ -7,7 +7,7 @@ mirror image of the one at the start. So hip, feet and what else is planned have
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from casadi import DM, SX, fmax, vertcat, vertsplit
@@ -61,78 +61,103 @@ class Cycle(NamedTuple):
         )
 
 
+class PhaseMotion(NamedTuple):
+    """A phase of a walk over the left foot: from state to state while the right foot swings, or stands if ``lift`` is None."""
+
+    start: State
+    end: State
+    duration: SX  # [s]
+    right_from: SX  # x of the right foot from the left one [m]
+    right_to: SX  # at the end [m]
+    lift: SX | None = None  # height of the swing [m]
+
+
 def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
     """Return the variables of a cycle; the step length is the last one.
 
     Heights, velocities, swing height and times have the bounds of the phases.
     """
-    height, vz, _, vx, _, vy, _ = body.hip_variables
-    found = []
-    for switch in SWITCHES:
-        at = f"at {switch.replace('_', '-')}"
-        low, high = (round(share * body.leg_length_m, 3) for share in HIP_X_SHARES[switch])
-        table = [
-            ("hip_x", "m", low, high, f"{body.hip_name} ahead of the left foot"),
-            ("hip_y", "m", 0.0, body.feet_y[0], "towards the left foot"),
-            ("hip_z", "m", height.lower, height.upper, f"height of the {body.hip_name}"),
-            ("hip_vx", "m/s", vx.lower, vx.upper, "sagittal velocity"),
-            ("hip_vy", "m/s", vy.lower, vy.upper, "lateral velocity"),
-            ("hip_vz", "m/s", vz.lower, vz.upper, "vertical velocity"),
-        ]
-        for c in body.coordinates:
-            table.append((c.name, "rad", *c.bounds, c.words))
-            table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
-        found += [
-            Variable(
-                name=f"{name}_{switch}_{SUFFIXES[unit]}",
-                unit=unit,
-                lower=lower,
-                upper=upper,
-                description=f"{what}, {at}",
-            )
-            for name, unit, lower, upper, what in table
-        ]
+    found = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
     low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
     return (*found, body.lift_variable, body.make_time_variable("ssp"), body.make_time_variable("dsp"), step)
 
 
+def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
+    """Return the variables of the state at a switch of ``SWITCHES``, whose names contain ``name``."""
+    height, vz, _, vx, _, vy, _ = body.hip_variables
+    at = f"at {name.replace('_', '-')}"
+    low, high = (round(share * body.leg_length_m, 3) for share in HIP_X_SHARES[switch])
+    table = [
+        ("hip_x", "m", low, high, f"{body.hip_name} ahead of the left foot"),
+        ("hip_y", "m", 0.0, body.feet_y[0], "towards the left foot"),
+        ("hip_z", "m", height.lower, height.upper, f"height of the {body.hip_name}"),
+        ("hip_vx", "m/s", vx.lower, vx.upper, "sagittal velocity"),
+        ("hip_vy", "m/s", vy.lower, vy.upper, "lateral velocity"),
+        ("hip_vz", "m/s", vz.lower, vz.upper, "vertical velocity"),
+    ]
+    for c in body.coordinates:
+        table.append((c.name, "rad", *c.bounds, c.words))
+        table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
+    return [
+        Variable(
+            name=f"{what}_{name}_{SUFFIXES[unit]}",
+            unit=unit,
+            lower=lower,
+            upper=upper,
+            description=f"{words}, {at}",
+        )
+        for what, unit, lower, upper, words in table
+    ]
+
+
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     """Return the plans of both phases."""
+
+    def single(at: InstantPoint) -> PhaseMotion:
+        cycle = read_cycle(at, body.coordinates)
+        return PhaseMotion(cycle.lift_off, cycle.touch_down, cycle.single, -cycle.step, cycle.step, cycle.lift)
+
+    def double(at: InstantPoint) -> PhaseMotion:
+        cycle = read_cycle(at, body.coordinates)
+        return PhaseMotion(cycle.touch_down, cycle.end, cycle.double, cycle.step, cycle.step)
+
+    return {"ssp": make_planner(body, single), "dsp": make_planner(body, double)}
+
+
+def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion]) -> Planner:
+    """Return the plan of a phase over the left foot, which stands at x = 0."""
     left, right = body.standing_ankle("L"), body.standing_ankle("R")
     right_y, right_z = body.ankle("R")
 
-    def single(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-        """From lift-off to touch-down over the left foot."""
-        cycle = read_cycle(at, body.coordinates)
-        swing = swing_foot(-cycle.step, cycle.step, right_y, right_z, cycle.lift, cycle.single, phase)
-        hip, angles = between(cycle.lift_off, cycle.touch_down, cycle.single, phase)
-        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": swing}, at[REACH_MARGIN], ops)
+    def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        leg = read(at)
+        if leg.lift is None:
+            foot = right._replace(position=right.position + vertcat(leg.right_to, 0, 0))
+        else:
+            foot = swing_foot(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
+        hip, angles = between(leg.start, leg.end, leg.duration, phase)
+        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, at[REACH_MARGIN], ops)
 
-    def double(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-        """From touch-down to the mirror image of lift-off over both feet."""
-        cycle = read_cycle(at, body.coordinates)
-        ahead = right._replace(position=right.position + vertcat(cycle.step, 0, 0))
-        hip, angles = between(cycle.touch_down, cycle.end, cycle.double, phase)
-        return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": ahead}, at[REACH_MARGIN], ops)
-
-    return {"ssp": single, "dsp": double}
+    return plan
 
 
 def read_cycle(at: InstantPoint, coordinates: Sequence[Coordinate]) -> Cycle:
     """Cycle of the variables."""
-    lift_off, touch_down = (
-        State(
-            vertcat(*(at[f"hip_{axis}_{switch}_m"] for axis in "xyz")),
-            vertcat(*(at[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz")),
-            vertcat(*(at[f"{c.name}_{switch}_rad"] for c in coordinates)),
-            vertcat(*(at[f"{c.rate}_{switch}_rad_s"] for c in coordinates)),
-        )
-        for switch in SWITCHES
-    )
+    lift_off, touch_down = (read_state(at, switch, coordinates) for switch in SWITCHES)
     single, double = (read_duration(at, phase) for phase in TIMES)
     images = DM([c.image for c in coordinates])
     return Cycle(lift_off, touch_down, at[LIFT], single, double, fmax(at[STEP], LEAST_STEP), images)
+
+
+def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> State:
+    """State of the variables whose names contain ``name``."""
+    return State(
+        vertcat(*(at[f"hip_{axis}_{name}_m"] for axis in "xyz")),
+        vertcat(*(at[f"hip_v{axis}_{name}_m_s"] for axis in "xyz")),
+        vertcat(*(at[f"{c.name}_{name}_rad"] for c in coordinates)),
+        vertcat(*(at[f"{c.rate}_{name}_rad_s"] for c in coordinates)),
+    )
 
 
 def between(start: State, end: State, duration: SX, phase: SX) -> tuple[Motion, tuple[Motion, ...]]:

@@ -87,24 +87,37 @@ class Phase:
 
         Finite differences are of the samples themselves, so other phases need analytic derivatives.
         """
+        return self.sample_several([at], ops, phases)[0]
+
+    def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
+        """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
         traces = {name: trace for limit in self.limits for name, trace in limit.traces.items()}
         reads_wrenches = any(limit.reads_wrenches for limit in self.limits)
         if self.derivatives == "analytic":
             reads_motion = self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
             inputs, outputs = self._instant_outputs(ops, reads_motion, reads_wrenches, traces)
-            planned, reach, torque, power, zmp, miss, *rest = self._map_instant(inputs, outputs, at, ops, phases)
-            wrenches, moved, seen = (
-                [rest.pop(0) for _ in range(count)]
-                for count in (len(BOTH_FEET) * reads_wrenches, 3 * reads_motion, len(traces))
-            )
+            found = self._map_instant(inputs, outputs, ats, ops, phases)
         else:
-            q, _, _, hip, planned, reach, world, _, *seen = self._map(self._kinematics(ops, traces), at)
+            q, _, _, hip, planned, reach, world, _, *seen = self._map(self._kinematics(ops, traces), ats)
             n = self.grid.parts + 1
-            miss = MX(0, n)
-            qd, qdd = self._differences(q, at)
+            qd, qdd = self._differences(q, ats[0])
             torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
             wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if reads_wrenches else []
-            power, moved = qd * moving, [q, qd, qdd]
+            found = [planned, reach, torque, qd * moving, zmp, MX(0, n), *wrenches, q, qd, qdd, *seen]
+            reads_motion = True
+        columns = [[part] if len(ats) == 1 else ca.horzsplit(part, part.shape[1] // len(ats)) for part in found]
+        return [
+            self._make_samples(at, [part[k] for part in columns], reads_wrenches, reads_motion, tuple(traces), phases)
+            for k, at in enumerate(ats)
+        ]
+
+    def _make_samples(
+        self, at: Point, found: list[MX], wrenches: bool, motion: bool, traces: tuple[str, ...], phases: MX | None
+    ) -> Samples:
+        planned, reach, torque, power, zmp, miss, *rest = found
+        pushes, moved, seen = (
+            [rest.pop(0) for _ in range(count)] for count in (len(BOTH_FEET) * wrenches, 3 * motion, len(traces))
+        )
         return Samples(
             joints=self.body.joints,
             moving=self.moving,
@@ -117,7 +130,7 @@ class Phase:
             zmp=zmp,
             miss=miss,
             motion=tuple(moved),
-            wrenches=dict(zip(BOTH_FEET, wrenches, strict=False)),
+            wrenches=dict(zip(BOTH_FEET, pushes, strict=False)),
             traces=dict(zip(traces, seen, strict=True)),
         )
 
@@ -149,7 +162,7 @@ class Phase:
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        q, qd, qdd, hip, _, _, world, attitude = self._map(self._exact_kinematics, at)
+        q, qd, qdd, hip, _, _, world, attitude = self._map(self._exact_kinematics, [at])
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
@@ -214,18 +227,18 @@ class Phase:
         return [x, margin, phase], self.plan(at, phase, ops), at
 
     def _map_instant(
-        self, inputs: list[SX], outputs: list[SX], at: Point, ops: Nonsmooth, phases: MX | None
+        self, inputs: list[SX], outputs: list[SX], ats: Sequence[Point], ops: Nonsmooth, phases: MX | None
     ) -> list[Any]:
         """Evaluate one instant at all samples, or at other phases; its open equations become rows of gradient solvers."""
         roots = ops.open_roots()
         if roots is None:
-            return self._map(ca.Function("sample", inputs, simplify(outputs)), at, phases=phases)
-        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), at, phases=phases)
+            return self._map(ca.Function("sample", inputs, simplify(outputs)), ats, phases=phases)
+        (start,) = self._map(ca.Function("start", inputs, simplify([roots.start])), ats, phases=phases)
         tied = ca.Function("sample", [roots.unknowns, *inputs], simplify([roots.residual, *outputs]))
         found: list[Any] = []
 
         def residual(unknowns: MX) -> MX:
-            rows, *rest = self._map(tied, at, unknowns, phases=phases)
+            rows, *rest = self._map(tied, ats, unknowns, phases=phases)
             found.extend(rest)
             return rows
 
@@ -304,8 +317,8 @@ class Phase:
         )
         return [*parts, hip, world], self.loads(now)
 
-    def _map(self, function: ca.Function, at: Point, *columns: MX, phases: MX | None = None) -> list[Any]:
-        """Evaluate a function of columns and (x, margin, phase) at all samples, or at other phases (1, k).
+    def _map(self, function: ca.Function, ats: Sequence[Point], *columns: MX, phases: MX | None = None) -> list[Any]:
+        """Evaluate a function of columns and (x, margin, phase) at all samples, or at other phases (1, k), of each point.
 
         Columns are those of its inputs that differ from sample to sample.
         """
@@ -313,8 +326,9 @@ class Phase:
         last: Any = phases
         if phases is None:
             function, last = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
-        points = [ca.repmat(at.select(self.names).x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n)]
-        return list(function.map(n).call([*columns, *points, last]))
+        points = [[ca.repmat(at.select(self.names).x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), last] for at in ats]
+        inputs = points[0] if len(ats) == 1 else [ca.horzcat(*parts) for parts in zip(*points, strict=True)]
+        return list(function.map(n * len(ats)).call([*columns, *inputs]))
 
     def _differences(self, q: MX, at: Point) -> tuple[MX, MX]:
         """Differentiate sampled angles (m, N + 1) twice: central differences, one-sided at the ends.

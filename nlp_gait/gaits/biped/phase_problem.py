@@ -99,13 +99,15 @@ def make_phase_problem(
     return add_robot(problem, body)
 
 
-def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False) -> GaitProblem:
+def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False, steps: int | None = None) -> GaitProblem:
     """Return the problem with the robot that its gaits are drawn and simulated with.
 
-    ``repeats`` says that a gait is one step, whose mirror image is the next one.
+    ``repeats`` says that a gait is one step, whose mirror image is the next one; ``steps`` are those of a whole walk.
     """
     simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
-    model = SimulationModel(robot=simulated, gravity=body.gravity, heat_loss=HEAT_LOSS.name, repeats=repeats)
+    model = SimulationModel(
+        robot=simulated, gravity=body.gravity, heat_loss=HEAT_LOSS.name, repeats=repeats, steps=steps
+    )
     display = replace(problem.display, robot=body.full, skeleton=body.skeleton, simulation_model=model)
     return replace(problem, display=display)
 

@@ -12,6 +12,7 @@ from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.single_support import plan_single_support
+from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.humanoid.body import make_humanoid
 
 Share = Literal["lever", "free"]
@@ -90,6 +91,29 @@ def humanoid_cycle(
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
+
+
+@maker
+def humanoid_walk(
+    *,
+    robot: str = "nao-v5",
+    steps: int = 10,
+    intervals: int = 10,
+    samples_per_interval: int = 0,
+    drive_limits: bool = True,
+    motors: str = "",
+) -> GaitProblem:
+    """Whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    All inner steps are one cycle, as in ``humanoid-cycle``; its speed may have limits, which are parameters. The feet advance by
+    one step length less than there are steps, because the first and the last one are half steps.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
+    """
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    grid = make_grid("cubic", intervals, samples_per_interval)
+    return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"))
 
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:

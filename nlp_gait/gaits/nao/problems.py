@@ -28,6 +28,7 @@ from nlp_gait.gaits.biped.recorded_cycle import (
 )
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, make_places_function
 from nlp_gait.gaits.biped.single_support import place_stance, plan_single_support
+from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
 from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES, check_step_length
@@ -148,6 +149,37 @@ def nao_cycle(
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
+
+
+@maker
+def nao_walk(
+    *,
+    robot: str = "nao-v5",
+    steps: int = 10,
+    intervals: int = 10,
+    rotational_inertia: bool = True,
+    samples_per_interval: int = 0,
+    motors: str = "",
+) -> GaitProblem:
+    """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    All inner steps are one cycle, as in ``nao-cycle``; its speed may have limits, which are parameters. The feet advance by one
+    step length less than there are steps, because the first and the last one are half steps.
+
+    Args:
+        robot: name or file.
+        steps: swings of a foot, both half steps included.
+        intervals: of each phase.
+        rotational_inertia: False takes every link as a point mass.
+        samples_per_interval: above 1 for a denser grid.
+        motors: features of the real motors; the mean square of a continuous torque is that of each phase.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
+    """
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
+    grid = make_grid("cubic", intervals, samples_per_interval)
+    return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"))
 
 
 @maker

@@ -1,0 +1,190 @@
+"""Plan a whole walk from standing to standing, and say what stops it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.ipopt import IpoptSettings
+from nlp_gait.errors import InputError, check_count
+from nlp_gait.files import replace_nan, write_json
+from nlp_gait.formulation import Array, GaitProblem, Result, load
+from nlp_gait.formulation.solution import ConstraintValue, Solution
+from nlp_gait.gaits.biped.cycle_motion import STEP
+from nlp_gait.gaits.biped.walk import GREATEST_SPEED, LEAST_SPEED
+from nlp_gait.gaits.nao.body import load_nao
+from nlp_gait.progress import Progress, ignore_progress
+
+MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
+FEW_STEPS = 2  # of these, one is a half step at the start, one at the stop
+# Begin of a row's name, the words for it, and what helps.
+REMEDIES = (
+    ("joint_angle", "exceeds its limit", "plan shorter steps or a lower speed"),
+    ("reach", "is too straight or too bent", "plan shorter steps, which let the hip be lower"),
+    ("closure", "does not reach its foot", "plan shorter steps, which let the hip be lower"),
+    (
+        "dbm",
+        "balance margin is too small",
+        "plan a lower speed or shorter steps, or lower the margin's limit with --set",
+    ),
+    ("torque_change", "torque changes too fast", "plan a lower speed, or raise torque_change_limit_Nm with --set"),
+    (
+        "effort",
+        "torque exceeds its limit",
+        "plan a lower speed or shorter steps; the limit is that of the robot's file",
+    ),
+    ("joint_speed", "turns too fast", "plan a lower speed or shorter steps; the limit is that of the robot's file"),
+    ("speed", "of the inner steps is not reached", "plan another speed, or other bounds of times and steps with --set"),
+    ("torque_", "torque exceeds its motor", "plan a lower speed or shorter steps"),
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WalkPlan:
+    """A planned walk."""
+
+    problem: GaitProblem  #: with its values
+    solution: Solution  #: of the solver, judged by the exact functions
+    steps: int  #: swings of a foot, both half steps included
+    distance_m: float  #: that the feet advance
+    duration_s: float  #: of the whole walk
+    energy_J: float  #: of the whole walk
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all limits are satisfied."""
+        return self.solution.feasible
+
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """Sentences that name step, constraint, amount and remedy of the largest violations; empty if feasible."""
+        if self.feasible:
+            return ()
+        return tuple(dict.fromkeys(describe_violation(row, self.steps) for row in self.solution.worst_violations[:5]))
+
+    @property
+    def result(self) -> Result:
+        """The walk as a result, for signals, simulation and export."""
+        return Result(problem=self.problem, x=self.problem.check_x(self.solution.x))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the plan as plain data, from which ``load_result`` reads it."""
+        own = {name: getattr(self, name) for name in ("feasible", "energy_J", "distance_m", "duration_s", "steps")}
+        return {**self.solution.to_json(), **own, "obstacles": list(self.obstacles)}
+
+    def save(self, path: str | Path) -> None:
+        """Write the plan to a JSON file for ``nlp-gait simulate`` and ``export``; raises OutputError."""
+        write_json(Path(path), replace_nan(self.to_json()))
+
+
+def plan_walk(
+    robot: str = "nao-v5",
+    steps: int | None = None,
+    *,
+    speed_m_s: float | None = None,
+    distance_m: float | None = None,
+    intervals: int = 10,
+    values: dict[str, float] | None = None,
+    starts: int = 3,
+    progress: Progress = ignore_progress,
+) -> WalkPlan:
+    """Plan a walk from standing to standing on the flat with least energy per metre.
+
+    Args:
+        robot: name or file; robots of NAO's build swing their arms and have closed-form legs, others are planned as humanoids.
+        steps: swings of a foot, both half steps included; None for 10, or for as many as the distance takes.
+        speed_m_s: of the inner steps; None for the cheapest.
+        distance_m: that the feet advance; None for the cheapest steps.
+        intervals: of each phase.
+        values: parameters and bounds of ``nao-walk`` or ``humanoid-walk``, by name.
+        starts: most start points, until one converges.
+        progress: receives a line about each start.
+
+    Raises:
+        InputError: a number that is not allowed, or a distance that these steps cannot have.
+        GaitError: a robot that cannot walk by these problems.
+    """
+    for name, value in (("speed_m_s", speed_m_s), ("distance_m", distance_m)):
+        if value is not None and not (isinstance(value, (int, float)) and 0.0 < value < math.inf):
+            raise InputError(f"{name} must be a finite number > 0, got {value!r}")
+    name = find_walk(robot)
+    count = 10 if steps is None else check_count("steps", steps, at_least=FEW_STEPS)
+    problem = load(name, robot=robot, steps=count, intervals=intervals)
+    if steps is None and distance_m is not None:
+        natural = problem.by_name(problem.start_point(np.random.default_rng(0)))[STEP]
+        problem = load(name, robot=robot, steps=max(FEW_STEPS, round(distance_m / natural) + 1), intervals=intervals)
+    problem = problem.with_values(**(values or {}))
+    if speed_m_s is not None:
+        problem = problem.with_values(**{LEAST_SPEED: speed_m_s, GREATEST_SPEED: speed_m_s})
+    if distance_m is not None:
+        problem = _fix_step(problem, distance_m)
+    return _solve(problem, starts, progress)
+
+
+def find_walk(robot: str) -> str:
+    """Return the name of the walk's problem: NAO's for robots of its build."""
+    try:
+        load_nao(robot)
+    except InputError:
+        return "humanoid-walk"
+    return "nao-walk"
+
+
+def _fix_step(problem: GaitProblem, distance_m: float) -> GaitProblem:
+    steps = int(problem.options["steps"])
+    step_m, i = distance_m / (steps - 1), problem.names.index(STEP)
+    least, most = float(problem.lower[i]), float(problem.upper[i])
+    if not least <= step_m <= most:
+        fewest, largest = math.ceil(distance_m / most) + 1, math.floor(distance_m / least) + 1
+        remedy = f"use {fewest} to {largest} steps" if FEW_STEPS <= fewest <= largest else "choose another distance"
+        raise InputError(
+            f"{distance_m:g} m in {steps} steps needs steps of {step_m:.3g} m; they are {least:g} to {most:g} m long; {remedy}"
+        )
+    return problem.fix(**{STEP: step_m})
+
+
+def _solve(problem: GaitProblem, starts: int, progress: Progress) -> WalkPlan:
+    rng, best = np.random.default_rng(0), None
+    solver = IpoptSettings(few_rows=False).prepare(problem, solves=MANY_SOLVES)
+    for k in range(check_count("starts", starts)):
+        x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
+        found = solve(problem, x0=x0, solver=solver, workers=1)
+        progress(f"start {k + 1}: {found.status}")
+        if best is None or found.starts[0].rank < best.starts[0].rank:
+            best = found
+        if best.converged:
+            break
+    assert best is not None  # at least one start
+    indexes = build_exact_model(problem).at(problem.check_x(best.x), problem.p).indexes
+    numbers = {name: float(indexes[name]) for name in ("distance_m", "duration_s", "energy_J")}
+    return WalkPlan(problem=problem, solution=best, steps=int(problem.options["steps"]), **numbers)
+
+
+def describe_violation(row: ConstraintValue, steps: int) -> str:
+    """Return a sentence about a violated row of a walk: step, constraint, amount and remedy."""
+    places = {
+        "start_ssp_": "step 1 (half step), single support",
+        "start_dsp_": "step 1 (half step), double support",
+        "stop_ssp_": f"step {steps} (half step), single support",
+        "stop_dsp_": f"after step {steps}, weight shift",
+        "shift_": "before step 1, weight shift",
+        "stand_": "standing",
+        "ssp_": f"steps 2 to {steps - 1}, single support",
+        "dsp_": f"steps 2 to {steps - 1}, double support",
+    }
+    prefix = next((prefix for prefix in places if row.name.startswith(prefix)), "")
+    stem, _, label = row.name.removeprefix(prefix).partition("[")
+    words, remedy = next(
+        ((words, remedy) for begin, words, remedy in REMEDIES if stem.startswith(begin)),
+        ("is violated", "relax it with --set"),
+    )
+    owner = label.rstrip("]").split(",")[0].strip()
+    what = f"{stem} {words}" if not owner or owner.isdigit() else f"{owner} {words}"
+    where = places.get(prefix, f"steps 2 to {steps - 1}")
+    return f"{where}: {what} by {row.violation:.3g} {row.unit} ({row.name}); {remedy}"

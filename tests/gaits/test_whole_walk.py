@@ -1,0 +1,128 @@
+"""Whole walks: continuous from standing to standing, judged by their phases' limits, named where infeasible."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nlp_gait
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, find_walk, plan_walk
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem, load_result
+from nlp_gait.formulation.solution import ConstraintValue
+
+STEPS = 3
+RATES = {"q": "qd", "qd": "qdd"}
+
+
+@pytest.fixture(scope="module")
+def problem() -> GaitProblem:
+    return nlp_gait.load("nao-walk", steps=STEPS)
+
+
+@pytest.fixture(scope="module")
+def x(problem: GaitProblem) -> np.ndarray:
+    return problem.start_point(np.random.default_rng(0))
+
+
+def test_a_walk_begins_and_ends_at_rest_in_the_same_pose(problem: GaitProblem, x: np.ndarray) -> None:
+    arrays = problem.signals(x).arrays
+    for k in (0, -1):
+        np.testing.assert_allclose(arrays["qd"][k], 0.0, atol=1e-9)
+        feet = arrays["left_foot"][k], arrays["right_foot"][k]
+        np.testing.assert_allclose((feet[0] - feet[1])[[0, 2]], 0.0, atol=1e-9)
+    np.testing.assert_allclose(arrays["q"][0], arrays["q"][-1], atol=1e-9)
+    step = dict(zip(problem.names, x, strict=True))["step_length_m"]
+    assert arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0] == pytest.approx((STEPS - 1) * step)
+
+
+def test_neighbouring_phases_share_angles_and_rates(problem: GaitProblem, x: np.ndarray) -> None:
+    """On samples close to each other no angle and no rate of any joint jumps, though accelerations do."""
+    dense = problem.dense(40)
+    arrays = dense.signals(x).arrays
+    t = np.diff(arrays["t"])[:, None]
+    for name, rate in RATES.items():
+        trapezoid = t * (arrays[rate][1:] + arrays[rate][:-1]) / 2
+        jump = np.abs(np.diff(arrays[name], axis=0) - trapezoid).max()
+        largest = np.abs(arrays[rate]).max()
+        assert jump < 0.6 * t.max() * largest  # accelerations jump by at most their largest value between two samples
+
+
+@pytest.mark.slow
+def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
+    found = {}
+    for steps in (3, 8):
+        problem = nlp_gait.load("nao-walk", steps=steps)
+        found[steps] = build_exact_model(problem).at(x, problem.p).indexes
+        signals = problem.signals(x)
+        assert found[steps]["duration_s"] == pytest.approx(signals.arrays["t"][-1])
+    cycle = found[3]["cycle_energy_J_per_m"] * found[3]["distance_m"] / 2
+    assert found[8]["energy_J"] - found[3]["energy_J"] == pytest.approx(5 * cycle)
+
+
+@pytest.mark.slow
+def test_a_plan_is_feasible_and_can_be_saved_and_loaded(tmp_path: Path) -> None:
+    lines: list[str] = []
+    plan = plan_walk("nao-v5", 4, distance_m=0.18, intervals=2, progress=lines.append)
+    assert plan.feasible and plan.solution.converged and not plan.obstacles and lines == ["start 1: converged"]
+    assert plan.distance_m == pytest.approx(0.18, abs=1e-7) and plan.energy_J > 0.0
+    path = tmp_path / "walk.json"
+    plan.save(path)
+    data = json.loads(path.read_text())
+    assert (data["feasible"], data["steps"]) == (True, 4) and data["energy_J"] == plan.energy_J
+    again = load_result(path)
+    assert again.problem.options["steps"] == 4
+    np.testing.assert_array_equal(again.x, plan.result.x)
+
+
+def test_the_robot_decides_which_problem_is_solved() -> None:
+    assert find_walk("nao-v6") == "nao-walk"
+
+
+@pytest.mark.parametrize(
+    ("row", "sentence"),
+    [
+        (
+            "start_ssp_joint_angle[LKneePitch, 3]",
+            "step 1 (half step), single support: LKneePitch exceeds its limit by 0.1 rad",
+        ),
+        ("ssp_dbm_y[4]", "steps 2 to 9, single support: dbm_y balance margin is too small by 0.1 rad"),
+        (
+            "stop_dsp_torque_change[LHipRoll, 2]",
+            "after step 10, weight shift: LHipRoll torque changes too fast by 0.1 rad",
+        ),
+        ("speed", "steps 2 to 9: speed of the inner steps is not reached by 0.1 rad"),
+    ],
+)
+def test_a_violation_names_step_constraint_amount_and_remedy(row: str, sentence: str) -> None:
+    value = ConstraintValue(name=row, value=1.0, lower=None, upper=0.9, violation=0.1, unit="rad")
+    found = describe_violation(value, 10)
+    assert found.startswith(sentence) and row in found and "; " in found
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"steps": 1}, "steps"),
+        ({"steps": 4, "distance_m": 3.0}, r"needs steps of 1 m; they are .* m long; use 26 to 151 steps"),
+        ({"speed_m_s": 0.0}, "speed_m_s must be a finite number > 0, got 0.0"),
+        ({"distance_m": float("nan")}, "distance_m must be a finite number > 0"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused(options: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        plan_walk("nao-v5", **options)  # type: ignore[arg-type]
+
+
+def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
+    row = ConstraintValue(name="ssp_reach[left leg, 3]", value=1.0, lower=None, upper=0.99, violation=0.01, unit="1")
+    x0 = problem.start_point(np.random.default_rng(0))
+    quick = nlp_gait.IpoptSettings(iterations=1, compiled=False, few_rows=False, hessian="limited-memory")
+    solution = nlp_gait.solve(problem, x0=x0, solver=quick)
+    plan = WalkPlan(problem=problem, solution=solution, steps=STEPS, distance_m=1.0, duration_s=1.0, energy_J=1.0)
+    assert not plan.feasible and plan.obstacles
+    assert "left leg is too straight or too bent by 0.01 1" in describe_violation(row, STEPS)
