@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from compare.cli.command import command
 from compare.cli.common import fail, print_json, print_written, say, stdout
-from compare.cli.options import AsJson, parse_values
+from compare.cli.options import parse_values
 from compare.cli.outputs import output_file
 
 
 @command
 def plan(
     *,
-    robot: Annotated[
-        str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file (.json, .urdf, .xml of MuJoCo).")
-    ] = "nao-v5",
-    steps: Annotated[
-        int | None,
-        typer.Option(min=2, max=1000, help="Swings of a foot, both half steps included (default: 10, or by distance)."),
-    ] = None,
-    speed: Annotated[float | None, typer.Option(help="Speed of the inner steps [m/s] (default: the cheapest).")] = None,
-    distance: Annotated[float | None, typer.Option(help="Distance that the feet advance [m].")] = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="NAME=VALUE", help="Parameter or bound of nao-walk or humanoid-walk; repeatable."
-        ),
-    ] = None,
-    starts: Annotated[int, typer.Option(min=1, max=100, help="Most start points, until one converges.")] = 3,
-    out: Annotated[Path | None, typer.Option(help="Write the plan to this JSON file.")] = None,
-    as_json: AsJson = False,
+    robot: str = "nao-v5",
+    steps: int | None = None,
+    speed: float | None = None,
+    distance: float | None = None,
+    values: list[str] | None = None,
+    starts: int = 3,
+    out: Path | None = None,
+    as_json: bool = False,
 ) -> None:
     """Plan a whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 
