@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from casadi import MX
 
+from compare.questions.robust.robust_gait import make_worst_case
 from nlp_gait import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem
-from nlp_gait.formulation.worst_case import make_worst_case
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import Mathematics, row, toy
 
