@@ -26,7 +26,6 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.formulation.assembly import Assembly, Point
-from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Solution
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import average_pressure
