@@ -24,7 +24,7 @@ from compare.cli.common import (
     stdout,
 )
 from compare.cli.options import name_all
-from compare.cli.simulation_options import DriveOptions
+from compare.cli.simulate import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError

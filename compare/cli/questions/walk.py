@@ -7,7 +7,7 @@ from dataclasses import replace
 from compare.cli.command import command
 from compare.cli.options import AnyCycle
 from compare.cli.questions.output import Output
-from compare.cli.simulation_options import DriveOptions
+from compare.cli.simulate import DriveOptions
 
 
 @command

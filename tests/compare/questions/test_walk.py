@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from compare.cli.questions.output import Output
-from compare.cli.simulation_options import DriveOptions
+from compare.cli.simulate import DriveOptions
 from compare.drawing.figures import new_figure
 from compare.questions.question import Work, find
 from compare.questions.sweep import Sweep, SweepPoint, parse_axis
