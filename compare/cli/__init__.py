@@ -11,12 +11,11 @@ from typing import Annotated
 import typer
 
 import nlp_gait
-from compare.cli.archive import archive, cite, verify
 from compare.cli.bench import bench
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
-from compare.cli.exchange import import_results, logs
+from compare.cli.exchange import archive, cite, import_results, logs, verify
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
 from compare.cli.plan import plan
