@@ -11,18 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compare.analysis.best_known import relative_gap
-from compare.analysis.statistics.inference import a12, bootstrap_interval, holm, rank_sum, rank_sum_normal, signed_rank
 from compare.analysis.statistics.run_length import (
     ECDF_TARGETS,
     TARGETS,
     Curve,
     Weighting,
+    a12,
+    bootstrap_interval,
     compute_band,
     ecdf,
     expected_running_time,
     find_best_known,
+    holm,
     make_curve,
     performance_profile,
+    rank_sum,
+    rank_sum_normal,
+    signed_rank,
 )
 from nlp_gait.formulation import Objective
 from tests.compare.records import record
