@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 import nlp_gait
-from compare.analysis.statistics.run_length import rank_sum_normal
+from compare.analysis.record_statistics import rank_sum_normal
 from metaheuristics import ParticleSwarm, minimize
 from metaheuristics.algorithms import particle_swarm
 from metaheuristics.algorithms.genetic import GeneticAlgorithm

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from compare.analysis.statistics.run_length import find_best_known
+from compare.analysis.record_statistics import find_best_known
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT, Handling, ProblemSpec, Stop, Task
 

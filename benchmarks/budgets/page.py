@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.budgets.opponents import LARGEST, OPPONENTS, TARGETS
-from compare.analysis.statistics.run_length import Curve, Weighting, expected_running_time, make_curve
+from compare.analysis.record_statistics import Curve, Weighting, expected_running_time, make_curve
 from compare.drawing.figures import assign_looks, new_figure, save, style, use_log_axes
 from compare.study.record import RunRecord
 from compare.study.task import ProblemSpec

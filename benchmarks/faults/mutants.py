@@ -1,6 +1,6 @@
 """Mutation testing: small errors put into the code one at a time; a test that stands for that code must find each.
 
-    python -m benchmarks.faults.mutants compare/analysis/statistics --tests tests/compare/analysis
+    python -m benchmarks.faults.mutants compare/analysis/record_statistics.py --tests tests/compare/analysis
     python -m benchmarks.faults.mutants --sample 15 [NAME ...]
 
 With ``--sample`` so many mutants are drawn of each module of ``BELONGING``, or of those whose path holds a name, and the tests

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.best_known import ZERO, is_zero, relative_gap
-from compare.analysis.statistics.run_length import (
+from compare.analysis.record_statistics import (
     Curve,
     Weighting,
     expected_running_time,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from compare.analysis.comparison import Comparison, index_solvers
-from compare.analysis.statistics.run_length import tie
+from compare.analysis.record_statistics import tie
 from compare.analysis.units import join_words, percent
 from compare.analysis.verdict import FOUND, SIGNIFICANT, Pair, compare_pairs
 from nlp_gait.backends.identity import SOURCE

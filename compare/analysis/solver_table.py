@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.run_length import TARGETS, bootstrap_interval
+from compare.analysis.record_statistics import TARGETS, bootstrap_interval
 from compare.analysis.units import seconds, with_unit
 from compare.study.record import RunRecord
 

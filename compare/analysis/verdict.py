@@ -9,8 +9,8 @@ from itertools import combinations
 
 from compare.analysis.best_known import describe_bound, relative_gap
 from compare.analysis.comparison import Comparison, SolverRuns
+from compare.analysis.record_statistics import a12, holm, rank_sum, signed_rank
 from compare.analysis.solver_table import count
-from compare.analysis.statistics.run_length import a12, holm, rank_sum, signed_rank
 from compare.analysis.units import join_words, with_unit
 from compare.study.record import RunRecord
 from compare.study.task import FUNCTION

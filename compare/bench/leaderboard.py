@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns, compare_problems, index_solvers
-from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS, a12, holm, rank_sum, signed_rank
+from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, a12, holm, rank_sum, signed_rank
 from compare.bench.baseline import load_baseline
 from compare.study.record import RunRecord
 

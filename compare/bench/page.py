@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from compare.analysis.comparison import Comparison
+from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
-from compare.analysis.statistics.run_length import TARGETS
 from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard
 from compare.drawing.comparison_figures import plot_suite_ecdf

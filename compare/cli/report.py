@@ -69,7 +69,7 @@ def report(
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
     """
     from compare.analysis.comparison import label_editions
-    from compare.analysis.statistics.run_length import Weighting
+    from compare.analysis.record_statistics import Weighting
     from compare.report import FurtherFiles, write_report
     from compare.study.evidence import read_evidence
     from compare.study.settings import read_manifest

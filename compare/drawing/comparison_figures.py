@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
-from compare.analysis.statistics.run_length import ECDF_TARGETS, TARGETS, compute_band, ecdf, performance_profile
+from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, ecdf, performance_profile
 from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE

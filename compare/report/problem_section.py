@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.published import make_published_rows
+from compare.analysis.record_statistics import TARGETS
 from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.analysis.solver_table import HEADER, SolverSummary, count, describe_unknown, format_cells, summarise
-from compare.analysis.statistics.run_length import TARGETS
 from compare.analysis.units import BY_UNIT, heading, seconds
 from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps

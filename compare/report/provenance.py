@@ -9,7 +9,7 @@ from typing import Any
 
 from compare.analysis.best_known import relative_gap
 from compare.analysis.comparison import read_objective
-from compare.analysis.statistics.run_length import find_best_known
+from compare.analysis.record_statistics import find_best_known
 from compare.analysis.units import percent, with_unit
 from compare.report.document import Prose, Table, text_table
 from compare.study.description import describe_solver, list_described_names

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.record_statistics import TARGETS
 from compare.drawing import PAPER_STYLE
 from compare.drawing.comparison_figures import plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.figures import add_styles, check_style, save_pdf

@@ -8,8 +8,8 @@ from pathlib import Path
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
 from compare.analysis.overview import write_overall_verdict
 from compare.analysis.published import write_better_points
+from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
-from compare.analysis.statistics.run_length import Weighting
 from compare.analysis.verdict import write_verdict
 from compare.report.document import Document, Section, text_table
 from compare.report.overview_section import make_overview

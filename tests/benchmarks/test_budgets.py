@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.budgets.opponents import OPPONENTS, TARGETS, tasks_of
 from benchmarks.budgets.page import leaders, price, write_page
-from compare.analysis.statistics.run_length import Curve
+from compare.analysis.record_statistics import Curve
 from compare.study.task import ProblemSpec, check_task
 
 

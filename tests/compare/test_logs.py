@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.statistics.run_length import ecdf
+from compare.analysis.record_statistics import ecdf
 from compare.bench.leaderboard import rank_solvers
 from compare.logs import NOTHING_FEASIBLE, SMALLEST, make_traces, write_coco, write_ioh
 

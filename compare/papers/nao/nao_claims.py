@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from compare.analysis.statistics.run_length import a12, rank_sum_normal
+from compare.analysis.record_statistics import a12, rank_sum_normal
 from compare.papers.claims import (
     Check,
     Verdict,

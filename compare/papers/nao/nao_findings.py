@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.statistics.run_length import RankSum, rank_sum_normal
+from compare.analysis.record_statistics import RankSum, rank_sum_normal
 from compare.papers.nao.nao_paper import PAPER, PrintedPhase
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.papers.paper_runs import choose_best

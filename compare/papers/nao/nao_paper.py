@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from compare.analysis.statistics.run_length import RankSum
+from compare.analysis.record_statistics import RankSum
 from compare.papers.claims import read_printed
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.statistics.run_length import a12, holm
+from compare.analysis.record_statistics import a12, holm
 from compare.papers.claims import SIGNIFICANT, bind_checks
 from compare.papers.nao import nao_claims, nao_gait_claims
 from compare.papers.nao import nao_runs as nao

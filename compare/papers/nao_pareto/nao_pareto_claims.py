@@ -9,7 +9,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from compare.analysis.statistics.run_length import rank_sum
+from compare.analysis.record_statistics import rank_sum
 from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Case, ParetoEffort, Run
 from compare.questions.pareto.competing import CompetingObjective

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compare.analysis.statistics.run_length import rank_sum_normal
+from compare.analysis.record_statistics import rank_sum_normal
 
 SAMPLES = st.lists(st.integers(0, 6), min_size=1, max_size=14)
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compare.analysis.best_known import relative_gap
-from compare.analysis.statistics.run_length import (
+from compare.analysis.record_statistics import (
     ECDF_TARGETS,
     TARGETS,
     Curve,

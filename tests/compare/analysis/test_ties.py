@@ -10,7 +10,7 @@ import pytest
 
 from compare.analysis.best_known import ZERO, relative_gap
 from compare.analysis.comparison import compare_problems
-from compare.analysis.statistics.run_length import tie
+from compare.analysis.record_statistics import tie
 from compare.analysis.units import percent, with_unit
 from compare.analysis.verdict import compare_pairs, write_verdict
 from compare.study.record import RunRecord

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import compare_problems
-from compare.analysis.statistics.run_length import TARGETS
+from compare.analysis.record_statistics import TARGETS
 from compare.bench.baseline import BASELINE, FOLDER, RUNS, list_instances, load_baseline, make_bench_tasks, pack_records
 from compare.bench.leaderboard import rank_solvers
 from compare.bench.page import make_leaderboard_page

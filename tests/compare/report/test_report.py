@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from compare.analysis.comparison import compare_problems
+from compare.analysis.record_statistics import Weighting
 from compare.analysis.solver_table import summarise
-from compare.analysis.statistics.run_length import Weighting
 from compare.report import FurtherFiles, rebuild_report, write_report
 from compare.study.record_files import write_record
 from compare.study.settings import Manifest, Session

@@ -1,1 +1,0 @@
-"""Statistics of records: pure functions of arrays and plain data, each with its source."""
