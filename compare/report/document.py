@@ -62,6 +62,7 @@ class Figure:
     name: str
     caption: str
     drawing: Drawing
+    data: Mapping[str, Any] | None = None  #: from which the page draws an interactive figure; see ``interactive``
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, text_table
+from compare.report.interactive import describe_gaits, describe_runs
 from compare.study.record import RunRecord, load_gait
 from compare.study.simulations import SimulatedGait
 from nlp_gait.errors import GaitError
@@ -27,8 +28,8 @@ HOW = Prose(
     "that can be (extra `sim`) and adds their energy, fate and rank to this report."
 )
 CAPTION = (
-    "Best gait of all, six poses at equidistant times, later ones darker (left blue, right orange), and the best gait of each "
-    "solver beside it. The deviation is the largest distance of a joint from its place in the best gait after the same share of "
+    "Best gait of each solver, left blue, right orange. In the drawing the best of all, six poses at equidistant times, later ones "
+    "darker, and the others beside it. The deviation is the largest distance of a joint from its place in the best gait after the same share of "
     "the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin is the distance of the "
     "zero-moment point from the nearest edge of the support polygon, negative outside of it."
 )
@@ -45,13 +46,20 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
             caption="Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. "
             f"Gaps below {100 * SMALLEST_GAP:g} % are drawn at that value: the solvers' tolerances end near it.",
             drawing=plot_convergence(comparison),
+            data=describe_runs(comparison),
         ),
         Figure(
             name=f"{stem}-runtime",
             caption="Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
             drawing=plot_ecdf(comparison),
+            data={"kind": "runtime", "of": f"{stem}-convergence"},
         ),
-        Figure(name=f"{stem}-final", caption="Gap of every run at its end.", drawing=plot_final_gaps(comparison)),
+        Figure(
+            name=f"{stem}-final",
+            caption="Gap of every run at its end.",
+            drawing=plot_final_gaps(comparison),
+            data={"kind": "final", "of": f"{stem}-convergence"},
+        ),
     )
     gaits = make_gaits_part(comparison)
     where_needed = (
@@ -279,7 +287,12 @@ def make_gaits_part(comparison: Comparison) -> Figure | str | None:
     found = {title: gait for title, gait in gaits.items() if gait is not None}
     if not any(gait.skeleton is not None or gait.power is not None for gait in found.values()):
         return None
-    return Figure(name=f"{make_file_name(comparison.problem)}-gaits", caption=CAPTION, drawing=plot_gaits(found))
+    return Figure(
+        name=f"{make_file_name(comparison.problem)}-gaits",
+        caption=CAPTION,
+        drawing=plot_gaits(found),
+        data=describe_gaits(found),
+    )
 
 
 def _gait(record: RunRecord) -> GaitCurves | None:

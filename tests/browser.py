@@ -1,0 +1,86 @@
+"""A real browser for tests: Chromium, driven by Playwright; tests that need it are skipped where there is none."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+OPTIONS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+SCREENS = {"1280 light": (1280, "light"), "400 dark": (400, "dark")}
+
+
+@dataclass
+class Visit:
+    """An open page, what its console said and what it requested besides itself."""
+
+    page: Any
+    messages: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+
+@contextmanager
+def start_browser() -> Iterator[Any]:
+    """Yield a browser, or skip the test."""
+    if BROWSER is None:
+        pytest.skip("no Chromium here")
+    api = pytest.importorskip("playwright.sync_api", reason="browser tests need Playwright")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=list(OPTIONS))
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def visit(browser: Any, file: Path, screen: str = "1280 light") -> Iterator[Visit]:
+    """Open a file on a screen of ``SCREENS``."""
+    width, scheme = SCREENS[screen]
+    context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    opened = Visit(page=context.new_page())
+    opened.page.on("console", lambda message: opened.messages.append(message.text))
+    opened.page.on("pageerror", lambda error: opened.messages.append(str(error)))
+    opened.page.on("request", lambda request: opened.requests.append(request.url))
+    opened.page.goto(file.as_uri())
+    opened.requests = [url for url in opened.requests if url != file.as_uri() and not url.startswith("data:")]
+    yield opened
+    context.close()
+
+
+def list_wide_parts(page: Any) -> list[str]:
+    """Return the parts of a page that are wider than the screen and do not scroll within themselves."""
+    found: list[str] = page.evaluate(
+        """() => [...document.querySelectorAll("main *")].filter((part) => {
+          const box = part.getBoundingClientRect();
+          if (box.right <= innerWidth + 1 || box.width === 0) return false;
+          for (let up = part.parentElement; up; up = up.parentElement)
+            if (["auto", "scroll", "hidden"].includes(getComputedStyle(up).overflowX) || up.tagName === "svg") return false;
+          return true;
+        }).map((part) => part.outerHTML.slice(0, 120))"""
+    )
+    return found
+
+
+def list_accessibility_faults(page: Any) -> list[str]:
+    """Return what axe finds, serious or critical: contrast, names of controls, alternative texts."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
+    violations = axe.Axe().run(page).response["violations"]
+    return [
+        f"{fault['id']}: {node['html'][:100]}"
+        for fault in violations
+        if fault["impact"] in ("serious", "critical")
+        for node in fault["nodes"][:3]
+    ]

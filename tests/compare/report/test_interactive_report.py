@@ -1,0 +1,184 @@
+"""The report in a real browser: charts answer to hover, zoom and choices, gaits move, all by keyboard, on two screens."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from compare.report import write_report
+from compare.study.manifest import Manifest
+from compare.study.record import RunRecord
+from tests.browser import SCREENS, Visit, list_accessibility_faults, list_wide_parts, start_browser, visit
+from tests.compare.records import DSP_X, record, study
+
+pytestmark = pytest.mark.slow
+CONVERGENCE, FINAL, RUNTIME = "#figure-walk-convergence", "#figure-walk-final", "#figure-walk-runtime"
+GAITS = "#figure-dsp-gaits"
+
+
+def gaits() -> list[RunRecord]:
+    """Two runs with gaits that can be drawn."""
+    stored = {"name": "nao-dsp", "options": {}, "parameters": {}, "sha256": ""}
+    other = DSP_X | {"hip_height_m": 0.30}
+    return [
+        replace(r, x=x, definition={**r.definition, "problem": stored})
+        for solver, x, power in (("pso", DSP_X, 0.5), ("ga", other, 0.6))
+        for r in [record(solver, 0, [(1, 0.9), (50, power)], problem="dsp")]
+    ]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with start_browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Path:
+    folder = tmp_path_factory.mktemp("interactive")
+    write_report(folder, [*study(), *gaits()], Manifest(settings=None, sessions=()))
+    return folder / "report.html"
+
+
+@pytest.fixture
+def opened(browser: Any, report: Path) -> Iterator[Visit]:
+    with visit(browser, report) as found:
+        yield found
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_the_page_fits_is_silent_and_accessible(browser: Any, report: Path, screen: str) -> None:
+    with visit(browser, report, screen) as opened:
+        page = opened.page
+        page.wait_for_selector(f"{CONVERGENCE} .chart path")
+        assert page.evaluate("document.documentElement.scrollWidth") <= SCREENS[screen][0]
+        assert list_wide_parts(page) == []
+        assert list_accessibility_faults(page) == []
+        assert (opened.messages, opened.requests) == ([], [])
+
+
+def test_the_pointer_reads_values(opened: Visit) -> None:
+    """The final value of swarm's first run: 10.05 W, 0.5 % above the best known."""
+    circle = opened.page.locator(f"{FINAL} .chart circle[data-series=swarm]").first
+    circle.hover(force=True)
+    assert opened.page.locator(f"{FINAL} .note").inner_text() == "swarm, run 0: 0.5 %, power [W] 10.05"
+
+
+def test_one_choice_of_solvers_for_all_charts(opened: Visit) -> None:
+    page = opened.page
+    charts = (CONVERGENCE, FINAL, RUNTIME)
+    assert all(page.locator(f"{chart} .chart [data-series=swarm]").count() for chart in charts)
+    page.click("[data-solver=swarm]")
+    assert not any(page.locator(f"{chart} .chart [data-series=swarm]").count() for chart in charts)
+    assert page.get_attribute("[data-solver=swarm]", "aria-pressed") == "false"
+    page.click("[data-solver=swarm]")
+    assert page.locator(f"{RUNTIME} .chart [data-series=swarm]").count()
+
+
+def test_target_and_budget_are_chosen(opened: Visit) -> None:
+    """A hand-made study: of swarm's four runs, two are at 1 % or better (10.1 W) after 400 of 500 evaluations."""
+    page = opened.page
+
+    def last_share() -> str:
+        """Read the last point of swarm by keyboard."""
+        page.locator(f"{RUNTIME} .chart svg").focus()
+        words = page.locator(f"{RUNTIME} .note")
+        page.keyboard.press("ArrowRight")
+        while not words.inner_text().startswith("swarm"):
+            page.keyboard.press("ArrowDown")
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+        return str(words.inner_text())
+
+    page.select_option("text=target", "0.01")
+    assert last_share() == "swarm: 50.0 % within 400"
+    assert page.locator(f"{FINAL} .chart circle[data-series=swarm]").count() == 4
+    page.select_option("text=budget", "0.2")
+    assert page.locator(f"{FINAL} .chart circle[data-series=swarm]").count() == 3  # run 0 had nothing after 100
+
+
+def test_zoom_by_dragging_and_by_keyboard(opened: Visit) -> None:
+    page = opened.page
+    chart = page.locator(f"{CONVERGENCE} .chart svg").first
+    chart.scroll_into_view_if_needed()
+    before = chart.inner_html()
+    box = chart.bounding_box()
+    page.mouse.move(box["x"] + 150, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 300, box["y"] + 200)
+    page.mouse.up()
+    zoomed = chart.inner_html()
+    assert re.sub("clip-[0-9]+", "", zoomed) != re.sub("clip-[0-9]+", "", before)
+    chart.focus()
+    page.keyboard.press("0")
+    assert re.sub("clip-[0-9]+", "", chart.inner_html()) == re.sub("clip-[0-9]+", "", before)
+
+
+def test_gaits_move_pause_and_turn(opened: Visit) -> None:
+    page = opened.page
+    canvas = page.locator(f"{GAITS} canvas")
+    canvas.scroll_into_view_if_needed()
+    page.wait_for_function("Number(document.querySelector('canvas').dataset.time) > 20")
+    page.click(f"{GAITS} .play")
+    picture = "document.querySelector('canvas').toDataURL()"
+    still = page.evaluate(picture)
+    page.wait_for_timeout(100)
+    assert page.evaluate(picture) == still
+    canvas.focus()
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate(picture) != still
+    page.locator(f"{GAITS} input[type=range]").fill("500")
+    assert page.locator(f"{GAITS} .controls output").inner_text() == "0.20 s"  # of 0.4 s
+
+
+def test_a_figure_is_enlarged_and_closed(opened: Visit) -> None:
+    page = opened.page
+    page.click(f"{CONVERGENCE} .enlarge")
+    assert page.locator(CONVERGENCE).bounding_box()["width"] >= 1200
+    page.keyboard.press("Escape")
+    assert page.locator(CONVERGENCE).bounding_box()["width"] < 1200
+
+
+def test_without_javascript_the_drawings_are_shown(browser: Any, report: Path) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(report.as_uri())
+    assert page.locator(f"{CONVERGENCE} .drawing svg").bounding_box()["height"] > 50
+    context.close()
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_tables_sort(browser: Any, report: Path, screen: str) -> None:
+    with visit(browser, report, screen) as opened:
+
+        def sort_by(head: str) -> list[str]:
+            """Click a head of the first table, which a phone does not show; return its column."""
+            column: list[str] = opened.page.evaluate(
+                """(name) => {
+                  const table = document.querySelector("table"), heads = [...table.tHead.rows[0].cells];
+                  const i = heads.findIndex((cell) => cell.textContent === name);
+                  heads[i].querySelector("button").click();
+                  return [...table.tBodies[0].rows].map((row) => row.cells[i].textContent);
+                }""",
+                head,
+            )
+            return column
+
+        up, down = sort_by("median"), sort_by("median")
+        assert up == ["10.000000 W", "10.500000 W", "10.550000 W"] and down == up[::-1]
+        assert sort_by("solver") == ["colony", "newton", "swarm"]
+        assert opened.page.locator("table").first.locator("[aria-sort]").count() == 1
+
+
+def test_what_a_page_loads_is_noticed(browser: Any, report: Path, tmp_path: Path) -> None:
+    """The page's own policy blocks it, with a message on the console: what the first test would see."""
+    probed = tmp_path / "probed.html"
+    image = '<img src="http://127.0.0.1:9/x.png">'
+    probed.write_text(report.read_text(encoding="utf-8").replace("</main>", image + "</main>"), encoding="utf-8")
+    with visit(browser, probed) as opened:
+        assert any("127.0.0.1:9" in message for message in opened.messages)
