@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from compare.report import write_report
-from compare.study.manifest import Manifest
 from compare.study.record import RunRecord
+from compare.study.settings import Manifest
 from tests.browser import SCREENS, Visit, list_accessibility_faults, list_wide_parts, start_browser, visit
 from tests.compare.records import DSP_X, record, study
 
