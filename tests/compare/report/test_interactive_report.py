@@ -157,10 +157,10 @@ def test_tables_sort(browser: Any, report: Path, screen: str) -> None:
     with visit(browser, report, screen) as opened:
 
         def sort_by(head: str) -> list[str]:
-            """Click a head of the first table, which a phone does not show; return its column."""
+            """Click a head of the table of solvers, which a phone does not show; return its column."""
             column: list[str] = opened.page.evaluate(
                 """(name) => {
-                  const table = document.querySelector("table"), heads = [...table.tHead.rows[0].cells];
+                  const table = document.querySelector("section:has(#figure-walk-final) table"), heads = [...table.tHead.rows[0].cells];
                   const i = heads.findIndex((cell) => cell.textContent === name);
                   heads[i].querySelector("button").click();
                   return [...table.tBodies[0].rows].map((row) => row.cells[i].textContent);
@@ -172,7 +172,7 @@ def test_tables_sort(browser: Any, report: Path, screen: str) -> None:
         up, down = sort_by("median"), sort_by("median")
         assert up == ["10.000000 W", "10.500000 W", "10.550000 W"] and down == up[::-1]
         assert sort_by("solver") == ["colony", "newton", "swarm"]
-        assert opened.page.locator("table").first.locator("[aria-sort]").count() == 1
+        assert opened.page.locator("section:has(#figure-walk-final) table").first.locator("[aria-sort]").count() == 1
 
 
 def test_what_a_page_loads_is_noticed(browser: Any, report: Path, tmp_path: Path) -> None:
