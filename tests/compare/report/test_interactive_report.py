@@ -160,7 +160,8 @@ def test_tables_sort(browser: Any, report: Path, screen: str) -> None:
             """Click a head of the table of solvers, which a phone does not show; return its column."""
             column: list[str] = opened.page.evaluate(
                 """(name) => {
-                  const table = document.querySelector("section:has(#figure-walk-final) table"), heads = [...table.tHead.rows[0].cells];
+                  const table = document.querySelector("section:has(#figure-walk-final) table");
+                  const heads = [...table.tHead.rows[0].cells];
                   const i = heads.findIndex((cell) => cell.textContent === name);
                   heads[i].querySelector("button").click();
                   return [...table.tBodies[0].rows].map((row) => row.cells[i].textContent);
