@@ -28,8 +28,9 @@ HOW = Prose(
     "that can be (extra `sim`) and adds their energy, fate and rank to this report."
 )
 CAPTION = (
-    "Best gait of each solver, left blue, right orange. In the drawing the best of all, six poses at equidistant times, later ones "
-    "darker, and the others beside it. The deviation is the largest distance of a joint from its place in the best gait after the same share of "
+    "Best gait of each solver, left blue, right orange. In the drawing the best of all, six poses at equidistant times, later "
+    "ones darker, and the others beside it. The deviation is the largest distance of a joint from its place in the best gait "
+    "after the same share of "
     "the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin is the distance of the "
     "zero-moment point from the nearest edge of the support polygon, negative outside of it."
 )
