@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.statistics.run_length import ECDF_TARGETS, Curve
+from compare.analysis.record_statistics import ECDF_TARGETS, Curve
 from compare.drawing.comparison_figures import SMALLEST_GAP
 from compare.drawing.figures import Look, assign_looks
 from compare.drawing.gait_figure import GaitCurves
