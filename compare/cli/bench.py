@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
@@ -32,6 +33,7 @@ def bench(
     families: str | None = None,
     seeds: str = "0:5",
     against: str = RIVALS,
+    audit: bool = False,
     label: str = "",
     runs: int = RUNS,
     evaluations: int = EVALUATIONS,
@@ -47,7 +49,7 @@ def bench(
 
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
     `nlp-gait bench --algorithm my.py:MyAlgo --families walk12-long,ssp --seeds 0:5 --out DIR`,
-    `nlp-gait bench --algorithm pso --label pso-again`
+    `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`
     """
     from compare.bench.baseline import list_instances
     from compare.bench.leaderboard import rank_solvers
@@ -57,6 +59,11 @@ def bench(
     from compare.study.run_study import Study, check_study, run_study
     from nlp_gait.backends.kernel.compiled import available_cores
 
+    if audit:
+        if algorithm is None:
+            raise InputError("--audit examines one search: name it with --algorithm")
+        _audit(algorithm, as_json)
+        return
     chosen = choose_instances(suite, instances, families, seeds)
     shipped = evaluations == EVALUATIONS and set(chosen) <= set(list_instances())
     label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
@@ -116,3 +123,28 @@ def bench(
         ],
     }
     print_result(as_json, data, written, tables)
+
+
+def _audit(algorithm: str, as_json: bool) -> None:
+    """Audit a search and print what was found."""
+    from compare.bench.audit import INSTANCES, audit_search
+    from compare.study.task import check_task
+
+    task = make_bench_tasks(INSTANCES[:1], algorithm)[0]
+    if not task.is_search:
+        raise InputError(f"--audit examines searches, and {algorithm} uses gradients; choose a search")
+    check_task(task)
+    with progress_bar("audit", len(INSTANCES) + 1) as advance:
+        found = audit_search(task.make_search(), progress=advance)
+    rows = [(e.change, e.verdict, f"{e.a12:.2f}", f"{e.p:.2g}") for e in found.effects]
+
+    def tables() -> None:
+        print_table(f"{task.title}: gait problems in other places of the box", ("change", "result", "A12", "p"), rows)
+        stdout.print(
+            f"on noise, {100 * found.edge:.1f} % of the variables end at a bound (unbiased: 0 %), {100 * found.middle:.0f} % in "
+            "the middle 10 % of their ranges (unbiased: 10 %)"
+        )
+        stdout.print("; ".join(found.accusations) or "no bias found")
+
+    effects = [{**asdict(effect), "verdict": effect.verdict} for effect in found.effects]
+    print_result(as_json, {**asdict(found), "effects": effects, "accusations": list(found.accusations)}, (), tables)
