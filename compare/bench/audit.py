@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import metaheuristics
-from compare.analysis.statistics.inference import a12, holm
+from compare.analysis.record_statistics import a12, holm
 from metaheuristics.interface import Algorithm
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
