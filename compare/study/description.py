@@ -12,9 +12,8 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-import metaheuristics
 from compare.study.task import list_solvers
-from metaheuristics.multi_objective import FRONT_ALGORITHMS
+from metaheuristics.registry import ADAPTERS, ALGORITHMS, FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 from nlp_gait.decoding import decode
 from nlp_gait.errors import unknown
@@ -53,7 +52,7 @@ def list_described_names() -> tuple[str, ...]:
 
 def describe_solver(name: str) -> Description:
     """Return the description of a solver by its name, as ``nlp-gait list`` shows it."""
-    factory: Any = {**metaheuristics.ALGORITHMS, **metaheuristics.ADAPTERS, **FRONT_ALGORITHMS, **SOLVERS}[name]
+    factory: Any = {**ALGORITHMS, **ADAPTERS, **FRONT_ALGORITHMS, **SOLVERS}[name]
     bound = factory.keywords if isinstance(factory, partial) else {}
     kind: Any = factory.func if isinstance(factory, partial) else factory
     # A class may inherit the documentation of its settings and its source.

@@ -10,7 +10,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH
 from nlp_gait.decoding import decode
@@ -20,6 +19,7 @@ from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.gaitbench.generated import is_generated
+from nlp_gait.gaitbench.instance import load as load_instance
 from nlp_gait.proofs.certificate import load_certificates, proven_bound
 from nlp_gait.providers import PROBLEMS
 
@@ -116,7 +116,7 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
 @cache
 def _find_generated(id: str) -> Reference:
     """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
-    instance = gaitbench.load(id)
+    instance = load_instance(id)
     sign = instance.gait_problem.objective.sign
     source = f"generated with {instance.evidence}"
     return Reference(objective=sign * instance.best_known, x=tuple(instance.best_x.tolist()), source=source)
