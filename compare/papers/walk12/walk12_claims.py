@@ -285,11 +285,7 @@ def _check_share(_: Walk12Findings, name: str) -> Check:
 
 
 def _check_circle(findings: Walk12Findings, degrees: float) -> Check:
-    robot, turn, x = (
-        load_point_mass_biped(),
-        math.radians(degrees),
-        np.array(get_point(findings.optimum(PAPER, 0.9))),
-    )
+    robot, turn, x = (load_point_mass_biped(), math.radians(degrees), np.array(get_point(findings.optimum(PAPER, 0.9))))
     arrays = compute_steps(robot, x, steps=90, intervals=2, turn_rad=turn).arrays
     prints = np.unique(np.round(arrays["left_ankle"][arrays["left_stance"] == 1.0][:, :2], 7), axis=0)
     radii = np.linalg.norm(prints - prints.mean(axis=0), axis=1)

@@ -26,16 +26,7 @@ from compare.papers.walk12.walk12_findings import (
     compute_straightest_knee,
     list_rounded,
 )
-from compare.papers.walk12.walk12_paper import (
-    CHANGES,
-    F1MAX,
-    F2MAX,
-    SHARES,
-    TABLE_3,
-    TABLE_4,
-    PaperRow,
-    find_row,
-)
+from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
 from compare.papers.walk12.walk12_step_time_claims import list_f1max
 from compare.papers.walk12.walk12_walks import DRIVES, PERTURBATION_RAD, WALKED_STEPS, WalkedGait

@@ -11,14 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.paper_runs import (
-    Effort,
-    Runs,
-    choose_best,
-    make_computation,
-    make_search_tasks,
-    make_start_tasks,
-)
+from compare.papers.paper_runs import Effort, Runs, choose_best, make_computation, make_search_tasks, make_start_tasks
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
 from compare.papers.walk12.walk12_walks import simulate_walks
 from compare.study.store import Computation

@@ -135,9 +135,7 @@ def test_the_full_effort_counts_all_its_steps() -> None:
 
 def test_verdicts_on_another_robot_are_compared(finished: Finished) -> None:
     findings = finished.findings
-    assert compute_values(findings)["other"] == "not computed at this effort"
-    same = compute_values(replace(findings, other=findings))["other"]
-    assert same == f"0 of {len(REPRODUCTION.checks)} verdicts are others: none"
+    assert "verdicts are others" not in finished.report and "not computed at this effort" in finished.report
     lines = [with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0))]
     changed = compute_values(replace(lines[0], other=lines[1]))["other"]
     assert f"{REPRODUCTION.printed.claims['higher-hip-ssp'].text}: does not hold instead of holds" in changed
