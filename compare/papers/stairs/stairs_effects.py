@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
+from compare.papers.paper_runs import choose_best
 from compare.papers.stairs.stairs_choices import CHOICES, OURS, PLAN_CHOICES, PRINTED
 from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_4
 from compare.papers.stairs.stairs_planning import PLANS, describe_plan, list_choice_plans, move
-from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings
+from compare.papers.stairs.stairs_runs import ACO, DRAWN_CASE, StairsFindings
 from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, centres, points
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 
 INERTIAS = (0.0, 1.0, 2.0)  # as multiples of those of slender rods
@@ -31,12 +33,19 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
     motions = {what: move(findings, what, DRAWN_CASE) for what in PLANS}
     moments = {what: [_change_inertia(motions[what][0].arrays, share) for share in INERTIAS] for what in PLANS}
     learned = [findings.others[f"learned-{case}"] for case in cases]
+    planned = {name or OURS: _describe_plans(findings, name) for name in ("", *PLAN_CHOICES)}
     return {
         "inertia_J": {what: _join(energy for energy, _ in rows) for what, rows in moments.items()},
         "inertia_mm": {what: _join(margin for _, margin in rows) for what, rows in moments.items()},
-        "edge_mm": {what: _join(_measure_depth(findings, what, setback) for setback in SETBACKS) for what in PLANS},
-        "zmp_gap_mm": {what: _join(_measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
-        "start_m_s": _join(_measure_start(findings, case) for case in cases),
+        "edge_mm": {
+            what: _join(measure_depth(findings, what, DRAWN_CASE, setback) for setback in SETBACKS) for what in PLANS
+        },
+        "zmp_gap_mm": {what: _join(measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
+        "start_m_s": _join(measure_hip_speeds(findings, "jerk", case)[0] for case in cases),
+        "centre_mm": {what: _join(_measure_centre(findings, what, case) for case in cases) for what in PLANS},
+        "search_gap": max(
+            _measure_search_gap(findings, case, name) for case in cases for name in findings.effort.choices
+        ),
         "turn_rad": {name: _join(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
         "learned": [_join(row[name] for row in learned) for name in LEARNED],
         "first": [_join(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
@@ -45,7 +54,8 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
             for solver in findings.track_solvers
         },
         "printed_effort": ANTS * ITERATIONS,
-        "planned": {name or OURS: _describe_plans(findings, name) for name in ("", *PLAN_CHOICES)},
+        "planned": planned,
+        "plan_effect": {name: _compare_texts(text, planned[OURS]) for name, text in planned.items()},
         "tracked": {name: _describe_step(findings, name) for name in CHOICES},
     }
 
@@ -55,8 +65,13 @@ def _describe_plans(findings: StairsFindings, name: str) -> str:
         return NOT_COMPUTED
     found = {what: describe_plan(findings, what, name) for what in list_choice_plans(name)}
     return ", ".join(
-        f"no {NAMES[what]} found" if "(" in text else f"{text} {PLANS[what]}" for what, text in found.items()
+        f"no {NAMES[what]} {text.removeprefix('none ')}" if "(" in text else f"{text} {PLANS[what]}"
+        for what, text in found.items()
     )
+
+
+def _compare_texts(changed: str, ours: str) -> str:
+    return f"case {DRAWN_CASE}: {'unchanged' if changed == ours else f'{changed} instead of {ours}'}"
 
 
 def _describe_step(findings: StairsFindings, name: str) -> str:
@@ -81,16 +96,16 @@ def _change_inertia(arrays: Mapping[str, Array], share: float) -> tuple[float, f
     return float(np.trapezoid(power, arrays["t"])), 1e3 * float(margin)
 
 
-def _measure_depth(findings: StairsFindings, what: str, setback: float) -> float:
-    """Return how deep ankle, sole or toe of the swing foot are in steps whose edges are elsewhere [mm]."""
-    tread, rise = TABLE_4[DRAWN_CASE].step_m
-    signals, legs = move(findings, what, DRAWN_CASE)
-    x, z = np.moveaxis(legs[RIGHT][signals.arrays["t"] > findings.best(what, DRAWN_CASE).x["t2_s"], 2:5], -1, 0)
+def measure_depth(findings: StairsFindings, what: str, case: int, setback: float) -> float:
+    """Return how deep ankle, sole or toe of the swing foot are in steps with such edges [mm]."""
+    tread, rise = TABLE_4[case].step_m
+    signals, legs = move(findings, what, case)
+    x, z = np.moveaxis(legs[RIGHT][signals.arrays["t"] > findings.best(what, case).x["t2_s"], 2:5], -1, 0)
     ground = rise * (1.0 * (x >= -setback) + (x >= tread - setback) - 1.0)
     return round(1e3 * float((ground - z).max()), 1) + 0.0
 
 
-def _measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
+def measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
     """Return the largest distance of the ZMP of (49) from the planned one of (22) [mm]."""
     arrays, x = move(findings, what, case)[0].arrays, findings.best(what, case).x
     share, (tread, _) = arrays["t"] / arrays["t"][-1], TABLE_4[case].step_m
@@ -98,10 +113,25 @@ def _measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
     return 1e3 * float(np.abs(arrays["zmp"][:, 0] + tread - planned).max())
 
 
-def _measure_start(findings: StairsFindings, case: int) -> float:
-    """Return the speed of the hip at the start of the plan of least jerk [m/s]."""
-    arrays = move(findings, "jerk", case)[0].arrays
-    return float((arrays["hip"][1, 0] - arrays["hip"][0, 0]) / arrays["t"][1])
+def measure_hip_speeds(findings: StairsFindings, what: str, case: int) -> tuple[float, float]:
+    """Return the forward speeds of the hip at the start and the end of a plan [m/s]."""
+    arrays = move(findings, what, case)[0].arrays
+    rates = np.diff(arrays["hip"][:, 0])[[0, -1]] / np.diff(arrays["t"])[[0, -1]]
+    return float(rates[0]), float(rates[1])
+
+
+def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
+    """Return how far the centre of gravity of all links is below the hip at the start of a plan [mm]."""
+    rods, angles = toe_foot_biped().rods, move(findings, what, case)[0].arrays["link_q"][0]
+    place = points(rods, ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
+    moment = sum(rods[link].mass * float(middle[1]) for link, middle in centres(place).items())
+    return 1e3 * (float(place["H"][1]) - moment / toe_foot_biped().mass_kg)
+
+
+def _measure_search_gap(findings: StairsFindings, case: int, name: str) -> float:
+    """Return by how much a reading's own search is above what a narrower one found [%]."""
+    own, best = choose_best(findings.runs[f"track-{case}-{name}", ACO]), get_best(findings, case, name)
+    return 100 * (own.verdict.objective / best.verdict.objective - 1)
 
 
 def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:

@@ -33,15 +33,13 @@ from nlp_gait.gaits.stairs.stair import GRAVITY
 
 PLANS = {"jerk": "rad/s^3", "plan": "J"}  # of least jerk, of least energy; unit of what is least
 INDEXES = {"jerk": "peak_jerk_rad_s3", "plan": "energy_J"}
+CLIMBS = ("ideal", "plan", "jerk")  # simulated
 DENSITY = 5  # samples of a drawn or judged plan, as a multiple of the problem's own
 TORQUE_WEIGHT, ACCELERATION_WEIGHT = 0.01, 1e-3  # of the effort that ``stairs-ideal`` minimises
 
 
 def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
-    """Yield plans under every choice, and in each case with the paper's hip height, an upright torso or a reverse double support.
-
-    And floors of the effort.
-    """
+    """Yield plans under every choice, and in each case the paper's hip height, an upright torso, a reverse double support."""
     effort = findings.effort
     for name in effort.plan_choices:
         choice = PLAN_CHOICES[name]
@@ -62,7 +60,6 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
         yield from make_start_tasks(make_plan_spec(effort, case, "hip"), effort.hip_starts, settings=settings)
         yield _make_task(make_plan_spec(effort, case, "landing"), findings.best("jerk", case), settings)
         yield _make_task(make_plan_spec(effort, case, "upright"), findings.best("plan", case), settings)
-        yield from make_start_tasks(_make_floor_spec(findings, case), 1, settings=settings)
 
 
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
@@ -90,15 +87,6 @@ def make_first_spec(findings: StairsFindings, case: int) -> ProblemSpec:
     return replace(spec, values={**spec.values, **ends})
 
 
-def _make_floor_spec(findings: StairsFindings, case: int) -> ProblemSpec:
-    """Return the ideal whose ends move and whose rear foot lifts when that of the plan does."""
-    times = findings.best("plan", case).x
-    spec = make_ideal_spec(findings.effort, case).with_options(
-        ends="moving", sole_off_s=round(times["t1_s"], 2), toe_off_s=round(times["t2_s"], 2)
-    )
-    return replace(spec, label=f"floor-{case}")
-
-
 def load_spec(findings: StairsFindings, what: str, case: int) -> ProblemSpec:
     """Return the problem of a plan: ``plan``, ``jerk``, ``landing`` or ``first``."""
     return make_first_spec(findings, case) if what == "first" else make_plan_spec(findings.effort, case, what)
@@ -124,7 +112,7 @@ def _move(findings: StairsFindings, what: str, case: int) -> tuple[Signals, dict
 def make_planning_computations(findings: StairsFindings) -> Iterator[Computation]:
     """Yield simulations of the ideal and of both plans."""
     for case in findings.cases:
-        for what in ("ideal", *PLANS):
+        for what in CLIMBS:
             spec = make_ideal_spec(findings.effort, case) if what == "ideal" else load_spec(findings, what, case)
             x = get_point(findings.best(what, case))
             yield make_computation(f"climb-{what}-{case}", spec, partial(simulate_climb, spec), x=x)
@@ -164,7 +152,6 @@ def make_planning_tables(findings: StairsFindings) -> dict[str, Rows]:
         "plan-choices": [_list_choice(findings, name) for name in ("", *findings.effort.plan_choices)],
         "steps": [_list_step(findings, case, what) for case in findings.cases for what in ("first", "landing", "jerk")],
         "ideal": [_list_ideal(findings, case) for case in findings.cases],
-        "energies": [_list_energies(findings, case) for case in findings.cases],
     }
 
 
@@ -207,42 +194,22 @@ def _list_step(findings: StairsFindings, case: int, what: str) -> list[Value]:
     speeds = [
         float((arrays["hip"][i + 1, 0] - arrays["hip"][i, 0]) / (arrays["t"][i + 1] - arrays["t"][i])) for i in (0, -2)
     ]
-    others = [
-        1e3 * indexes["zmp_margin_min_m"],
-        indexes["energy_J"],
-        indexes["peak_jerk_rad_s3"],
-        indexes["peak_torque_Nm"],
-    ]
-    return [case, names[what], verdict.feasible, *others, *speeds]
+    others = [indexes[name] for name in ("energy_J", "peak_jerk_rad_s3", "peak_torque_Nm")]
+    margin = 1e3 * indexes["zmp_margin_min_m"]
+    return [case, names[what], verdict.feasible, margin, *others, *speeds]
 
 
 def _list_ideal(findings: StairsFindings, case: int) -> list[Value]:
-    found, ideal, floor = (
-        findings.runs[f"ideal-{case}", IPOPT],
-        findings.best("ideal", case),
-        findings.best("floor", case),
-    )
-    every = ", ".join(f"{run.verdict.objective:.3f}" if run.claimed else "failed" for run in found)
-    floor_effort = floor.verdict.objective if floor.claimed else None
-    return [case, ideal.verdict.objective, every, floor_effort, *_efforts(findings, case).values()]
-
-
-def _efforts(findings: StairsFindings, case: int) -> dict[str, float]:
-    """Efforts of both plans and of the best tracked step."""
-    found = {}
-    for what in ("plan", "jerk"):
+    """Efforts and energies of the ideal, both plans and the tracked step, and what becomes of the former in the engine."""
+    runs = [findings.best(what, case) for what in CLIMBS]
+    efforts, energies = [runs[0].verdict.objective], [run.verdict.indexes["energy_J"] for run in runs]
+    for what in CLIMBS[1:]:
         arrays = move(findings, what, case)[0].arrays
-        found[what] = compute_effort(arrays["t"], arrays["tau"], arrays["link_qdd"])
-    track = make_track_spec(case, findings.plan(case)).load()
-    arrays = track.signals(get_point(findings.best_track(case))).arrays
+        efforts.append(compute_effort(arrays["t"], arrays["tau"], arrays["link_qdd"]))
+    step = findings.best_track(case)
+    arrays = make_track_spec(case, findings.plan(case)).load().signals(get_point(step)).arrays
     acceleration = np.gradient(arrays["link_qd"][:, :7], arrays["t"], axis=0)
-    return {**found, "track": compute_effort(arrays["t"], arrays["tau"], acceleration)}
-
-
-def _list_energies(findings: StairsFindings, case: int) -> list[Value]:
+    efforts.append(compute_effort(arrays["t"], arrays["tau"], acceleration))
     weight = toe_foot_biped().mass_kg * GRAVITY * TABLE_4[case].step_m[1]
-    runs = [findings.best(what, case) for what in ("plan", "jerk", "ideal")]
-    energies = [run.verdict.indexes["energy_J"] for run in runs]
-    track = findings.best_track(case).verdict.indexes["energy_J"]
-    climbs = [describe_climb(findings.others[f"climb-{what}-{case}"]) for what in ("plan", "jerk", "ideal")]
-    return [case, weight, *energies, track, *climbs]
+    climbs = [describe_climb(findings.others[f"climb-{what}-{case}"]) for what in CLIMBS]
+    return [case, *efforts, weight, *energies, step.verdict.indexes["energy_J"], *climbs]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -63,11 +61,16 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
         "toe_jump_mm": 1e3 * lift[1],  # (eq. 16) with theta_6 = 0
         "raised_toe_mm": 1e3 * (lift[1] + robot.foot_m * math.sin(toe)),  # with theta_6 = theta_b
         "third_point_mm": 1e3 * math.dist(points[2], points[3] - catch * slope),
-        "arc_m": tread / math.sin(2 * math.atan2(rise, tread)),  # (eq. 25)
+        "arc_m": (arc := tread / math.sin(2 * math.atan2(rise, tread))),  # (eq. 25)
+        "sagitta_mm": 1e3 * arc * (1 - math.cos(math.atan2(rise, tread))),  # from the arc to its chord
     }
 
 
-def list_equations(places: Iterable[str]) -> list[int]:
-    """Return the numbers of the equations that places such as "(3), (4)" and "(15)-(20)" name."""
-    pairs = [pair for place in places for pair in re.findall(r"\((\d+)\)(?:-\((\d+)\))?", place)]
-    return sorted({number for first, last in pairs for number in range(int(first), int(last or first) + 1)})
+def measure_slide(tread: float, rise: float) -> float:
+    """Return how deep the printed ankle is inside the first step of a flat stair at its edge, by (8), (9) [mm]."""
+    past = tread - SETBACK - max(2 * tread - math.pi * rise, 0.0)  # of the cycloid, at the edge
+    angles = np.linspace(0.0, math.pi, 100_001)
+    angle = float(np.interp(past, rise * (angles - np.sin(angles)), angles))
+    lift = toe_foot_biped().toe_m * math.sin(TABLE_3["toe_angle_rad"])
+    flat = math.pi * rise < 2 * tread
+    return 1e3 * max(rise - lift - rise * (1 - math.cos(angle)), 0.0) * flat

@@ -15,10 +15,8 @@ from compare.papers.stairs import stairs_plan_claims as plan_claims
 from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs import stairs_tracking as tracking
-from compare.papers.stairs.stairs_choices import OURS
 from compare.papers.stairs.stairs_figures import draw_figures
 from compare.papers.stairs.stairs_paper import EVAPORATION, TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_printed import list_equations
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
@@ -26,8 +24,6 @@ from compare.study.task import IPOPT
 from metaheuristics import AntColony
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES
-
-LACKING = "the paper gives no value"  # reason in the table of differences
 
 
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
@@ -59,23 +55,12 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "evaporation": EVAPORATION,
         "usual_spread": AntColony().spread,
         "quantum_s": QUANTUM,
-        "adam": runs.RULES["adam"],
+        "adam": runs.RULES["adam"][0],
         "end_rate": end_rate,
         **plan_claims.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
         **stairs_effects.compute_effects(findings),
-        **_list_failed_equations(),
     }
-
-
-def _list_failed_equations() -> dict[str, str]:
-    """Return the numbered equations that contradict themselves or each other, and those that only lack values."""
-    rows = REPRODUCTION.printed.differences
-    places = {
-        "contradictory": [row.where for row in rows if row.cannot_run],
-        "lacking": [row.where for row in rows if row.reason.startswith(LACKING)],
-    }
-    return {name: ", ".join(f"({n})" for n in list_equations(where)) for name, where in places.items()}
 
 
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it
@@ -90,7 +75,6 @@ QUANTITIES = {
     "energy": "energy (paper: no unit; ours: J)",
     "peak_torque_Nm": "peak torque [N m]",
 }
-TRACKED = {"jerk": "jerk", "plan": OURS}  # choice of the tracked step that follows a plan
 
 
 def make_tables(findings: StairsFindings) -> dict[str, Rows]:
@@ -156,11 +140,12 @@ def _compute_time_s(records: Sequence[RunRecord]) -> float:
 def _list_table_4(findings: StairsFindings) -> Rows:
     """The paper's quantities in each case, then ours on both plans: of the desired angles, and of the paper's search."""
     found: dict[str, list[float]] = {name: [] for name in QUANTITIES}
-    for what, choice in TRACKED.items():
+    for what in planning.PLANS:
+        choice = tracking.FOLLOWED[what]
         for case in findings.cases:
             run = tracking.get_best(findings, case, choice)
             tracked = {name: tracking.read_index(run, index) for name, index in tracking.TABLE_4_ROWS.items()}
-            for name, value in {**findings.others[f"differences-{what}-{case}"], **tracked}.items():
+            for name, value in {**findings.others[f"differences-{what}-{case}"][runs.KINDS[0]], **tracked}.items():
                 found[name].append(value)
     printed = {name: [float(getattr(TABLE_4[case], name)) for case in findings.cases] for name in QUANTITIES}
     return [[words, *printed[name], *found[name]] for name, words in QUANTITIES.items()]
@@ -177,14 +162,11 @@ def _list_tracks(findings: StairsFindings, case: int) -> Rows:
 
 
 def _list_other_stairs(findings: StairsFindings) -> Rows:
-    rows = []
-    for tread, rise in findings.effort.other_stairs:
-        cells: list[Value] = [tread, rise]
-        for name, unit in (("stairs-plan", " J"), ("stairs-ideal", "")):
-            run = choose_best(findings.runs[runs.make_other_spec(findings.effort, name, tread, rise).title, IPOPT])
-            worst = ", ".join(run.verdict.violated[:3])
-            cells.append(f"{run.verdict.objective:.3f}{unit}" if run.claimed else f"none; violated: {worst}")
-        rows.append(cells)
+    rows: list[Sequence[Value]] = []
+    for size in findings.effort.other_stairs:
+        run = choose_best(findings.runs[runs.make_other_spec(findings.effort, *size).title, IPOPT])
+        none = f"none; violated: {', '.join(run.verdict.violated[:3])}"
+        rows.append([*size, f"{run.verdict.objective:.3f} J" if run.claimed else none])
     return rows
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 import numpy as np
@@ -18,19 +20,22 @@ from compare.papers.paper_runs import (
     make_search_tasks,
     make_start_tasks,
 )
-from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, PLAN_CHOICES, PRINTED
+from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, OURS, PLAN_CHOICES, PRINTED
 from compare.papers.stairs.stairs_instants import Decides
 from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
-from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm
+from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleSwarm, minimize
 from metaheuristics.interface import Algorithm
-from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, leg_vector, network_angles
+from nlp_gait.backends.kernel.compiled import compile_objective
+from nlp_gait.formulation import Array, Assembly, Point
+from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkPath, NetworkSettings, leg_vector, network_angles
+from nlp_gait.gaits.stairs.leg_network import PRINTED as PRINTED_NETWORK
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.gaits.stairs.track import PLAN
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 ALGORITHMS: Mapping[str, Algorithm] = {
     "aco": AntColony(population=ANTS, spread=EVAPORATION),
@@ -39,16 +44,22 @@ ALGORITHMS: Mapping[str, Algorithm] = {
     "pso": ParticleSwarm(),
     "ga": GeneticAlgorithm(),
 }
+ACO = "aco"  # the paper's search
 DRAWN_CASE = 2  # where the paper draws one case only
 TRACK_START = {"kp": 60.0, "kd": 60.0, "torso_pitch_rad": 1.4}
 IMPOSSIBLE_RISE_M = 0.5
-RULES = {
-    "adam": NetworkSettings(),
-    "gradient 0.3": NetworkSettings(rule="gradient", rate=0.3),
-    "gradient 0.05": NetworkSettings(rule="gradient", rate=0.05),
-    "gradient 1e-4, as printed": NetworkSettings(rule="gradient", rate=1e-4),
+RULES = {  # of the network, and the unit of length
+    "adam": (NetworkSettings(), "m"),
+    "gradient 0.3": (NetworkSettings(rule="gradient", rate=0.3), "m"),
+    "gradient 0.05": (NetworkSettings(rule="gradient", rate=0.05), "m"),
+    "gradient 1e-4, as printed, in m": (PRINTED_NETWORK, "m"),
+    "gradient 1e-4, as printed, in cm": (PRINTED_NETWORK, "cm"),
 }
+UNITS = {"m": 1.0, "cm": 100.0}  # in a metre
+CLOSED_FORM, KINDS = "closed form", ("closed-form", "network")  # in the table of the network; of inverse kinematics
+TORSO_INDEXES = ("energy_J", "zmp_margin_min_m")
 PER_CASE = 4  # see ``make_computations``
+POWERLESS = (OURS, "jerk", PRINTED)  # readings of the tracked step that are tuned without the power, too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +92,7 @@ class StairsEffort(Effort):
         (0.254, 0.50),
     )
     other_starts: int = 8  # of IPOPT on the plan there
-    poses: int = 350  # of the swing leg for which the network is trained
+    poses: int = 350  # first ones of the swing leg, every 0.01 s, for which the network is trained
     printed_poses: int = 350  # of these at the printed rate
     plan_intervals: int = 40
     ideal_intervals: int = 70
@@ -97,16 +108,22 @@ class StairsEffort(Effort):
 
     @property
     def plan_steps(self) -> int:
-        """Plans under every choice and other plans of each case, first steps, floors of the effort, and simulations."""
+        """Plans under every choice and other plans of each case, first steps and simulations."""
         chosen = sum(len(PLAN_CHOICES[name].plans) for name in self.plan_choices)
-        return chosen + len(self.cases) * (2 + self.first_starts + 1 + 1 + 3)
+        return chosen + len(self.cases) * (2 + self.first_starts + 1 + 3)
 
     @property
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
         gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + self.track_ipopt
-        case = gradient + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs + PER_CASE + len(self.instant_searches)
-        others = sum(1 + self.count_other_starts(rise) for _, rise in self.other_stairs)
+        case = (
+            gradient
+            + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs
+            + PER_CASE
+            + len(POWERLESS)
+            + len(self.instant_searches)
+        )
+        others = sum(self.count_other_starts(rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2 + self.plan_steps
 
 
@@ -146,11 +163,11 @@ def make_track_spec(case: int, plan: Mapping[str, float], **options: str | bool)
     return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
 
 
-def make_other_spec(effort: StairsEffort, name: str, tread: float, rise: float) -> ProblemSpec:
-    """Return the planner or the ideal on a stair that the paper did not try."""
+def make_other_spec(effort: StairsEffort, tread: float, rise: float) -> ProblemSpec:
+    """Return the planner on a stair that the paper did not try."""
     values = {"stair_length_m": 2 * tread, "rise_run_ratio": rise / tread}
-    intervals = {"stairs-plan": effort.plan_intervals, "stairs-ideal": effort.ideal_intervals}[name]
-    return ProblemSpec(name=name, options={"intervals": intervals}, values=values, label=f"{name}-{tread:g}-{rise:g}")
+    options = {"intervals": effort.plan_intervals}
+    return ProblemSpec(name="stairs-plan", options=options, values=values, label=f"stairs-plan-{tread:g}-{rise:g}")
 
 
 def get_stair(case: int) -> dict[str, float]:
@@ -189,9 +206,8 @@ class StairsFindings:
         return (*ALGORITHMS, *([IPOPT] if self.effort.track_ipopt else []))
 
     def best_track(self, case: int) -> RunRecord:
-        """Return the best run of any solver on the track of a case, a feasible one if there is one."""
-        records = [record for name in self.track_solvers for record in self.runs[f"track-{case}", name]]
-        return min(records, key=lambda record: (not record.verdict.feasible, record.verdict.objective))
+        """Return the best run of the paper's search on the track of a case."""
+        return self.best("track", case, ACO)
 
 
 def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
@@ -206,8 +222,8 @@ def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
                 yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
         settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else effort.plan_settings
-        for name, count in (("stairs-plan", effort.count_other_starts(rise)), ("stairs-ideal", 1)):
-            yield from make_start_tasks(make_other_spec(effort, name, tread, rise), count, settings=settings)
+        spec = make_other_spec(effort, tread, rise)
+        yield from make_start_tasks(spec, effort.count_other_starts(rise), settings=settings)
 
 
 def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
@@ -222,92 +238,116 @@ def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
 
 
 def make_computations(findings: StairsFindings) -> Iterator[Computation]:
-    """Yield the network, and in each case the printed scheme, differences of both plans, the network in the loop."""
+    """Yield the network, and in each case the printed gains, differences of both plans, the network in the loop."""
     effort, first = findings.effort, findings.cases[0]
     poses = {"poses": effort.poses, "printed_poses": effort.printed_poses}
-    plan_spec, plan = make_plan_spec(effort, first), findings.plan(first)
+    plan_spec, plan = make_plan_spec(effort, first, "jerk"), findings.plan(first, "jerk")
     yield make_computation("network", plan_spec, train_network, case=first, plan=plan, **poses)
     for case in effort.cases:
-        plan, jerk, x = findings.plan(case), findings.plan(case, "jerk"), get_point(findings.best_track(case))
+        plans = {what: findings.plan(case, what) for what in ("plan", "jerk", "upright")}
+        plan, x = plans["plan"], get_point(findings.best_track(case))
         track = make_track_spec(case, plan)
-        yield make_computation(f"printed-{case}", track, run_printed_scheme, case=case, plan=plan, jerk=jerk, x=x)
-        for what, used in (("plan", plan), ("jerk", jerk)):
-            spec = make_track_spec(case, used)
-            yield make_computation(f"differences-{what}-{case}", spec, difference_angles, case=case, plan=used)
+        yield make_computation(f"printed-{case}", track, run_printed_gains, case=case, plans=plans, x=x)
+        for what in ("plan", "jerk"):
+            spec = make_track_spec(case, plans[what])
+            yield make_computation(f"differences-{what}-{case}", spec, difference_angles, case=case, plan=plans[what])
         yield make_computation(f"learned-{case}", track, track_with_network, case=case, plan=plan, x=x)
 
 
 def train_network(case: int, plan: Mapping[str, float], poses: int, printed_poses: int) -> dict[str, Any]:
-    """Train the network on poses of a plan's swing leg: convergence, time and error against the closed form."""
+    """Train the network on the first poses of a plan's swing leg: convergence, time and error against the closed form."""
     desired = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
-    samples = np.linspace(0, len(desired) - 1, poses).round().astype(int)
-    all_poses = np.cumsum(desired[samples, :2], axis=1)  # the knee is measured from the thigh
+    all_poses = np.cumsum(desired[:poses, :2], axis=1)  # the knee is measured from the thigh
     robot = toe_foot_biped()
-    lengths = robot.link("HK").length_m, robot.link("KA").length_m
-    found = {}
-    for name, settings in RULES.items():
-        q = all_poses[: printed_poses if "printed" in name else poses]
-        hip_to_ankle = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in q]).T
-        path = network_angles(hip_to_ankle, *lengths, settings)
-        error = np.abs((path.angles - q + np.pi) % (2 * np.pi) - np.pi)
-        bends = np.sign(np.sin(np.diff([path.angles, q], axis=2)))[..., 0]
-        found[name] = {
-            "converged": int((path.error_m2 <= settings.tolerance_m2).sum()),
-            "poses": len(q),
-            "iterations": path.iterations.tolist(),
-            "time_s": path.time_s.tolist(),
-            "largest_angle_error_rad": float(error.max()),
-            "mean_angle_error_rad": float(error.mean()),
-            "bent_otherwise": int((bends[0] != bends[1]).sum()),
-        }
+    lengths = np.array([robot.link(name).length_m for name in LEGS[0]])
+    legs = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in all_poses]).T
+    found = {CLOSED_FORM: _describe_path(_solve_legs(legs, *lengths), all_poses, NetworkSettings())}
+    for name, (settings, unit) in RULES.items():
+        count = printed_poses if "printed" in name else poses
+        thigh, shank = UNITS[unit] * lengths
+        path = network_angles(UNITS[unit] * legs[:count], thigh, shank, settings)
+        found[name] = _describe_path(path, all_poses[:count], settings)
     return found
 
 
-def roll_out(case: int, plan: Mapping[str, float], x: list[float]) -> Mapping[str, Array]:
-    """Return time histories of the closed loop with given gains and torso pitch."""
-    return make_track_spec(case, plan).load().signals(np.array(x)).arrays
+def _describe_path(path: NetworkPath, q: Array, settings: NetworkSettings) -> dict[str, Any]:
+    error = np.abs((path.angles - q + np.pi) % (2 * np.pi) - np.pi)
+    bends = np.sign(np.sin(np.diff([path.angles, q], axis=2)))[..., 0]
+    return {
+        "converged": int((path.error_m2 <= settings.tolerance_m2).sum()),
+        "poses": len(q),
+        "iterations": path.iterations.tolist(),
+        "time_s": path.time_s.tolist(),
+        "largest_angle_error_rad": float(error.max()),
+        "mean_angle_error_rad": float(error.mean()),
+        "bent_otherwise": int((bends[0] != bends[1]).sum()),
+    }
 
 
-def run_printed_scheme(
-    case: int, plan: Mapping[str, float], jerk: Mapping[str, float], x: Sequence[float]
-) -> dict[str, float]:
-    """Return what the paper's gains do on a plan, and the best ones x with an upright torso.
+def _solve_legs(hip_to_ankle: Array, thigh: float, shank: float) -> NetworkPath:
+    """Return leg angles by the cosine rule, and the time of each pose."""
+    rows = []
+    for x, z in hip_to_ankle.tolist():
+        started = time.perf_counter()
+        knee = math.acos((x * x + z * z - thigh**2 - shank**2) / (2 * thigh * shank))
+        first = math.atan2(-z, x) - math.atan2(shank * math.sin(knee), thigh + shank * math.cos(knee))
+        rows.append(([first, first + knee], 0.0, 0, time.perf_counter() - started))
+    return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
-    They are the quanta that the explicit scheme survives, also without contacts or gains; the largest errors in the implicit one,
-    also with everything as printed on the plan of least jerk; and the energy and ZMP margin of the upright torso.
+
+def roll_out(case: int, plan: Mapping[str, float], x: list[float], kind: str = "closed-form") -> Mapping[str, Array]:
+    """Return time histories of the closed loop with given gains and torso pitch; kind is the inverse kinematics."""
+    return make_track_spec(case, plan, inverse_kinematics=kind).load().signals(np.array(x)).arrays
+
+
+def run_printed_gains(case: int, plans: Mapping[str, Mapping[str, float]], x: Sequence[float]) -> dict[str, float]:
+    """Return what the paper's gains do on our plans, and the best ones x on the plan for an upright torso.
+
+    They are the quanta that the explicit scheme survives, also without contacts or gains; the largest errors and ZMP margins in
+    the implicit one, also with the controller as printed on the plan of least jerk; and energies and ZMP margins upright.
     """
-    row = TABLE_4[case]
+    row, plan = TABLE_4[case], plans["plan"]
     gains, none = [row.kp, row.kd, row.torso_pitch_rad], [0.0, 0.0, row.torso_pitch_rad]
     compensated = make_track_spec(case, plan).load()
     implicit = compensated.with_values(gravity_compensation=0.0)
     explicit = make_track_spec(case, plan, scheme="explicit").load().with_values(gravity_compensation=0.0)
     floating = explicit.with_values(ground_stiffness_N_m=0.0, ground_damping_N_s_m=0.0)
-    as_printed = make_track_spec(case, jerk, **CHOICES[PRINTED].options).load().with_values(**CHOICES[PRINTED].values)
-    quanta = {
-        "_printed": (explicit, gains),
-        "_floating": (floating, gains),
-        "_slack": (explicit, none),
-        "_free": (floating, none),
+    printed = CHOICES[PRINTED]
+    as_printed = make_track_spec(case, plans["jerk"], **printed.options).load().with_values(**printed.values)
+    scheme = {
+        "printed": (explicit, gains),
+        "floating": (floating, gains),
+        "slack": (explicit, none),
+        "free": (floating, none),
     }
-    errors = {"implicit": implicit, "compensated": compensated, "hip": as_printed}
-    upright = evaluate(compensated, [*x[:2], np.pi / 2]).indexes
-    return {
-        **{
-            f"explicit{name}_quanta": evaluate(*how).indexes["quanta_before_divergence"] for name, how in quanta.items()
-        },
-        **{
-            f"{name}_largest_error_rad": evaluate(how, gains).indexes["largest_error_rad"]
-            for name, how in errors.items()
-        },
-        **{f"upright_{name}": upright[name] for name in ("energy_J", "zmp_margin_min_m")},
+    tracked = {"implicit": implicit, "compensated": compensated, "hip": as_printed}
+    found = {f"explicit_{name}": evaluate(*how).indexes["quanta_before_divergence"] for name, how in scheme.items()}
+    indexes = {name: evaluate(how, gains).indexes for name, how in tracked.items()}
+    found |= {f"{name}_error_rad": own["largest_error_rad"] for name, own in indexes.items()}
+    indexes |= {
+        what: evaluate(make_track_spec(case, plans[what]).load(), [*x[:2], np.pi / 2]).indexes for what in plans
     }
+    return found | {f"{name}_{index}": own[index] for name, own in indexes.items() for index in TORSO_INDEXES}
+
+
+def track_without_power(spec: ProblemSpec, evaluations: int) -> dict[str, float]:
+    """Return the indexes of the gains and the torso pitch of least error without the power term of (53)."""
+    problem = spec.load()
+
+    def drop_power(assembly: Assembly, point: Point, _: Nonsmooth) -> Assembly:
+        margin = point["zmp_weight"] * assembly.indexes["zmp_margin_min_m"]
+        return replace(assembly, objective=assembly.indexes["tracking_cost"] - margin)
+
+    objective = compile_objective(problem.derive(name="stairs-errors", change=drop_power), threads=1)
+    found = minimize(objective, ALGORITHMS[ACO], evaluations=evaluations, seed=0)
+    return dict(evaluate(problem, found.x).indexes)
 
 
 def track_with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[str, float]:
     """Compare a tracked step whose desired leg angles come from the network with the closed form: cost and angles."""
     found: dict[str, float] = {}
     angles = []
-    for kind in ("closed-form", "network"):
+    for kind in KINDS:
         problem = make_track_spec(case, plan, inverse_kinematics=kind).load()
         found[f"{kind} cost"] = evaluate(problem, x).objective["value"]
         angles.append(problem.signals(np.array(x)).arrays["q_desired"])
@@ -315,9 +355,13 @@ def track_with_network(case: int, plan: Mapping[str, float], x: list[float]) -> 
     return {**found, "largest_angle_error_rad": float(error.max()), "mean_angle_error_rad": float(error.mean())}
 
 
-def difference_angles(case: int, plan: Mapping[str, float]) -> dict[str, float]:
-    """Return the largest acceleration and jerk of the joints by differences of the desired angles at 0.01 s."""
-    angles = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
-    acceleration = np.diff(angles, 2, axis=0) / 0.01**2
-    jerk = np.diff(angles, 3, axis=0) / 0.01**3
-    return {"acceleration": float(np.abs(acceleration).max()), "jerk": float(np.abs(jerk).max())}
+def difference_angles(case: int, plan: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """Return the largest acceleration and jerk of the joints by differences of the desired angles at 0.01 s, by their source."""
+    found = {}
+    for kind in KINDS:
+        angles = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]], kind)["q_desired"]
+        parts = {
+            name: np.diff(angles, order, axis=0) / 0.01**order for name, order in (("acceleration", 2), ("jerk", 3))
+        }
+        found[kind] = {name: float(np.abs(part).max()) for name, part in parts.items()}
+    return found

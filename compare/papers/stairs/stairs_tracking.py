@@ -9,12 +9,20 @@ from typing import Any, get_args
 
 import numpy as np
 
+from compare.judge import evaluate
 from compare.papers.claims import Check, Series, Verdict, compare_readings, decide, require_change, require_feasible
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible, make_computation, make_search_tasks
 from compare.papers.stairs.stairs_choices import CHOICES, OURS, PRINTED
 from compare.papers.stairs.stairs_instants import Decides, Instants, track_by_instants
 from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsFindings, make_track_spec
+from compare.papers.stairs.stairs_runs import (
+    ACO,
+    ALGORITHMS,
+    POWERLESS,
+    StairsFindings,
+    make_track_spec,
+    track_without_power,
+)
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.store import Computation
@@ -24,9 +32,9 @@ from nlp_gait.gaits.stairs.bodies import rigid_bodies
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 
-ACO = "aco"  # the paper's search
 FOLLOWED_RAD = 0.1
 READINGS = (OURS, "jerk", PRINTED, "printed-b10000")  # that claims compare
+NEXT = tuple(name for name in CHOICES if name != "first")  # readings of the next step
 UNLIMITED = ("unlimited", "jerk-unlimited", PRINTED, "printed-b10000")  # whose searches do not limit the errors
 LEAST_ROWS = {
     "cost": "controller_cost",
@@ -39,6 +47,9 @@ READ: Mapping[str, Sequence[str]] = {  # what claims tell of readings
     "zmp_margin_min_m": (*READINGS, "penalty"),
     "largest_error_rad": (*UNLIMITED, OURS),
 }
+PRINTED_GAINS = ("implicit", "compensated", "hip")  # ways to follow our plans with them
+SCHEMES = ("printed", "floating", "slack", "free")  # explicit ones: with all, without contacts, gains, or both
+FOLLOWED = {"plan": OURS, "jerk": "jerk"}  # reading of the tracked step that follows a plan
 EFFECTS = {  # of a choice: indexes of the best step, and their texts
     "controller_cost": "mean of (53) {}",
     "energy_J": "energy {} J",
@@ -66,9 +77,13 @@ def make_tracking_tasks(findings: StairsFindings) -> Iterator[Task]:
 
 
 def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation]:
-    """Yield Algorithm 4 in each case, which decides gains or torques."""
+    """Yield in each case gains without the power, and Algorithm 4, which decides gains or torques."""
     effort = findings.effort
     for case in effort.cases:
+        for name in POWERLESS:
+            spec = make_choice_spec(findings, case, name)
+            function = partial(track_without_power, spec)
+            yield make_computation(f"powerless-{name}-{case}", spec, function, evaluations=effort.track_evaluations)
         for name, decides in effort.instant_searches:
             spec, plan = make_choice_spec(findings, case, name), findings.plan(case, CHOICES[name].plan)
             arguments = {
@@ -91,8 +106,9 @@ def run_algorithm_4(spec: ProblemSpec, torso_rad: float, decides: Decides, evalu
 
 
 def get_best(findings: StairsFindings, case: int, name: str) -> RunRecord:
-    """Return the best run of a choice in a case."""
-    return choose_best(findings.runs[f"track-{case}-{name}", ACO])
+    """Return the best run of a choice in a case, or of one with the same objective that it contains."""
+    names = (name, *(other for other in CHOICES[name].contains if other in findings.effort.choices))
+    return choose_best(run for one in names for run in findings.runs[f"track-{case}-{one}", ACO])
 
 
 def make_tracking_tables(findings: StairsFindings) -> dict[str, Rows]:
@@ -116,7 +132,7 @@ def _list_instants(findings: StairsFindings, case: int, name: str, decides: Deci
     found = findings.others[f"instants-{name}-{decides}-{case}"]
     constants = get_best(findings, case, name).verdict.indexes["controller_cost"]
     what = [case, CHOICES[name].text, decides, found["quanta"] * QUANTUM, found["cost"], constants]
-    medians = [f"{low:.3g} to {high:.3g}" for low, _, high in found["decided"]] if decides == "gains" else [""] * 3
+    medians = [f"{low:.3g} to {high:.3g}" for low, high in found["decided"]] if decides == "gains" else [""] * 3
     return [*what, found["energy_J"], found["largest_error_rad"], found["outside_quanta"], *medians]
 
 
@@ -129,6 +145,9 @@ def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
         "reading": {index: _describe(_collect(findings, index, names)) for index, names in READ.items()},
         "best": {name: Series(one[name] for one in tracks) for name in tracks[0]},
         "gains": {name: _collect_printed(findings, name) for name in findings.others[f"printed-{findings.cases[0]}"]},
+        "over": {index: _describe_range(findings, index) for index in LEAST_ROWS.values()},
+        "instant_ms": _describe_instant_times(findings),
+        "powerless": _describe({name: _collect_powerless(findings, name) for name in POWERLESS}),
         "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()})),
     }
 
@@ -164,6 +183,15 @@ def _collect(findings: StairsFindings, index: str, names: Iterable[str] = READIN
     return {name: Series(read_index(get_best(findings, case, name), index) for case in findings.cases) for name in run}
 
 
+def _describe_range(findings: StairsFindings, index: str) -> str:
+    """Return the ratios of cases 1 and 3 to case 2 over all readings of the next step."""
+    rows = np.array([*_collect(findings, index, NEXT).values()])
+    if rows.shape[1] < len(TABLE_4):
+        return f"{len(rows)} readings, one case"
+    low, high = (Series(end(rows[:, [0, 2]] / rows[:, [1]], axis=0)) for end in (np.min, np.max))
+    return f"{len(rows)} readings: cases 1 / 3 by case 2 at least {low}, at most {high}"
+
+
 def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str]) -> Check:
     runs = (get_best(findings, case, name) for name in names for case in findings.cases)
     return require_feasible(check, list_infeasible(runs))
@@ -173,20 +201,25 @@ def _compare_cases(quantity: str, compare: Callable[[Array, Array], Check]) -> C
     """Return the check of a quantity of Table IV in cases 1 and 3 divided by that in case 2."""
 
     def check(findings: StairsFindings) -> Check:
-        ours = _collect(findings, LEAST_ROWS[quantity])
+        ours = _collect(findings, LEAST_ROWS[quantity], NEXT)
         if len(findings.cases) < len(TABLE_4):
             return decide(Verdict.NOT_SHOWN, ratios="one case only")
         printed = [float(getattr(row, quantity)) for row in TABLE_4.values()]
         theirs, *ratios = (np.array(row)[[0, 2]] / row[1] for row in (printed, *ours.values()))
-        texts = {"ratios": _describe(dict(zip(ours, map(Series, ratios), strict=True)))}
+        shown = dict(zip(ours, map(Series, ratios), strict=True))
+        texts = {"ratios": _describe({name: row for name, row in shown.items() if name in READINGS})}
         return _require_steps(findings, replace(compare(theirs, np.array(ratios)), values=texts), ours)
 
     return check
 
 
 def _check_balance(findings: StairsFindings) -> Check:
+    """By constant gains, whose searches demand it, by a colony at every instant, and by the printed gains."""
     ours = _collect(findings, "zmp_margin_min_m", READ["zmp_margin_min_m"])
-    return _require_steps(findings, decide(all(min(row) >= 0 for row in ours.values())), ours)
+    held = [min(row) >= 0 for row in ours.values()]
+    held += [not any(part["outside_quanta"] for part in parts) for parts in _get_instants(findings, "gains").values()]
+    held += [min(_collect_printed(findings, f"{name}_zmp_margin_min_m")) >= 0 for name in PRINTED_GAINS]
+    return _require_steps(findings, decide(held), ours)
 
 
 def _check_following(findings: StairsFindings) -> Check:
@@ -200,8 +233,7 @@ def _collect_printed(findings: StairsFindings, name: str) -> Series:
 
 
 def _check_printed_gains(findings: StairsFindings) -> Check:
-    names = ("implicit", "compensated", "hip")
-    errors = [_collect_printed(findings, f"{name}_largest_error_rad") for name in names]
+    errors = [_collect_printed(findings, f"{name}_error_rad") for name in PRINTED_GAINS]
     return decide([max(row) <= FOLLOWED_RAD for row in errors], limit=FOLLOWED_RAD)
 
 
@@ -233,29 +265,72 @@ def _check_instants(decides: Decides) -> Checker:
     return check
 
 
-def _check_online(findings: StairsFindings) -> Check:
-    parts, share = _get_instants(findings, "gains")[OURS], ANTS * ITERATIONS / findings.effort.instant_evaluations
-    times = Series(1e3 * part["time_s"] / part["quanta"] for part in parts)
-    return decide(share * max(times) <= 1e3 * QUANTUM, found=times, scaled=Series(share * time for time in times))
+def _describe_instant_times(findings: StairsFindings) -> str:
+    """Return the mean time of an instant's search for gains [ms], by reading."""
+    times = {
+        name: Series(1e3 * part["time_s"] / part["quanta"] for part in parts)
+        for name, parts in _get_instants(findings, "gains").items()
+    }
+    return _describe(times)
+
+
+def _check_dynamics(findings: StairsFindings) -> Check:
+    quanta = [_collect_printed(findings, f"explicit_{name}") for name in SCHEMES]
+    return decide([min(row) * QUANTUM >= TABLE_3["t3_s"] for row in quanta])
 
 
 def _check_cost_against_energy(_: StairsFindings) -> Check:
-    """(53) contains the power, so that its mean is at least the mean power."""
+    """(53) contains the power, so that its mean is at least the mean power; of one instant's (53) nothing follows."""
     cost, energy, torque = np.array([[row.cost, row.energy, row.peak_torque_Nm] for row in TABLE_4.values()]).T
     power = energy / TABLE_3["t3_s"]  # of an energy in J
     rates, least = power / torque / len(LINKS), power * QUANTUM  # the latter of a sum over quanta
-    return decide(bool((cost >= least).all()), power=Series(power), least=Series(least), rates=Series(rates))
+    held = [bool((cost >= power).all()), bool((cost >= least).all()), True]
+    return decide(held, power=Series(power), least=Series(least), rates=Series(rates))
+
+
+def _collect_powerless(findings: StairsFindings, name: str) -> Series:
+    """Return the energies [J] of gains and torso of least error, without the power, under a reading."""
+    return Series(findings.others[f"powerless-{name}-{case}"]["energy_J"] for case in findings.cases)
+
+
+def _check_power(findings: StairsFindings) -> Check:
+    with_power = [sum(row) for row in _collect(findings, "energy_J", POWERLESS).values()]
+    without = [sum(_collect_powerless(findings, name)) for name in POWERLESS]
+    return require_change(100 * (np.divide(without, with_power) - 1)[:, None])
 
 
 def _check_torso(index: str, sign: float) -> Checker:
-    """Return the check that the tuned torso pitch improves a quantity from that of an upright one with the same gains [%]."""
+    """Return the check that the tuned torso pitch improves a quantity from that of an upright one, all cases together [%].
+
+    Under each reading with the same plan and gains; and for our plan of least energy against one that was made for an upright
+    torso. A step whose ZMP leaves the polygon upright is no comparison of energies.
+    """
 
     def check(findings: StairsFindings) -> Check:
-        tuned = [findings.best_track(case).verdict.indexes[index] for case in findings.cases]
-        upright = np.array(_collect_printed(findings, f"upright_{index}"))
-        return require_change(100 * sign * (tuned - upright) / np.abs(upright))
+        tuned = _collect(findings, index)
+        upright = {name: _measure_upright(findings, name) for name in tuned}
+        values = {name: Series(row[index] for row in rows) for name, rows in upright.items()}
+        margins = {name: min(row["zmp_margin_min_m"] for row in rows) for name, rows in upright.items()}
+        pairs = [(tuned[name], values[name]) for name in tuned if index == "zmp_margin_min_m" or margins[name] >= 0]
+        own = _collect_printed(findings, f"upright_{index}")
+        sums = [(sum(better), sum(worse)) for better, worse in [*pairs, (tuned[OURS], own)]]
+        changes = [[100 * sign * (better - worse) / abs(worse)] for better, worse in sums]
+        parts = {name: f"{row} against {values[name]}" for name, row in tuned.items()}
+        found = "; ".join(f"{CHOICES[name].text}: {part}" for name, part in parts.items())
+        return require_change(
+            np.array(changes), found=found, own=own, torso=_collect(findings, "torso_pitch_rad")[OURS]
+        )
 
     return check
+
+
+def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, float]]:
+    """Return the indexes of the best gains of a reading with an upright torso, in all cases."""
+    found = []
+    for case in findings.cases:
+        gains = get_point(get_best(findings, case, name))[:2]
+        found.append(evaluate(make_choice_spec(findings, case, name).load(), [*gains, np.pi / 2]).indexes)
+    return found
 
 
 TRACKING_CHECKS: dict[str, Checker] = {
@@ -267,6 +342,7 @@ TRACKING_CHECKS: dict[str, Checker] = {
     "printed-gains": _check_printed_gains,
     "torso-margin": _check_torso("zmp_margin_min_m", 1.0),
     "torso-energy": _check_torso("energy_J", -1.0),
-    "online": _check_online,
+    "power-term": _check_power,
+    "dynamics": _check_dynamics,
     **{f"instants-{decides}": _check_instants(decides) for decides in get_args(Decides)},
 }
