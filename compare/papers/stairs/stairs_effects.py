@@ -8,12 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from compare.papers.paper_runs import choose_best
 from compare.papers.stairs.stairs_choices import CHOICES, OURS, PLAN_CHOICES, PRINTED
 from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_4
-from compare.papers.stairs.stairs_planning import PLANS, describe_plan, list_choice_plans, move
-from compare.papers.stairs.stairs_runs import ACO, DRAWN_CASE, StairsFindings
-from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec
+from compare.papers.stairs.stairs_planning import PLANS, describe_plan, get_choice, list_choice_plans, move
+from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings
+from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec, measure_spread
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
@@ -43,9 +42,7 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
         "zmp_gap_mm": {what: _join(measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
         "start_m_s": _join(measure_hip_speeds(findings, "jerk", case)[0] for case in cases),
         "centre_mm": {what: _join(_measure_centre(findings, what, case) for case in cases) for what in PLANS},
-        "search_gap": max(
-            _measure_search_gap(findings, case, name) for case in cases for name in findings.effort.choices
-        ),
+        "search_gap": max(measure_spread(findings, name) for name in findings.effort.choices),
         "turn_rad": {name: _join(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
         "learned": [_join(row[name] for row in learned) for name in LEARNED],
         "first": [_join(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
@@ -55,6 +52,7 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
         },
         "printed_effort": ANTS * ITERATIONS,
         "planned": planned,
+        "tread_between": "".join(f" ({row} between samples)" for row in _list_between(findings, "tread")),
         "plan_effect": {name: _compare_texts(text, planned[OURS]) for name, text in planned.items()},
         "tracked": {name: _describe_step(findings, name) for name in CHOICES},
     }
@@ -68,6 +66,12 @@ def _describe_plans(findings: StairsFindings, name: str) -> str:
         f"no {NAMES[what]} {text.removeprefix('none ')}" if "(" in text else f"{text} {PLANS[what]}"
         for what, text in found.items()
     )
+
+
+def _list_between(findings: StairsFindings, name: str) -> list[str]:
+    """Return the worst violation of the plan of least jerk under a choice that is feasible at its samples."""
+    verdict = get_choice(findings, "jerk", name).verdict if name in findings.effort.plan_choices else None
+    return [*verdict.violated[:1]] if verdict is not None and verdict.feasible else []
 
 
 def _compare_texts(changed: str, ours: str) -> str:
@@ -126,12 +130,6 @@ def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
     place = points(rods, ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
     moment = sum(rods[link].mass * float(middle[1]) for link, middle in centres(place).items())
     return 1e3 * (float(place["H"][1]) - moment / toe_foot_biped().mass_kg)
-
-
-def _measure_search_gap(findings: StairsFindings, case: int, name: str) -> float:
-    """Return by how much a reading's own search is above what a narrower one found [%]."""
-    own, best = choose_best(findings.runs[f"track-{case}-{name}", ACO]), get_best(findings, case, name)
-    return 100 * (own.verdict.objective / best.verdict.objective - 1)
 
 
 def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:

@@ -35,6 +35,8 @@ class StairsPaper:
 
     table_3: Mapping[str, float]  # governing parameters under the names of the problem
     table_4: tuple[Case, ...]
+    rows: Mapping[str, str]  # words for the quantities of Table IV
+    effects: Mapping[str, str]  # texts for indexes of a tracked step
     ants: int
     iterations: int
     evaporation: float

@@ -16,7 +16,7 @@ from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
 from compare.papers.stairs import stairs_tracking as tracking
 from compare.papers.stairs.stairs_figures import draw_figures
-from compare.papers.stairs.stairs_paper import EVAPORATION, TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import EVAPORATION, PAPER, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
@@ -64,17 +64,6 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
 
 
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it
-# Rows of Table IV: words, and name in the paper's table.
-QUANTITIES = {
-    "acceleration": "largest joint acceleration over quanta [rad/s^2]",
-    "jerk": "largest joint jerk over quanta [rad/s^3]",
-    "torso_pitch_rad": "torso pitch [rad]",
-    "kp": "K_p",
-    "kd": "K_d",
-    "cost": "mean of (53)",
-    "energy": "energy (paper: no unit; ours: J)",
-    "peak_torque_Nm": "peak torque [N m]",
-}
 
 
 def make_tables(findings: StairsFindings) -> dict[str, Rows]:
@@ -139,7 +128,7 @@ def _compute_time_s(records: Sequence[RunRecord]) -> float:
 
 def _list_table_4(findings: StairsFindings) -> Rows:
     """The paper's quantities in each case, then ours on both plans: of the desired angles, and of the paper's search."""
-    found: dict[str, list[float]] = {name: [] for name in QUANTITIES}
+    found: dict[str, list[float]] = {name: [] for name in PAPER.rows}
     for what in planning.PLANS:
         choice = tracking.FOLLOWED[what]
         for case in findings.cases:
@@ -147,8 +136,8 @@ def _list_table_4(findings: StairsFindings) -> Rows:
             tracked = {name: tracking.read_index(run, index) for name, index in tracking.TABLE_4_ROWS.items()}
             for name, value in {**findings.others[f"differences-{what}-{case}"][runs.KINDS[0]], **tracked}.items():
                 found[name].append(value)
-    printed = {name: [float(getattr(TABLE_4[case], name)) for case in findings.cases] for name in QUANTITIES}
-    return [[words, *printed[name], *found[name]] for name, words in QUANTITIES.items()]
+    printed = {name: [float(getattr(TABLE_4[case], name)) for case in findings.cases] for name in PAPER.rows}
+    return [[words, *printed[name], *found[name]] for name, words in PAPER.rows.items()]
 
 
 def _list_tracks(findings: StairsFindings, case: int) -> Rows:

@@ -14,7 +14,7 @@ from compare.papers.claims import Check, Series, Verdict, compare_readings, deci
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible, make_computation, make_search_tasks
 from compare.papers.stairs.stairs_choices import CHOICES, OURS, PRINTED
 from compare.papers.stairs.stairs_instants import Decides, Instants, track_by_instants
-from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, PAPER, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import (
     ACO,
     ALGORITHMS,
@@ -50,13 +50,6 @@ READ: Mapping[str, Sequence[str]] = {  # what claims tell of readings
 PRINTED_GAINS = ("implicit", "compensated", "hip")  # ways to follow our plans with them
 SCHEMES = ("printed", "floating", "slack", "free")  # explicit ones: with all, without contacts, gains, or both
 FOLLOWED = {"plan": OURS, "jerk": "jerk"}  # reading of the tracked step that follows a plan
-EFFECTS = {  # of a choice: indexes of the best step, and their texts
-    "controller_cost": "mean of (53) {}",
-    "energy_J": "energy {} J",
-    "peak_torque_Nm": "peak torque {} Nm",
-    "zmp_margin_min_m": "ZMP margin {} m",
-    "largest_error_rad": "largest error {} rad",
-}
 
 
 def make_choice_spec(findings: StairsFindings, case: int, name: str) -> ProblemSpec:
@@ -111,6 +104,15 @@ def get_best(findings: StairsFindings, case: int, name: str) -> RunRecord:
     return choose_best(run for one in names for run in findings.runs[f"track-{case}-{one}", ACO])
 
 
+def measure_spread(findings: StairsFindings, name: str) -> float:
+    """Return by how much the objectives of a reading's own runs are above its best one, at most over all cases [%]."""
+    return max(
+        100 * (run.verdict.objective / get_best(findings, case, name).verdict.objective - 1)
+        for case in findings.cases
+        for run in findings.runs[f"track-{case}-{name}", ACO]
+    )
+
+
 def make_tracking_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name."""
     return {
@@ -156,7 +158,7 @@ def _describe_effect(findings: StairsFindings, name: str) -> str:
     if name not in findings.effort.choices:
         return "not computed"
     parts = []
-    for index, text in EFFECTS.items():
+    for index, text in PAPER.effects.items():
         values = [f"{row}" for row in _collect(findings, index, (name, OURS)).values()]
         if values[0] != values[-1]:
             parts.append(text.format(" instead of ".join(values)))
@@ -197,7 +199,7 @@ def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str])
     return require_feasible(check, list_infeasible(runs))
 
 
-def _compare_cases(quantity: str, compare: Callable[[Array, Array], Check]) -> Checker:
+def _compare_cases(quantity: str, compare: Callable[[Array, Array, Array], Check]) -> Checker:
     """Return the check of a quantity of Table IV in cases 1 and 3 divided by that in case 2."""
 
     def check(findings: StairsFindings) -> Check:
@@ -208,9 +210,15 @@ def _compare_cases(quantity: str, compare: Callable[[Array, Array], Check]) -> C
         theirs, *ratios = (np.array(row)[[0, 2]] / row[1] for row in (printed, *ours.values()))
         shown = dict(zip(ours, map(Series, ratios), strict=True))
         texts = {"ratios": _describe({name: row for name, row in shown.items() if name in READINGS})}
-        return _require_steps(findings, replace(compare(theirs, np.array(ratios)), values=texts), ours)
+        spreads = np.array([[measure_spread(findings, name)] for name in ours])
+        return _require_steps(findings, replace(compare(theirs, np.array(ratios), spreads), values=texts), ours)
 
     return check
+
+
+def _require_least(_: Array, ours: Array, spreads: Array) -> Check:
+    """Return the check that case 2 has the least value, by more than the runs of a reading differ [%]."""
+    return require_change(100 * (ours - 1) - spreads)
 
 
 def _check_balance(findings: StairsFindings) -> Check:
@@ -299,27 +307,24 @@ def _check_power(findings: StairsFindings) -> Check:
     return require_change(100 * (np.divide(without, with_power) - 1)[:, None])
 
 
-def _check_torso(index: str, sign: float) -> Checker:
-    """Return the check that the tuned torso pitch improves a quantity from that of an upright one, all cases together [%].
+def _check_torso(index: str) -> Checker:
+    """Return the check that the tuned torso pitch saves energy [%] or adds ZMP margin [mm] to an upright one, on average.
 
     Under each reading with the same plan and gains; and for our plan of least energy against one that was made for an upright
     torso. A step whose ZMP leaves the polygon upright is no comparison of energies.
     """
 
     def check(findings: StairsFindings) -> Check:
-        tuned = _collect(findings, index)
+        tuned, own = _collect(findings, index), _collect_printed(findings, f"upright_{index}")
         upright = {name: _measure_upright(findings, name) for name in tuned}
         values = {name: Series(row[index] for row in rows) for name, rows in upright.items()}
-        margins = {name: min(row["zmp_margin_min_m"] for row in rows) for name, rows in upright.items()}
-        pairs = [(tuned[name], values[name]) for name in tuned if index == "zmp_margin_min_m" or margins[name] >= 0]
-        own = _collect_printed(findings, f"upright_{index}")
-        sums = [(sum(better), sum(worse)) for better, worse in [*pairs, (tuned[OURS], own)]]
-        changes = [[100 * sign * (better - worse) / abs(worse)] for better, worse in sums]
-        parts = {name: f"{row} against {values[name]}" for name, row in tuned.items()}
-        found = "; ".join(f"{CHOICES[name].text}: {part}" for name, part in parts.items())
-        return require_change(
-            np.array(changes), found=found, own=own, torso=_collect(findings, "torso_pitch_rad")[OURS]
-        )
+        stays = [name for name, rows in upright.items() if min(row["zmp_margin_min_m"] for row in rows) >= 0]
+        names = stays if index == "energy_J" else tuned
+        pairs = [*((tuned[name], values[name]) for name in names), (tuned[OURS], own)]
+        better, worse = np.array([[sum(row) for row in pair] for pair in pairs]).T
+        found = "; ".join(f"{CHOICES[name].text}: {row} against {values[name]}" for name, row in tuned.items())
+        changes = 100 * (1 - better / worse) if index == "energy_J" else 1e3 * (better - worse) / len(own)
+        return require_change(changes[:, None], found=found, own=own)
 
     return check
 
@@ -335,13 +340,16 @@ def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, f
 
 TRACKING_CHECKS: dict[str, Checker] = {
     "cost-energy": _check_cost_against_energy,
-    **{f"least-{name}": _compare_cases(name, lambda _, ours: require_change(100 * (ours - 1))) for name in LEAST_ROWS},
-    **{f"ratios-{name}": _compare_cases(name, compare_readings) for name in LEAST_ROWS},
+    **{f"least-{name}": _compare_cases(name, _require_least) for name in LEAST_ROWS},
+    **{
+        f"ratios-{name}": _compare_cases(name, lambda theirs, ours, _: compare_readings(theirs, ours))
+        for name in LEAST_ROWS
+    },
     "balance": _check_balance,
     "follow": _check_following,
     "printed-gains": _check_printed_gains,
-    "torso-margin": _check_torso("zmp_margin_min_m", 1.0),
-    "torso-energy": _check_torso("energy_J", -1.0),
+    "torso-margin": _check_torso("zmp_margin_min_m"),
+    "torso-energy": _check_torso("energy_J"),
     "power-term": _check_power,
     "dynamics": _check_dynamics,
     **{f"instants-{decides}": _check_instants(decides) for decides in get_args(Decides)},
