@@ -253,7 +253,7 @@ def _check_adaptation(findings: StairsFindings) -> Check:
 
 
 def _check_climb(findings: StairsFindings) -> Check:
-    """Whether the hip's speed goes on where steps follow each other."""
+    """Whether the hip keeps its speed where steps follow each other."""
     first, after = (np.array([measure_hip_speeds(findings, what, case) for case in findings.cases]) for what in STEPS)
     jumps = np.abs([first[:, 1] - after[:, 0], after[:, 1] - after[:, 0]])
     texts = {"first": Series(first[:, 1]), "start": Series(after[:, 0]), "end": Series(after[:, 1])}
