@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,20 +14,26 @@ from nlp_gait.export.set_points import COUPLED, SetPoints, make_set_points, to_n
 from nlp_gait.export.webots import write_motion
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
 from nlp_gait.formulation import Result, Signals, sample_signals
-from nlp_gait.formulation.result import SCHEMA
+from nlp_gait.formulation.result import SCHEMA, sample_at_period
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 
 # Usual suffix of a file by format.
-FORMATS = {"webots": ".motion", "csv": ".csv", "json": ".signals.json", "mjcf": ".xml", "naoqi": ".naoqi.json"}
+FORMATS = {
+    "webots": ".motion",
+    "csv": ".csv",
+    "json": ".signals.json",
+    "mjcf": ".xml",
+    "naoqi": ".naoqi.json",
+    "ros": ".trajectory.json",
+}
 
 
 def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     """Write a gait to a file in one of FORMATS.
 
-    The period is between rows of ``webots`` and ``naoqi``, and the longest between those of ``csv`` and ``json``, which have the
-    problem's own samples and refine them.
+    Rows are exactly a period apart; the last one is that before the end, or after it where the robot is at rest.
 
     Raises:
         UnknownNameError: no such format.
@@ -47,16 +55,37 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     elif name == "mjcf":
         write_text(path, make_plan_model(make_plan(result), Drive()))
     elif name == "csv":
-        write_signals_csv(path, sample_signals(result, period_ms / 1000.0))
+        write_signals_csv(path, sample_at_period(result, period_ms))
+    elif name == "ros":
+        _check_motors(result)
+        write_json(path, to_ros(sample_at_period(result, period_ms)))
     else:
-        write_signals_json(path, result, sample_signals(result, period_ms / 1000.0))
+        write_signals_json(path, result, sample_at_period(result, period_ms))
 
 
 def write_signals_csv(path: Path, signals: Signals) -> None:
-    """Write one row per sample, with a header like ``q LKneePitch [rad]``; raises InputError, OutputError."""
+    """Write one row per sample, with a header like ``q_LKneePitch_rad``; raises InputError, OutputError."""
     table = list(signals.named_columns())
-    header = [f"{name} [{unit}]" for name, unit, _ in table]
+    header = [name_column(name, unit) for name, unit, _ in table]
     write_text(path, format_csv([header, *zip(*(values.tolist() for _, _, values in table), strict=True)]))
+
+
+def name_column(name: str, unit: str) -> str:
+    """Return a plain heading, ``qd_LKneePitch_rad_s``; a dimensionless column has no unit."""
+    suffix = "" if unit == "1" else "_" + unit.replace("/", "_").replace("^", "")
+    return name.replace(" ", "_") + suffix
+
+
+def to_ros(signals: Signals) -> dict[str, Any]:
+    """Return a ``trajectory_msgs/JointTrajectory``: positions [rad], velocities [rad/s], accelerations, efforts [Nm]."""
+    arrays = signals.arrays
+    fields = {"positions": "q", "velocities": "qd", "accelerations": "qdd", "effort": "tau"}
+    points = []
+    for k, t in enumerate(arrays["t"].tolist()):
+        seconds, nanoseconds = divmod(round(1e9 * t), 10**9)
+        values = {field: arrays[name][k].tolist() for field, name in fields.items()}
+        points.append({**values, "time_from_start": {"sec": seconds, "nanosec": nanoseconds}})
+    return {"header": {"frame_id": ""}, "joint_names": list(signals.joints), "points": points}
 
 
 def write_signals_json(path: Path, result: Result, signals: Signals) -> None:
@@ -81,10 +110,13 @@ def write_npz(path: Path, signals: Signals) -> None:
 
 def _make_motor_set_points(result: Result, period_ms: int) -> SetPoints:
     """Return set-points, if their joints are those of a robot."""
+    _check_motors(result)
+    return make_set_points(result, period_ms)
+
+
+def _check_motors(result: Result) -> None:
     robot = result.problem.display.robot
     if robot is None:
         raise InputError(f"problem {result.problem.name!r} has no robot with motors; export it as csv or json")
-    points = make_set_points(result, period_ms)
-    for joint in points.joints:
+    for joint in sample_signals(result, math.inf).joints:
         robot.joint(joint)
-    return points

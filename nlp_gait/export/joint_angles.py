@@ -14,8 +14,8 @@ from nlp_gait.export.webots import read_motion
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.robots import Robot
 
-# ``q LKneePitch [rad]`` of `export --format csv`, ``LKneePitch``, ``LKneePitch [deg]``, ``t``, ``time_s``.
-COLUMN = re.compile(r"(?:(?P<what>\w+) )?(?P<name>\w+)(?: ?\[(?P<unit>[^\]]*)\])?")
+# ``LKneePitch``, ``LKneePitch_deg``, ``LKneePitch [deg]``, and ``q_LKneePitch_rad`` of `export --format csv`.
+COLUMN = re.compile(r"(?P<name>\w+?)(?:_(?P<suffix>rad|deg)| ?\[(?P<unit>[^\]]*)\])?")
 TIMES = ("t", "time", "time_s")
 FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 
@@ -23,7 +23,7 @@ FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
     """Read angles over time of a robot's joints from a ``.motion`` file of Webots or from CSV.
 
-    CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch [deg]``; other columns
+    CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch_deg``; other columns
     of ``nlp-gait export --format csv`` are ignored.
 
     Raises:
@@ -39,18 +39,21 @@ def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
     table = read_table(path, "motion")
     times: int | None = None
     angles: dict[str, tuple[int, float]] = {}
+    exported = "t_s" in table.header  # which has other columns, too
     for k, heading in enumerate(table.header):
         match = COLUMN.fullmatch(heading)
-        what, name, unit = (match["what"], match["name"], match["unit"] or "") if match else (None, heading, "")
-        if what is None and name in TIMES:
+        name, unit = (match["name"], match["suffix"] or match["unit"] or "") if match else (heading, "")
+        name = name.removeprefix("q_") if exported else name
+        name = heading if heading in robot.joints else name
+        if name in TIMES or heading == "t_s":
             if unit not in ("", "s"):
                 raise InputError(f"{table.owner}: times must be in s, got [{unit}]")
             times = k
-        elif what in (None, "q") and name in robot.joints:
+        elif name in robot.joints:
             if unit not in FACTORS:
                 raise InputError(f"{table.owner}: {name} must be in rad or deg, got [{unit}]")
             angles[name] = k, FACTORS[unit]
-        elif what is None:
+        elif not exported:
             raise unknown(f"joint in {table.owner}", heading, robot.joints)
     if times is None:
         raise InputError(

@@ -9,6 +9,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
+from nlp_gait.formulation.result import count_periods
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
@@ -26,7 +27,7 @@ class SetPoints:
 
 
 def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
-    """Return planned joint angles at every period from time zero, and at the end, rounded to the millisecond.
+    """Return planned joint angles exactly a period apart, see ``count_periods``.
 
     Raises:
         InputError: the problem has no time histories, or the period is not a whole number of milliseconds >= 1.
@@ -37,8 +38,8 @@ def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
         raise InputError(f"the period must be a whole number of milliseconds >= 1, got {period_ms!r}")
     signals = sample_finely(result)
     duration = float(signals.arrays["t"][-1])
-    end_ms = max(1, round(1000.0 * duration))
-    times_ms = (*range(0, end_ms, period_ms), end_ms)
+    count = count_periods(signals, period_ms)
+    times_ms = tuple(range(0, (count + 1) * period_ms, period_ms))
     angles = CubicSpline(signals.arrays["t"], signals.arrays["q"])(np.minimum(np.array(times_ms) / 1000.0, duration))
     return SetPoints(joints=signals.joints, times_ms=times_ms, angles=angles)
 

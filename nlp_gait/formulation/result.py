@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from nlp_gait.decoding import decode
-from nlp_gait.errors import GaitError, InputError
+from nlp_gait.errors import GaitError, InputError, check_count
 from nlp_gait.files import read_json
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.registry import load
@@ -19,7 +19,9 @@ from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.user_code import resolve_code
 
 SCHEMA = 1  # of a result, and the default
-SHORTEST_S, LONGEST_S = 0.001, 60.0  # of a gait; a step takes a second
+SHORTEST_S, LONGEST_S = 0.001, 300.0  # of a gait; a step takes a second
+AT_REST = 1e-6  # largest rate of a joint that stands still [rad/s]
+ROUNDING = 1e-6  # of the number of periods: rounding must not add a row
 FINE_INTERVALS = 1000  # of a grid that splines are fitted to: their error is below 1e-9 rad
 
 
@@ -120,10 +122,38 @@ def sample_signals(result: Result, period_s: float) -> Signals:
     return signals if dense is None else dense.signals(result.x)
 
 
+def count_periods(signals: Signals, period_ms: int) -> int:
+    """Count whole periods of a motion, at least one; if it ends at rest, its last pose is held for the rest of one more."""
+    arrays = signals.arrays
+    count = 1000.0 * float(arrays["t"][-1]) / period_ms
+    rests = "qd" in arrays and bool(np.abs(arrays["qd"][-1]).max() < AT_REST)
+    return max(1, math.ceil(count - ROUNDING) if rests else math.floor(count + ROUNDING))
+
+
 def sample_finely(result: Result) -> Signals:
-    """Return signals with at least ``FINE_INTERVALS`` intervals if the problem can be refined; raises as ``sample_signals``."""
+    """Return signals with ``FINE_INTERVALS`` intervals a step if the problem can be refined; raises as ``sample_signals``."""
     signals = sample_signals(result, math.inf)
-    return sample_signals(result, float(signals.arrays["t"][-1]) / FINE_INTERVALS)
+    steps = max(1, len(result.problem.display.durations) // 2)
+    return sample_signals(result, float(signals.arrays["t"][-1]) / FINE_INTERVALS / steps)
+
+
+def sample_at_period(result: Result, period_ms: int) -> Signals:
+    """Return signals exactly a period apart, see ``count_periods``.
+
+    Values are interpolated linearly between fine samples, so that torques do not overshoot where a foot lands. Raises as
+    ``sample_signals``, and InputError for a period that is not a whole number of milliseconds >= 1.
+    """
+    check_count("period_ms", period_ms)
+    end = float(sample_signals(result, math.inf).arrays["t"][-1])
+    fine = sample_signals(result, min(period_ms / 1000.0, end / FINE_INTERVALS))
+    t = np.arange(count_periods(fine, period_ms) + 1) * period_ms / 1000.0
+    arrays = {"t": t}
+    for name, values in fine.arrays.items():
+        if name != "t":
+            columns = values.reshape(len(values), -1).T
+            found = np.stack([np.interp(t, fine.arrays["t"], column) for column in columns], axis=1)
+            arrays[name] = np.round(found) if np.isin(values, (0.0, 1.0)).all() else found
+    return replace(fine, arrays=arrays)
 
 
 def _check_times(times: Array) -> None:

@@ -12,6 +12,7 @@ import nlp_gait
 from nlp_gait.errors import InputError, OutputError, UnknownNameError
 from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.formulation import Result, load_result, problem_names
+from nlp_gait.formulation.result import sample_at_period
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
 
@@ -23,19 +24,18 @@ def result():
 
 
 @pytest.mark.slow
-def test_csv_has_units_in_its_header_and_the_problems_own_samples(result, tmp_path):
+def test_csv_has_plain_headers_with_units_and_rows_exactly_a_period_apart(result, tmp_path):
     path = tmp_path / "gait.csv"
     write_as("csv", path, result, 100)
     header, *rows = csv.reader(path.read_text().splitlines())
-    assert header[0] == "t [s]" and "tau LKneePitch [Nm]" in header and "zmp y [m]" in header and "com z [m]" in header
-    assert all(name.endswith("]") for name in header) and len(set(header)) == len(header)
+    assert header[0] == "t_s" and {"tau_LKneePitch_Nm", "qdd_LKneePitch_rad_s2", "zmp_y_m", "com_z_m"} <= set(header)
+    assert all(name.isidentifier() for name in header) and len(set(header)) == len(header)
     table = np.array(rows, dtype=float)
-    assert table.shape == (21, len(header))  # ten intervals of 200 ms, halved
+    assert table.shape == (21, len(header))
+    np.testing.assert_array_equal(table[:, 0], np.arange(21) / 10)
     signals = result.problem.signals(result.x)
     knee = signals.joints.index("LKneePitch")
-    np.testing.assert_allclose(
-        table[::2, header.index("tau LKneePitch [Nm]")], signals.arrays["tau"][:, knee], rtol=1e-12
-    )
+    np.testing.assert_allclose(table[::2, header.index("tau_LKneePitch_Nm")], signals.arrays["tau"][:, knee], rtol=1e-9)
 
 
 @pytest.mark.slow
@@ -69,6 +69,34 @@ def test_json_can_be_simulated_again(result, tmp_path):
     again = load_result(path)
     np.testing.assert_array_equal(again.x, result.x)
     assert again.problem.value("torque_change_limit_Nm") == 1.0
+
+
+def test_ros_trajectory_is_exactly_periodic_and_agrees_with_the_csv(result, tmp_path):
+    write_as("ros", tmp_path / "gait.json", result, 30)
+    data = json.loads((tmp_path / "gait.json").read_text())
+    points = data["points"]
+    times = [1e9 * p["time_from_start"]["sec"] + p["time_from_start"]["nanosec"] for p in points]
+    np.testing.assert_array_equal(np.diff(times), 30e6)
+    assert times[-1] == 1.98e9  # the last multiple before the end at 2 s, where the robot moves
+    assert all(
+        len(p[field]) == len(data["joint_names"]) for p in points for field in ("positions", "velocities", "effort")
+    )
+    signals = result.problem.signals(result.x)
+    np.testing.assert_allclose(points[20]["positions"], signals.arrays["q"][3], atol=1e-9)  # at 0.6 s
+    np.testing.assert_allclose(points[20]["effort"], signals.arrays["tau"][3], atol=1e-9)
+
+
+def test_both_phases_of_a_cycle_have_rows_exactly_a_millisecond_apart():
+    problem = nlp_gait.load("nao-cycle")
+    middle = (problem.lower + problem.upper) / 2
+    x = dict(zip(problem.names, middle, strict=True)) | {"single_support_time_s": 0.4003, "double_support_time_s": 0.2}
+    signals = sample_at_period(Result(problem=problem, x=problem.check_x(x)), 1)
+    np.testing.assert_array_equal(signals.arrays["t"], np.arange(601) / 1000)
+    exact = problem.signals(problem.check_x(x)).arrays
+    k = np.searchsorted(exact["t"], 0.5, side="left")
+    assert abs(exact["t"][k] - 0.5) > 1e-5  # not a sample of the problem
+    rate = np.diff(signals.arrays["q"], axis=0) / 0.001 - (signals.arrays["qd"][1:] + signals.arrays["qd"][:-1]) / 2
+    assert np.abs(np.delete(rate, 400, axis=0)).max() < 0.05  # accelerations jump where the foot lands, at 400.3 ms
 
 
 def test_naoqi_keys_move_every_motor_once_after_an_approach(result, tmp_path):
@@ -105,7 +133,7 @@ def test_what_a_problem_has_not_is_refused(tmp_path):
             40,
         )
     write_as("csv", tmp_path / "x.csv", walk, 40)
-    assert "left_stance [1]" in (tmp_path / "x.csv").read_text().splitlines()[0]
+    assert ",left_stance" in (tmp_path / "x.csv").read_text().splitlines()[0]
     with pytest.raises(UnknownNameError, match="webots"):
         write_as("webot", tmp_path / "x", walk, 40)
 

@@ -66,7 +66,7 @@ def test_set_points_are_the_planned_angles(points):
 def test_the_last_pose_is_the_end_of_the_phase():
     problem = nlp_gait.load("nao-ssp")
     found = make_set_points(Result(problem=problem, x=problem.check_x((*OPTIMUM[:-1], 0.4567))))
-    assert found.times_ms[-3:] == (400, 440, 457)
+    assert found.times_ms[-3:] == (360, 400, 440)
 
 
 @pytest.mark.slow
