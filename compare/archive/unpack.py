@@ -65,20 +65,18 @@ def _check_entries(owner: str, entries: list[zipfile.ZipInfo]) -> None:
         raise InputError(f"{owner} is larger than {MOST_FILES:,} files or {LARGEST_TOTAL:,} bytes when unpacked")
     seen: set[str] = set()
     for entry in entries:
-        name, mode = entry.filename, entry.external_attr >> 16
+        name, kind, size = entry.filename, stat.S_IFMT(entry.external_attr >> 16), entry.file_size
         place = PurePosixPath(name)
-        if not name.isprintable() or "\\" in name or ":" in name or place.is_absolute() or str(place) != name:
-            raise InputError(f"{owner} contains a file of the name {name!r}, which is not allowed")
-        if ".." in place.parts or name.casefold() in seen:
-            raise InputError(f"{owner} contains the file {name!r} twice, or outside of its folder")
-        if entry.is_dir() or (stat.S_IFMT(mode) not in (0, stat.S_IFREG)) or entry.flag_bits & 1:
-            raise InputError(
-                f"{owner} contains {name!r}, which is a folder, a link or encrypted; only plain files are allowed"
-            )
-        if entry.file_size > LARGEST_FILE or entry.file_size > 2**20 + HIGHEST_RATIO * entry.compress_size:
-            raise InputError(
-                f"{owner} contains {name!r} of {entry.file_size:,} bytes from {entry.compress_size:,}: too large"
-            )
+        is_odd = not name.isprintable() or "\\" in name or ":" in name or place.is_absolute() or str(place) != name
+        for is_wrong, reason in (
+            (is_odd, "has a name that is not allowed"),
+            (".." in place.parts or name.casefold() in seen, "is there twice, or outside of its folder"),
+            (entry.is_dir() or kind not in (0, stat.S_IFREG), "is a folder or a link; only plain files are allowed"),
+            (entry.flag_bits & 1, "is encrypted"),
+            (size > min(LARGEST_FILE, 2**20 + HIGHEST_RATIO * entry.compress_size), f"is too large: {size:,} bytes"),
+        ):
+            if is_wrong:
+                raise InputError(f"{owner} contains {name!r}, which {reason}")
         seen.add(name.casefold())
 
 

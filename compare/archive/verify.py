@@ -117,7 +117,7 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> Finding
     installed = hash_installed_code()
     other = any(origin.code_sha256 != installed for _, origin in own)
     note = f"; other code is installed here ({installed[:8]}), so runs cannot be repeated" if other else ""
-    detail = "; ".join(wrong) or f"{len(manifest.sessions)} sessions explain {len(own)} runs{note}"
+    detail = "; ".join(wrong) or f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
     return Finding(FILE, not wrong, detail)
 
 
