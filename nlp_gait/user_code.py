@@ -16,12 +16,13 @@ import shlex
 import shutil
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from functools import cache, lru_cache
 from importlib.abc import SourceLoader
 from importlib.metadata import entry_points
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
@@ -39,6 +40,16 @@ LARGEST_SOURCE = 4 * 2**20  # bytes
 LARGEST_PROGRAM = 64 * 2**20  # it may be compiled
 
 _allowed: dict[str, str] = {}
+# Files that another machine has sent, by the place that a reference names.
+_copies: dict[str, str] = {}
+
+
+class PackedCode(NamedTuple):
+    """The files of a reference, for a process that may not see the folders of this one."""
+
+    home: str  # place that the reference names
+    file: str  # name of that file
+    contents: Mapping[str, bytes]  # of it and of the files that it imports, by path in its folder
 
 
 class Reference(NamedTuple):
@@ -93,6 +104,7 @@ def parse_reference(text: str, kind: Kind) -> Reference:
     if is_program(text):
         return Reference(_find_program_file(text), text)
     home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
+    home = _copies.get(home, home)
     return Reference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
 
 
@@ -132,6 +144,7 @@ def parse_command(text: str) -> tuple[str, ...]:
         raise UserCodeError(f"{text!r}: {error}; write {PROGRAM} and a command as in a shell") from error
     if not words:
         raise UserCodeError(f"{text!r} names no program; write for example {PROGRAM}octave-cli --quiet my_ga.m")
+    words = tuple(_copies.get(word, word) for word in words)
     if shutil.which(words[0]) is None:
         raise UserCodeError(f"{text!r}: no program {words[0]!r} on this machine; install it, or give its path")
     return words
@@ -140,8 +153,41 @@ def parse_command(text: str) -> tuple[str, ...]:
 def _find_program_file(text: str) -> str:
     """Return the absolute path of a command's own file: the script that it names, else the program."""
     words = parse_command(text)
-    own = [word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word))]
-    return os.path.abspath(own[0] if own else shutil.which(words[0]) or words[0])
+    own = _find_own_word(words)
+    return os.path.abspath(own or shutil.which(words[0]) or words[0])
+
+
+def _find_own_word(words: Sequence[str]) -> str | None:
+    own = (word for word in words if os.path.isfile(word) and not (word == words[0] and os.path.isabs(word)))
+    return next(own, None)
+
+
+def pack_code(text: str, kind: Kind) -> PackedCode | None:
+    """Return the files of a reference; None for a module or an installed program, which another machine must have itself."""
+    home = _find_own_word(parse_command(text)) if is_program(text) else text.rpartition(":")[0]
+    if home is None or not parse_reference(text, kind).is_file:
+        return None
+    path = Path(os.path.abspath(home))
+    files = _read_with_imports(path)
+    return PackedCode(home, path.name, {str(file.relative_to(path.parent)): content for file, content in files.items()})
+
+
+def unpack_code(packed: PackedCode) -> None:
+    """Use the files of a reference that another machine has packed wherever this process meets the reference."""
+    digest = hashlib.sha256(repr(sorted(packed.contents.items())).encode()).hexdigest()[:16]
+    folder = Path(_make_folder_of_copies().name) / digest
+    for name, content in packed.contents.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            path.write_bytes(content)
+            path.chmod(0o700)  # it may be a program
+    _copies[packed.home] = str(folder / packed.file)
+
+
+@cache
+def _make_folder_of_copies() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="nlp-gait-code-")  # deleted when the process ends
 
 
 def hash_source(text: str, kind: Kind) -> str:

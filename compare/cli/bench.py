@@ -96,7 +96,7 @@ def bench(
         make_leaderboard_page(board, name, suite_name, runs, evaluations),
         describe_command(),
         [{"name": "gaitbench", "options": {"instance": id}} for id in chosen],
-        str(jobs or available_cores()),
+        scheduler or str(jobs or available_cores()),
     )
     written = write_document(out, page, "leaderboard")
 

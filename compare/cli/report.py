@@ -99,6 +99,7 @@ def reproduce(
     out: Path,
     quick: bool = False,
     effort: Path | None = None,
+    scheduler: str | None = None,
 ) -> None:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
@@ -114,7 +115,7 @@ def reproduce(
     if effort:
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
     with interruptible(out), progress_bar(paper, chosen.steps) as advance:
-        reproduction.reproduce(out, chosen, advance, command=describe_command(), on_outdated=say)
+        reproduction.reproduce(out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler)
     print_written(out / "report.md")
 
 

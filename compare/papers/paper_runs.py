@@ -44,6 +44,7 @@ class Runner:
         folder: of the reproduction.
         progress: receives a line for each run and each computation.
         jobs: worker processes; 1 runs in this process.
+        scheduler: address of a Dask scheduler, whose workers perform the runs; other computations stay on this machine.
         on_outdated: receives a line for each solver whose stored runs are recomputed, with the reason.
         records: of all tasks, filled by ``run_tasks``.
     """
@@ -51,6 +52,7 @@ class Runner:
     folder: Path
     progress: Progress
     jobs: int
+    scheduler: str | None = None
     on_outdated: Progress = ignore_progress
     records: list[RunRecord] = field(default_factory=list)
 
@@ -60,7 +62,7 @@ class Runner:
         Raises:
             InputError: a run failed before it had a point, or the folder holds runs of other tasks.
         """
-        study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, run=run)
+        study = Study(tasks=tuple(tasks), folder=self.folder, jobs=self.jobs, scheduler=self.scheduler, run=run)
 
         def report_stored(count: int) -> None:
             for _ in range(count):

@@ -87,6 +87,7 @@ class Reproduction(Generic[E, F]):
         jobs: int | None = None,
         command: str = "python",
         on_outdated: Progress = ignore_progress,
+        scheduler: str | None = None,
     ) -> F:
         """Write the report (HTML, Markdown), tables (CSV) and figures (PNG, SVG), and return the findings.
 
@@ -97,15 +98,16 @@ class Reproduction(Generic[E, F]):
             jobs: worker processes; None for one on each core.
             command: command line, for the report.
             on_outdated: receives a line for each solver whose stored runs are recomputed, with the reason.
+            scheduler: address of a Dask scheduler, whose workers perform the runs; None for processes of this machine.
 
         Raises:
             OutputError: the folder cannot be written to.
             InputError: its list of sessions is damaged.
         """
         folder, jobs = make_writable_folder(out), jobs or available_cores()
-        sessions = [*read_sessions(folder), Session.begin(command, str(jobs))]
+        sessions = [*read_sessions(folder), Session.begin(command, scheduler or str(jobs))]
         write_json(folder / SESSIONS, [asdict(session) for session in sessions])
-        runner = Runner(folder=folder, progress=progress, jobs=jobs, on_outdated=on_outdated)
+        runner = Runner(folder=folder, progress=progress, jobs=jobs, scheduler=scheduler, on_outdated=on_outdated)
         findings = self.run(runner, effort)
         progress("figures, tables and report")
         self.write_report(folder, findings, effort, runner, sessions)
