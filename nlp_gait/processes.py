@@ -201,7 +201,7 @@ def _limit_memory(further_bytes: int) -> None:
 
 
 def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
-    """Call picklable functions in so many processes (-1: all of joblib's backend); yield key and result of each as it finishes.
+    """Call picklable functions in so many processes; yield key and result of each as it finishes.
 
     Raises:
         WorkerError: a worker process died, or none starts.
@@ -209,13 +209,12 @@ def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterat
     from joblib import Parallel, delayed  # costs 0.1 s to import
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    # Dask's workers belong to its scheduler.
-    begin = {} if workers < 0 else {"initializer": exit_with_parent, "initargs": (os.getpid(),)}
+    begin = {"initializer": exit_with_parent, "initargs": (os.getpid(),)}
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
     results: Generator[tuple[K, T], None, None] | None = None
     try:
         with block_interrupts_in_children():
-            folder = _find_working_folder() if workers > 0 else None  # another machine has other folders
+            folder = _find_working_folder()
             try:
                 _check_descriptors(workers + SPARE_DESCRIPTORS)
                 results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
@@ -293,8 +292,8 @@ def _find_working_folder() -> str:
         ) from error
 
 
-def _call(key: K, call: Callable[[], T], folder: str | None) -> tuple[K, T]:
+def _call(key: K, call: Callable[[], T], folder: str) -> tuple[K, T]:
     """Call in the folder of the caller: a worker keeps that in which it was started, and paths may be relative."""
-    if folder is not None and os.getcwd() != folder:
+    if os.getcwd() != folder:
         os.chdir(folder)
     return key, call()

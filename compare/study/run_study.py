@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from compare.study.cluster import Job, run_on_cluster
 from compare.study.definition import describe_differences
 from compare.study.evidence import check_records
 from compare.study.record import RunRecord, check_readable, hash_installed_code, make_frame
 from compare.study.record_files import find_record, locate_record, write_record
-from compare.study.run_task import MOST_REASON, PLANNED_RUNS, Run, run_task, try_task
+from compare.study.run_task import PLANNED_RUNS, Run, run_task, try_task
 from compare.study.task import Task, check_task
 from nlp_gait.errors import GaitError, InputError, NoWorkersError, OutputError, WorkerError
 from nlp_gait.files import convert_errors, make_writable_folder, remove_leftovers
@@ -23,14 +23,9 @@ from nlp_gait.interrupts import Interrupted, delay_interrupts, remember_interrup
 from nlp_gait.notebook import format_html_table
 from nlp_gait.processes import run_in_processes
 from nlp_gait.progress import Progress
-from nlp_gait.user_code import Kind, PackedCode, is_user_code, pack_code, unpack_code
 
 # A study continues in new processes if one dies, unless they die so often without finishing any run.
 DEATHS_WITHOUT_PROGRESS = 3
-CONNECT_TIMEOUT = "10s"
-
-Job = tuple[Task, RunRecord | None]
-"""A task, and the run that it polishes, if it does."""
 
 
 def run_jobs(
@@ -41,7 +36,7 @@ def run_jobs(
     One worker is this process; the address of a Dask scheduler stands for its workers instead.
 
     Raises:
-        WorkerError: worker processes keep dying.
+        WorkerError: worker processes keep dying, or the cluster is lost.
         InputError: no Dask scheduler answers at the address, or Dask is not installed.
     """
     alone = scheduler is None and (workers == 1 or len(jobs) <= 1)
@@ -55,68 +50,26 @@ def run_jobs(
     if len(here) == len(jobs):
         return
     waiting = {position: job for position, job in enumerate(jobs) if position not in here}
+    if scheduler is not None:
+        yield from run_on_cluster(waiting, scheduler, run)
+        return
     deaths = 0
-    code = () if scheduler is None else _pack_code(task for task, _ in waiting.values())
-    with ExitStack() as stack:
-        if scheduler is not None:
-            stack.enter_context(_connect(scheduler))
-        while waiting:
-            try:
-                calls = {position: partial(_try_with_code, code, *job, run) for position, job in waiting.items()}
-                for position, record in run_in_processes(calls, -1 if scheduler else min(workers, len(calls))):
-                    del waiting[position]
-                    deaths = 0
-                    yield position, record
-            except WorkerError as error:
-                if isinstance(error, NoWorkersError):
-                    raise
-                deaths += 1
-                if deaths == DEATHS_WITHOUT_PROGRESS:
-                    raise WorkerError(
-                        f"a worker process died {deaths} times in a row, perhaps out of memory; finished runs are stored: "
-                        "rerun with fewer --jobs to continue"
-                    ) from error
-            except Exception as error:  # of Dask or of the worker's own Python, which may lack a package
-                if scheduler is None:
-                    raise
+    while waiting:
+        try:
+            calls = {position: partial(try_task, *job, run) for position, job in waiting.items()}
+            for position, record in run_in_processes(calls, min(workers, len(calls))):
+                del waiting[position]
+                deaths = 0
+                yield position, record
+        except WorkerError as error:
+            if isinstance(error, NoWorkersError):
+                raise
+            deaths += 1
+            if deaths == DEATHS_WITHOUT_PROGRESS:
                 raise WorkerError(
-                    f"the Dask cluster at {scheduler!r} failed: {' '.join(str(error).split())[:MOST_REASON]}; finished runs are stored: rerun "
-                    "the same command to continue. Its workers need the same nlp-gait and extras as this machine"
+                    f"a worker process died {deaths} times in a row, perhaps out of memory; finished runs are stored: "
+                    "rerun with fewer --jobs to continue"
                 ) from error
-
-
-def _try_with_code(code: Sequence[PackedCode], task: Task, start: RunRecord | None, run: Run) -> RunRecord:
-    """Perform a run, perhaps on a machine that does not see the folders of the one that began the study."""
-    for packed in code:
-        unpack_code(packed)
-    return try_task(task, start, run)
-
-
-def _pack_code(tasks: Iterable[Task]) -> tuple[PackedCode, ...]:
-    """Return the files of all user code that tasks name."""
-    packed: dict[tuple[str, Kind], PackedCode | None] = {}
-    for task in tasks:
-        names: list[tuple[object, Kind]] = [(task.problem.name, "problem")]
-        names += [(task.solver, "algorithm")] if task.is_user_code else []
-        for name, kind in names:
-            if isinstance(name, str) and is_user_code(name, kind) and (name, kind) not in packed:
-                packed[name, kind] = pack_code(name, kind)
-    return tuple(each for each in packed.values() if each is not None)
-
-
-def _connect(address: str) -> AbstractContextManager[object]:
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InputError("--scheduler needs Dask: pip install 'nlp-gait[cluster]'") from error
-    from joblib import parallel_config
-
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are reported in one sentence
-    stack = ExitStack()
-    with convert_errors(f"no Dask scheduler answers at {address!r}", InputError, "start one with `dask scheduler`"):
-        stack.enter_context(Client(address, timeout=CONNECT_TIMEOUT, set_as_default=True))
-    stack.enter_context(parallel_config(backend="dask"))
-    return stack
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -1,4 +1,4 @@
-"""A study on a real Dask cluster on loopback, one worker of which is killed in the middle."""
+"""A study on a real Dask cluster on loopback: user code reaches its workers, and a killed worker or scheduler loses no run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, WorkerError
 from tests.compare.study.test_study import contents
 
 pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="distributed not installed")  # slow to import
@@ -30,56 +31,85 @@ STUDY = StudySettings(
 )
 
 
-def dask(*arguments: str) -> subprocess.Popen[bytes]:
-    """A process of Dask's command line that knows this package."""
+def dask(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
+    """A process of Dask's command line that knows this package, in another folder than the study's."""
     root = Path(__file__).parents[3]
     environment = {**os.environ, "PYTHONPATH": str(root), "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "30s"}
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     return subprocess.Popen(
-        [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]], env=environment, **quiet
+        [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]], env=environment, cwd=folder, **quiet
     )
 
 
 @pytest.fixture
-def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Address of a scheduler, and its two workers."""
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address of a scheduler, and it with its two workers."""
+    folder = tmp_path_factory.mktemp("workers")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{probe.getsockname()[1]}"
-    scheduler = dask("dask_scheduler", "--host", address, "--no-dashboard")
+    scheduler = dask(folder, "dask_scheduler", "--host", address, "--no-dashboard")
     workers = [
-        dask("dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+        dask(folder, "dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
         for _ in range(2)
     ]
-    yield address, workers
+    yield address, [scheduler, *workers]
     for process in (*workers, scheduler):
         process.kill()
         process.wait()
 
 
+OWN = """
+import numpy as np
+from helper import draw
+
+def search(evaluate, lower, upper, evaluations, seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(evaluations):
+        evaluate(draw(rng, lower, upper)[None])
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of Dask's own clean-up
-def test_a_killed_worker_changes_nothing(cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path) -> None:
+def test_user_code_reaches_workers_and_killed_processes_lose_no_run(
+    cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from distributed import Client
 
-    address, workers = cluster
+    address, (scheduler, *workers) = cluster
+    monkeypatch.chdir(tmp_path)
+    Path("own.py").write_text(OWN)
+    Path("helper.py").write_text("def draw(rng, lower, upper):\n    return rng.uniform(lower, upper)\n")
+    settings = replace(STUDY, solvers=(*STUDY.solvers, SolverSpec(name="own.py:search")))
     with Client(address, timeout="60s") as client:
         client.wait_for_workers(2, timeout=60)
-    killed: list[Task] = []
+    finished: list[RunRecord] = []
 
-    def kill_one(task: Task, record: RunRecord) -> None:
-        if not killed:
+    def kill_a_worker(task: Task, record: RunRecord) -> None:
+        if not finished:
             os.kill(workers[0].pid, signal.SIGKILL)
-            killed.append(task)
+        finished.append(record)
 
-    run_study(Study(tasks=STUDY.tasks(), folder=tmp_path / "cluster", scheduler=address), progress=kill_one)
-    assert killed and workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
-    run_study(Study(tasks=STUDY.tasks(), folder=tmp_path / "here"))
+    run_study(Study(tasks=settings.tasks(), folder=tmp_path / "cluster", scheduler=address), progress=kill_a_worker)
+    assert workers[0].wait(10) == -signal.SIGKILL and workers[1].poll() is None
+    run_study(Study(tasks=settings.tasks(), folder=tmp_path / "here"))
     assert contents(tmp_path / "cluster") == contents(tmp_path / "here")
+    finished.clear()
+
+    def kill_the_scheduler(task: Task, record: RunRecord) -> None:
+        scheduler.kill()
+        finished.append(record)
+
+    more = replace(settings, solvers=(SolverSpec(name="own.py:search"),), runs=30, stop=Stop(evaluations=2000))
+    with pytest.raises(WorkerError, match="failed: .*; finished runs are stored: rerun the same command to continue"):
+        study = Study(tasks=more.tasks(), folder=tmp_path / "lost", scheduler=address)
+        run_study(study, progress=kill_the_scheduler)
+    assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more.tasks())
 
 
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.study.run_study.CONNECT_TIMEOUT", "1s")
+    monkeypatch.setattr("compare.study.cluster.CONNECT_TIMEOUT", "1s")
     with pytest.raises(InputError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         run_study(Study(tasks=STUDY.tasks(), folder=tmp_path, scheduler="tcp://127.0.0.1:9"))
