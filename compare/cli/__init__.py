@@ -18,9 +18,8 @@ from compare.cli.evaluate import evaluate
 from compare.cli.exchange import archive, cite, import_results, logs, verify
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
-from compare.cli.questions.optima import certainty, motions, motors, prices, robust, sweep
+from compare.cli.questions.optima import certainty, motions, motors, prices, robust, sweep, walk
 from compare.cli.questions.pareto import pareto
-from compare.cli.questions.walk import walk
 from compare.cli.report import report, reproduce
 from compare.cli.simulate import simulate
 from compare.cli.solve import plan, search, solve

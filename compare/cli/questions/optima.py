@@ -1,14 +1,15 @@
-"""Commands about optima: how certain they are (``certainty``), and how they change (``motions``, ``motors``, ``prices``, ...)."""
+"""Commands about optima: how certain they are (``certainty``), and how they change (``motions``, ``prices``, ``walk``, ...)."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from compare.cli.command import command
 from compare.cli.common import print_json, progress_bar, stdout
-from compare.cli.options import AnyProblem, NamedProblem, NaoPhase, name_all, parse_names
+from compare.cli.options import AnyCycle, AnyProblem, NamedProblem, NaoPhase, name_all, parse_names
 from compare.cli.questions.output import Output
+from compare.cli.simulate import DriveOptions
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 
@@ -171,3 +172,45 @@ def sweep(
 
     axes, effort = [parse_axis(text) for text in over], {"starts": starts, "evaluations": evaluations, "seed": seed}
     output.answer(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort))
+
+
+@command
+def walk(
+    *,
+    over: str | None = None,
+    engine: bool = False,
+    steps: int | None = None,
+    baseline: list[str] | None = None,
+    starts: int = 5,
+    seed: int = 0,
+    drives: DriveOptions,
+    problem: AnyCycle,
+    output: Output,
+) -> None:
+    """Find the cheapest walking cycle at each speed: its cost of transport, and its simulation in a physics engine.
+
+    The problem is nao-cycle, or humanoid-cycle, with the power as its objective; each point starts from its neighbours.
+    Simulations are open loop unless a feedback is named. Rerun the command to continue after an interruption.
+
+    Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
+    `nlp-gait walk --baseline cart-table --baseline least-torque --engine`,
+    `nlp-gait walk humanoid-cycle --robot my.urdf --over speed_m_s=0.05 --baseline cart-table`,
+    `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
+    """
+    from compare.questions.sweep import parse_axis
+    from compare.questions.walk.walk import CheapestWalk, check_cycle, default_speeds
+    from compare.study.simulations import STEPS
+
+    check_cycle(problem.name)
+    cycle = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name).load()
+    output.answer(
+        CheapestWalk(
+            problem=cycle,
+            axis=parse_axis(over or default_speeds(cycle)),
+            starts=starts,
+            seed=seed,
+            steps=(STEPS if engine else 0) if steps is None else steps,
+            drive=drives.make(),
+            planners=baseline or (),
+        )
+    )
