@@ -1,4 +1,4 @@
-"""Files of a study for other programs and papers: CSV, Parquet, LaTeX tables, figures as PDF."""
+"""Files of a study for other programs and papers: CSV, Parquet, LaTeX tables with booktabs, figures as PDF."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def _write_figures(stem: Path, comparison: Comparison, style: Path | None) -> li
     return [*written, write_text(stem.with_name(f"{stem.name}-figures.tex"), text)]
 
 
-HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "gap", "$p$")
+LATEX_HEADER = ("solver", "feasible", "best", "median", "mean", "std.", "worst", "gap", "$p$")
 SPECIAL = str.maketrans(
     {c: rf"\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}", "\\": r"\textbackslash{}"}
 )
@@ -149,7 +149,7 @@ def format_latex_table(comparison: Comparison) -> str:
     leader = comparison.solvers[0].name
     p_values = {pair.second: pair.rank_sum for pair in compare_pairs(comparison) if pair.first == leader}
     best = find_leaders(comparison)
-    lines = [" & ".join(HEADER) + r" \\"]
+    lines = [" & ".join(LATEX_HEADER) + r" \\"]
     for solver, summary in zip(comparison.solvers, summarise(comparison), strict=True):
         values = [comparison.value(cost) for cost in solver.feasible]
         deviation = stdev(values) if len(values) > 1 else None
@@ -167,7 +167,7 @@ def format_latex_table(comparison: Comparison) -> str:
             r"\centering\small\setlength{\tabcolsep}{4pt}",
             rf"\caption{{{_write_caption(comparison)}}}",
             rf"\label{{tab:{make_file_name(comparison.problem)}}}",
-            rf"\begin{{tabular}}{{l{'r' * (len(HEADER) - 1)}}}",
+            rf"\begin{{tabular}}{{l{'r' * (len(LATEX_HEADER) - 1)}}}",
             r"\toprule",
             lines[0],
             r"\midrule",
