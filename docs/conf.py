@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from docs.pages import algorithms, api, commands, gallery, papers, problems  # noqa: E402
+from docs.pages import algorithms, api, commands, gallery, model, papers, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
 project = "nlp-gait"
@@ -21,11 +21,12 @@ author = "The authors of nlp-gait"
 project_copyright = "the authors of nlp-gait; BSD-3-Clause"
 smartquotes = False  # two hyphens are an option
 release = version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery", "docs.mathml"]
 exclude_patterns = [
     "pages",
     "generated/papers",
     "generated/examples",
+    "generated/model",
     "generated/gallery/*.ipynb",
     "generated/gallery/*.py",
     "**/sg_execution_times.*",
@@ -34,7 +35,9 @@ suppress_warnings = ["config.cache"]  # the gallery's configuration holds functi
 nitpicky = False
 default_role = "code"
 
-myst_enable_extensions = ["colon_fence", "fieldlist"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "fieldlist"]
+myst_dmath_double_inline = False
+html_math_renderer = "mathml"
 myst_heading_anchors = 4
 
 autodoc_typehints = "description"
@@ -69,5 +72,5 @@ def setup(app):
 def write_pages(app):
     """Pages of problems, papers, algorithms, commands and names."""
     folder = Path(app.srcdir) / "generated"
-    for part in (problems, papers, algorithms, commands, api):
+    for part in (problems, papers, algorithms, commands, api, model):
         part.write(folder)

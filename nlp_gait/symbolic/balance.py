@@ -24,7 +24,7 @@ def zmp_of_wrench(wrench: Wrench, height: float, weight: float) -> SX:
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (19), (20), with the sign of g made physical and the rotational term as the rate
-        of angular momentum about y (in x) and about x (in y).
+        of angular momentum about y (in x) and about x (in y); (B.1) to (B.3) in docs/model.
     """
     (fx, fy, _), (nx, ny, _) = ca.vertsplit(wrench.force), ca.vertsplit(wrench.moment)
     load = ground_load(wrench, weight)
@@ -64,7 +64,7 @@ def sole_limits(wrench: SX, along: tuple[float, float], across: tuple[float, flo
 
     Source:
         Caron, Pham, Nakamura (2015), "Stability of surface contacts for humanoid robots: closed-form formulae of the contact
-        wrench cone for rectangular support areas", with its absolute values as pairs of rows.
+        wrench cone for rectangular support areas", with its absolute values as pairs of rows; (B.11) to (B.13) in docs/model.
     """
     mu = friction / math.sqrt(2.0)
     fx, fy, fz, nx, ny, nz = ca.vertsplit(wrench)
@@ -86,7 +86,7 @@ def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
     """Return the ZMP (2,) of feet on the same flat ground, from their ZMPs (2,) in the world [m] and vertical forces [N].
 
     Source:
-        Gupta, Pratihar, Deb (2023), eqs. (30), (31).
+        Gupta, Pratihar, Deb (2023), eqs. (30), (31); (B.4) in docs/model.
     """
     moment = sum((p * f for p, f in zip(zmps, ground_loads, strict=True)), SX(2, 1))
     return moment / sum(ground_loads, SX(0))  # (eqs. 30, 31)
@@ -104,7 +104,7 @@ def zmp_of_point_masses(masses: DM, p: SX, a: SX, gravity: float, *, static_load
             point vanishes only if the centre of mass has no vertical acceleration.
 
     Source:
-        Goswami, Vadakkepat, Phung (2008), eqs. (12)-(14).
+        Goswami, Vadakkepat, Phung (2008), eqs. (12)-(14); (B.5) and (W.4) in docs/model.
     """
     weight = gravity * float(ca.sum1(masses))
     vertical = gravity + a[2, :]

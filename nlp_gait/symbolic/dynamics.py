@@ -86,7 +86,7 @@ def newton_euler(
         Gives the torques of Gupta, Pratihar, Deb (2023), eqs. (15)-(18); the recursion is that of Luh, Walker and Paul
         (1980), with each link seen from the joint through which it is reached, inertias regrouped and products of spins
         shared as Khalil and Kleinfinger (1987) do. Rotors add their inertia at the joint times its acceleration, without
-        gyroscopic torques: Featherstone (2008), section 9.6.
+        gyroscopic torques: Featherstone (2008), section 9.6. Equations (D.1) to (D.9) in docs/model.
     """
     shares = shares or {}
     rotations = [relative_rotation(body, q) for body in tree]
@@ -118,7 +118,7 @@ def regroup_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[I
 
     Matter on the axis of a joint moves in the same way whether it belongs to the body before or after the joint, and exerts no
     torque about the axis. So mass, the first moment along the axis and the second moment along it are moved to the body before:
-    only the first body has mass. Links in ``kept`` are not changed.
+    only the first body has mass. Links in ``kept`` are not changed. Equation (D.10) in docs/model.
     """
     inertias = [_inertia(body) for body in tree]
     for i in range(len(tree) - 1, 0, -1):

@@ -57,7 +57,7 @@ def centre_of_mass(tree: Sequence[Body], poses: Sequence[Pose]) -> SX:
     """Return the centre of mass (3,) of all bodies [m].
 
     Source:
-        Gupta, Pratihar, Deb (2023), eq. (23).
+        Gupta, Pratihar, Deb (2023), eq. (23); (K.4) in docs/model.
     """
     total = sum(body.link.mass_kg for body in tree)
     return sum((body.link.mass_kg * pose.com for body, pose in zip(tree, poses, strict=True)), SX(3, 1)) / total
@@ -92,7 +92,8 @@ def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (5)-(14) with the hip yaw-pitch angle at zero; the arcsine of eq. (9) replaced by
-        the two-argument arctangent, velocities and accelerations by differentiating in closed form.
+        the two-argument arctangent, velocities and accelerations by differentiating in closed form: (K.5)
+        to (K.17) in docs/model.
     """
     (x, y, z), (xd, yd, zd), (xdd, ydd, zdd) = (ca.vertsplit(part) for part in hip_to_ankle)
 

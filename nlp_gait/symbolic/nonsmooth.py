@@ -128,7 +128,7 @@ class Lift:
 
 
 class Lifted(Nonsmooth):
-    """Absolute values and minima as variables with inequalities; a jump as a sigmoid.
+    """Absolute values and minima as variables with inequalities; a jump as a sigmoid: (L.3) to (L.11), (S.2) in docs/model.
 
     ``width`` is that of the sigmoid, in units of the switch (an NLP parameter).
     """

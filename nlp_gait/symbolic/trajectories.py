@@ -33,7 +33,8 @@ def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
     The coefficients are (m, k), with m = spans + 1, or 0 for zero curves.
 
     Source:
-        Basis functions of Cox and de Boor on uniform knots with clamped ends; derivatives by de Boor's formula.
+        Basis functions of Cox and de Boor on uniform knots with clamped ends; derivatives by de Boor's formula:
+        (C.10) to (C.13) in docs/model.
     """
     m, k = coefficients.shape
     if m == 0:
@@ -119,7 +120,8 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
     ``phase`` is time / duration; the duration [s] must not be zero.
 
     Source:
-        Gupta, Pratihar, Deb (2023), Tables 3 and 5 (four boundary conditions each), in Hermite form.
+        Gupta, Pratihar, Deb (2023), Tables 3 and 5 (four boundary conditions each), in Hermite form:
+        (C.2) to (C.6) in docs/model.
     """
     rise, v0, v1 = end - start, start_velocity * duration, end_velocity * duration
     c2 = 3 * rise - 2 * v0 - v1
@@ -150,7 +152,7 @@ def parabola_lift(along: Motion, start: float | SX, end: float | SX, height: SX)
 
     Source:
         Gupta, Pratihar, Deb (2023), Table 3, row 2, with Z_A(x_f) = 0 in place of the misprinted Z_A(x_i + S_L) = 0:
-        with Z'(x_m) = 0 the cubic has no third-order term.
+        with Z'(x_m) = 0 the cubic has no third-order term; (C.7) to (C.9) in docs/model.
     """
     half = (end - start) / 2
     offset = (along.position - (start + end) / 2) / half

@@ -43,7 +43,7 @@ PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
 
 
 def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
-    """Compute the mean electrical power by the trapezoidal rule [W]: braking costs as much as driving, one K (eq. 32)."""
+    """Compute the mean electrical power by the trapezoidal rule [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
     mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
     return time_mean(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
 

@@ -223,7 +223,7 @@ class NaoBody(Body):
         Outside the sole the paper's zero is continued below zero, so that an infeasible gait shows how far outside it is.
 
         Source:
-            Gupta, Pratihar, Deb (2023), eqs. (21), (22).
+            Gupta, Pratihar, Deb (2023), eqs. (21), (22); (B.6), (B.7) in docs/model.
         """
         foot = self.robot.feet["left"]
 
