@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import pytest
@@ -14,7 +13,6 @@ from compare.papers.walk12 import walk12_runs, walk12_walks
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, SHARES, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
-from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.simulation import measurements, mjcf, simulate
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 from tests.compare.papers.walk12_readings import (
@@ -39,9 +37,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
         patch.setitem(vars(REPRODUCTION), "quick", replace(REPRODUCTION.quick, starts=1, runs=1))
         for drives in [name for name in walk12_walks.DRIVES if name not in ("ours", walk12_walks.HELD)]:
             patch.delitem(walk12_walks.DRIVES, drives)
-        # From an optimum five of ten iterations bring f within 2e-7; each has 20,000 nodes.
-        few = IpoptSettings(iterations=5)
-        patch.setattr(walk12_runs, "solve", partial(walk12_runs.solve, solver=few))
         patch.setattr(walk12_walks, "WALKED_STEPS", 1)
         patch.setattr(walk12_walks, "STEP_TIMES_S", (1.0,))
         patch.setattr(simulate, "SETTLE_TIME", 0.0)
