@@ -70,8 +70,10 @@ def compare_runs(record: RunRecord, task: Task, records: Sequence[RunRecord]) ->
         ("x", record.x, again.x),
         ("evaluations", record.evaluations, again.evaluations),
         ("history", record.history, again.history),
+        ("number of failed evaluations", record.failed_evaluations, again.failed_evaluations),
+        ("number of iterations", record.iterations, again.iterations),
         ("claim", record.claimed_objective, again.claimed_objective),
-        ("verdict", record.verdict.objective, again.verdict.objective),
+        ("verdict", repr(record.verdict), repr(again.verdict)),  # as text, for NaN differs from itself
     ):
         if before != now:
             return f"its {what} differs: recorded {before!s:.100}, found {now!s:.100}"

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_file, replace_nan
 from nlp_gait.gaitbench.definitions import Subset
-from nlp_gait.gaitbench.generated import make_id
+from nlp_gait.gaitbench.generated import list_test_seeds, make_id
 
 # Rules: the same runs, budget and seeds for all solvers.
 RUNS = 15
@@ -57,13 +58,17 @@ def choose_instances(
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Return the seeds of ``0:15`` (15 is not among them) or ``3,5,8``; raises InputError."""
+    """Return the seeds of ``0:15`` (15 is not among them), ``3,5,8`` or ``test:5``, today's; raises InputError."""
+    if text.startswith("test:") and text.removeprefix("test:").isdecimal():
+        return list_test_seeds(datetime.now(UTC).date(), int(text.removeprefix("test:")))
     match = SEEDS.fullmatch(text)
     seeds = tuple(range(int(match[1]), int(match[2]))) if match else ()
     if not match and all(part.strip().isdecimal() for part in text.split(",")):
         seeds = tuple(int(part) for part in text.split(","))
     if not 0 < len(seeds) <= MOST_SEEDS:
-        raise InputError(f"--seeds takes FIRST:END or numbers with commas, at most {MOST_SEEDS}, got {text!r}")
+        raise InputError(
+            f"--seeds takes FIRST:END, test:COUNT or numbers with commas, at most {MOST_SEEDS}, got {text!r}"
+        )
     return seeds
 
 

@@ -11,15 +11,20 @@ from compare.cli.command import command
 from compare.cli.common import (
     describe_command,
     end_interrupted,
+    fail,
     print_result,
     print_table,
+    print_written,
     progress_bar,
+    say,
     stdout,
     until_interrupted,
 )
-from compare.cli.options import parse_names
+from compare.cli.options import name_all, parse_names
+from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
+from nlp_gait.user_code import is_reference
 
 # Solvers that run beside yours on instances or with a budget for which no baseline is shipped.
 RIVALS = "random,pso,de,cma"
@@ -34,6 +39,9 @@ def bench(
     seeds: str = "0:5",
     against: str = RIVALS,
     audit: bool = False,
+    submit: Path | None = None,
+    verify: Path | None = None,
+    rerun: float = 0.1,
     label: str = "",
     runs: int = RUNS,
     evaluations: int = EVALUATIONS,
@@ -49,7 +57,8 @@ def bench(
 
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
     `nlp-gait bench --algorithm my.py:MyAlgo --families walk12-long,ssp --seeds 0:5 --out DIR`,
-    `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`
+    `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`,
+    `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
     """
     from compare.bench.baseline import list_instances
     from compare.bench.leaderboard import rank_solvers
@@ -57,8 +66,17 @@ def bench(
     from compare.report.writing import add_session, write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
+    from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
+    from compare.study.task import ProblemSpec, Stop
     from nlp_gait.backends.kernel.compiled import available_cores
 
+    if submit is not None or verify is not None:
+        name_all([algorithm] if algorithm and is_reference(algorithm) else [])
+        if submit is not None:
+            _submit(submit)
+        if verify is not None:
+            _verify(verify, rerun, as_json)
+        return
     if audit:
         if algorithm is None:
             raise InputError("--audit examines one search: name it with --algorithm")
@@ -84,6 +102,14 @@ def bench(
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         check_study(study)
+        named = tuple(SolverSpec(name=solver, label=own) for solver, own in solvers.items())
+        settings = StudySettings(
+            problems=tuple(ProblemSpec(name=id) for id in chosen),
+            solvers=named,
+            runs=runs,
+            stop=Stop(evaluations=evaluations),
+        )
+        write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
         with progress_bar(f"{name or 'all'} runs", len(study.tasks)) as advance:
             records, stopped = until_interrupted(
                 lambda: run_study(study, progress=lambda task, _: advance(task.problem.title)), nothing=""
@@ -148,3 +174,21 @@ def _audit(algorithm: str, as_json: bool) -> None:
 
     effects = [{**asdict(effect), "verdict": effect.verdict} for effect in found.effects]
     print_result(as_json, {**asdict(found), "effects": effects, "accusations": list(found.accusations)}, (), tables)
+
+
+def _submit(folder: Path) -> None:
+    """Write the submission next to its folder."""
+    from compare.bench.submission import SUFFIX, pack_submission
+
+    print_written(pack_submission(folder, output_file(folder.with_name(f"{folder.name}-submission{SUFFIX}"))))
+
+
+def _verify(path: Path, rerun: float, as_json: bool) -> None:
+    """Verify a submission; status 1 if anything does not hold."""
+    from compare.bench.submission import verify_submission
+
+    findings, _ = verify_submission(path, share=rerun, progress=say)
+    data = {"holds": all(f.holds for f in findings), "findings": [f._asdict() for f in findings]}
+    print_result(as_json, data, (), lambda: stdout.print("\n".join(finding.sentence for finding in findings)))
+    if not data["holds"]:
+        fail("the submission is rejected: see what does not hold")

@@ -1,0 +1,111 @@
+"""A submission holds as it is written, and no number in it can be edited, whether its hashes are computed again or not."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from compare.archive.pack import write_archive
+from compare.archive.unpack import MANIFEST
+from compare.bench.baseline import make_bench_tasks, parse_seeds
+from compare.bench.submission import check_rules, pack_submission, verify_submission
+from compare.study.record import RunRecord
+from compare.study.run_study import Study, run_study
+from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
+from compare.study.task import ProblemSpec, Stop
+from nlp_gait.errors import InputError
+from nlp_gait.gaitbench.generated import is_test_seed
+
+ID = "walk12-w015"
+EDITS = 12
+# What a run says about its machine and its clock cannot be checked.
+UNCHECKED = ("time_s", "origin", "solver_version", "session")
+
+
+def run(folder: Path, instances: tuple[str, ...] = (ID,)) -> list[RunRecord]:
+    tasks = make_bench_tasks(instances, "pso", runs=2, evaluations=100)
+    settings = StudySettings(
+        problems=tuple(ProblemSpec(name=id) for id in instances),
+        solvers=(SolverSpec(name="pso"),),
+        runs=2,
+        stop=Stop(evaluations=100),
+    )
+    write_manifest(folder, settings, Session.begin("nlp-gait bench", "1"))
+    return run_study(Study(tasks=tasks, folder=folder))
+
+
+@pytest.fixture(scope="module")
+def submission(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bench")
+    run(folder)
+    return pack_submission(folder, folder / "submission.zip")
+
+
+def list_numbers(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the place of every number in a record."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in items:
+        if key in UNCHECKED:
+            continue
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            yield (*path, key)
+        yield from list_numbers(value, (*path, key))
+
+
+def edit(path: Path, out: Path, seed: int, *, rehash: bool) -> tuple[Any, ...]:
+    """Write a copy with one number of one record edited, and return its place."""
+    rng = np.random.default_rng(seed)
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    record = str(rng.choice(sorted(name for name in content if name.startswith("records/"))))
+    data = json.loads(content[record])
+    place = list(list_numbers(data))
+    chosen = place[int(rng.integers(len(place)))]
+    inner = data
+    for key in chosen[:-1]:
+        inner = inner[key]
+    old = inner[chosen[-1]]
+    inner[chosen[-1]] = old + 1 if isinstance(old, int) else old * (1 - 1e-3) - 1e-6
+    content[record] = json.dumps(data).encode()
+    if rehash:
+        content.pop(MANIFEST)
+        write_archive(out, content, {})
+    else:
+        with zipfile.ZipFile(out, "w") as copy:
+            for name, part in content.items():
+                copy.writestr(name, part)
+    return chosen
+
+
+def test_a_submission_holds_as_it_was_written(submission: Path) -> None:
+    findings, records = verify_submission(submission, share=1.0)
+    assert [f.sentence for f in findings if not f.holds] == []
+    assert len(records) == 2 and sum(f.what.startswith("repeated") for f in findings) == 2
+
+
+@pytest.mark.parametrize("seed", range(EDITS))
+def test_an_edited_number_is_rejected(submission: Path, tmp_path: Path, seed: int) -> None:
+    """With the hashes as they were and computed again; the 100 of ``python -m benchmarks.gaitbench.edits`` likewise."""
+    place = edit(submission, tmp_path / "edited.zip", seed, rehash=seed % 2 == 0)
+    try:
+        findings, _ = verify_submission(tmp_path / "edited.zip", share=1.0)
+    except InputError:
+        return
+    assert not all(f.holds for f in findings), place
+
+
+def test_rules(tmp_path: Path) -> None:
+    """Training seeds are not for submissions; test seeds of the day are; every instance has the same runs."""
+    records = run(tmp_path, ("gb2:walk12-long:0",))
+    assert [f.what for f in check_rules(records) if not f.holds] == ["instances"]
+    with pytest.raises(InputError, match="cannot be submitted: instances: DOES NOT HOLD"):
+        pack_submission(tmp_path, tmp_path / "x.zip")
+    assert [f.what for f in check_rules(records[1:]) if not f.holds] == ["seeds of runs", "instances"]
+    assert not check_rules([])[0].holds
+    assert all(map(is_test_seed, parse_seeds("test:3")))
