@@ -21,16 +21,21 @@ from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 
-ROUNDS = 15  # in which rows, lifted variables and active rows change
+ROUNDS = 15  # in which rows and lifted variables are added
 VIOLATED = 1e-9  # by a solution of the program, in units of the row
 PRICED = 1e-6  # multiplier of a row that is active
+AT_ZERO = 1e-7  # largest |v| that is zero
+KINK = 1e-3  # least share of the price of |v|'s other row where v is zero
 RANK = 1e-9  # singular values of active rows below this share of the largest are zero
 # Smallest curvature of the program, relative to the largest.
 LEAST_CURVATURE = 1e-6
+MARGIN = 1e-2  # of the curvature across active rows, relative to the largest
 NO_BOUND = 1e30  # DAQP's infinity
 EQUATION, SOFT = 5, 8  # DAQP's marks of rows; a soft one may be violated
 INFEASIBLE = -1  # DAQP's exit flag
-SETTINGS = {"primal_tol": 1e-10, "dual_tol": 1e-10, "iter_limit": 1000}
+# More |v| at zero than this depend on each other in the problems here: DAQP then fails after hundreds of iterations.
+MOST_KINKS = 30
+SETTINGS = {"primal_tol": 1e-10, "dual_tol": 1e-10, "iter_limit": 200}
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +63,15 @@ class _Program:
     linear: Array  #: (q,)
 
 
+@dataclass(frozen=True, eq=False)
+class _Bend:
+    """What is added to a program to make it convex, for its first unknowns."""
+
+    hessian: Array
+    linear: Array
+    least: float  #: smallest curvature, that of further unknowns
+
+
 class StepSolver:
     """Programs of one NLP; each begins with the rows and lifted variables that mattered in the last one."""
 
@@ -82,9 +96,12 @@ class StepSolver:
 
     def begin(self, multipliers: Array) -> None:
         """Begin the next program with the rows that have a price in multipliers (m,), and with |v| at zero."""
-        active = np.flatnonzero(np.abs(multipliers) > PRICED)
-        counts = np.bincount(self._owner[active[active >= self._first] - self._first], minlength=self.lifted)
-        self._kept = np.flatnonzero((counts > 1) & ~self._is_tight)
+        price = np.abs(multipliers)
+        active = np.flatnonzero(price > PRICED)
+        total = np.bincount(self._owner, price[self._first :], minlength=self.lifted)
+        highest = np.maximum.reduceat(price[self._order], self._groups) if self.lifted else total
+        least = KINK * np.maximum(highest, KINK * price.max(initial=0.0)) + PRICED
+        self._kept = np.flatnonzero((total - highest > least) & ~self._is_tight)
         of_kept = np.zeros(len(multipliers), dtype=bool)
         of_kept[self._first :] = np.isin(self._owner, self._kept)
         self._rows = active[active < self._first]
@@ -106,27 +123,35 @@ class StepSolver:
         Takes what is left to the bounds of the rows (m,) and of z (n,), negative and positive.
         """
         ties, kept = self.choose_ties(self._functions.g), self._kept
+        if self.lifted:
+            kept = np.union1d(kept, self._find_kinks(self._functions.g))
         rows = np.union1d(self._rows, np.flatnonzero((lower == upper)[: self._first]))
         program = self._reduce(ties, kept, lower)
+        bend = self._choose_bend(program, rows, lower, upper, z_lower, z_upper)
         for _ in range(ROUNDS):
+            if len(kept) > MOST_KINKS:
+                return None
             inside = np.concatenate([rows, self._first + np.flatnonzero(np.isin(self._owner, kept))])
-            found = self._solve_dense(program, inside, lower, upper, z_lower, z_upper)
+            found = self._solve_dense(program, bend, inside, lower, upper, z_lower, z_upper)
             if found is None:
                 return None
-            y, priced, active, relaxed, settled = found
-            solved = program, inside, y, priced, relaxed
-            change = program.constant + program.rows @ y
+            solved = program, inside, *found
+            change = program.constant + program.rows @ found[0]
             out = np.maximum(lower - change, change - upper)
             out[program.chosen] = out[inside] = 0.0
             wrong = np.flatnonzero(out > VIOLATED)
-            self._active = active
-            if not wrong.size and settled:
+            if not wrong.size:
                 break
             rows = np.union1d(rows, wrong[wrong < self._first])
-            if wrong.size and wrong[0] >= self._first:  # the rows of the problem are satisfied
-                kept = np.union1d(kept, self._owner[wrong - self._first])
+            if wrong[0] >= self._first:  # the rows of the problem are satisfied
+                kept = np.concatenate([kept, np.unique(self._owner[wrong - self._first])])
                 program = self._reduce(ties, kept, lower)
         return self._finish(*solved)
+
+    def _find_kinks(self, g: Array) -> IntArray:
+        """Return the lifted variables with more than one row at its bound: |v| at zero."""
+        at_bound = np.add.reduceat(g[self._order] < AT_ZERO, self._groups)
+        return np.flatnonzero((at_bound > 1) & ~self._is_tight)
 
     def _reduce(self, ties: IntArray, kept: IntArray, lower: Array) -> _Program:
         """Eliminate all lifted variables but the kept ones."""
@@ -164,38 +189,52 @@ class StepSolver:
             linear=full[:, :-1].T @ (at.gradient + bent[:, -1]),
         )
 
+    def _choose_bend(
+        self, program: _Program, rows: IntArray, lower: Array, upper: Array, z_lower: Array, z_upper: Array
+    ) -> _Bend:
+        """Choose what makes the program convex, from what was active at the end of the last one."""
+        active, at_bound = self._active
+        active = active[(active >= self._first) | np.isin(active, rows)]
+        low, high = (lower - program.constant)[active], (upper - program.constant)[active]
+        low, high = np.append(low, z_lower[at_bound]), np.append(high, z_upper[at_bound])
+        targets = np.where(np.abs(high) < np.abs(low), high, low)
+        normals = np.concatenate([program.rows[active], np.eye(self.n, len(program.linear))[at_bound]])
+        return _make_bend((program.hessian + program.hessian.T) / 2, normals, targets)
+
     def _solve_dense(
-        self, program: _Program, inside: IntArray, lower: Array, upper: Array, z_lower: Array, z_upper: Array
-    ) -> tuple[Array, Array, tuple[IntArray, IntArray], bool, bool] | None:
-        """Return y, multipliers of the rows, what is active, whether rows are violated, and whether curvature fits."""
-        q = len(program.linear)
+        self,
+        program: _Program,
+        bend: _Bend,
+        inside: IntArray,
+        lower: Array,
+        upper: Array,
+        z_lower: Array,
+        z_upper: Array,
+    ) -> tuple[Array, Array, IntArray, bool] | None:
+        """Return y, multipliers of the rows, the variables at a bound, and whether rows are violated."""
+        q, old = len(program.linear), len(bend.linear)
         free = np.full(q - self.n, NO_BOUND)
-        high = np.concatenate([z_upper, free, (upper - program.constant)[inside]])
-        low = np.concatenate([z_lower, -free, (lower - program.constant)[inside]])
-        active_rows, at_bound = self._active
-        known = np.isin(inside, active_rows)
-        # Targets only matter in combination with the last multipliers' sides; both sides coincide for most rows.
-        side = np.where(np.abs(high[q:]) < np.abs(low[q:]), high[q:], low[q:])[known]
-        edge = np.where(np.abs(high[:q]) < np.abs(low[:q]), high[:q], low[:q])[at_bound]
-        normals = np.concatenate([program.rows[inside[known]], np.eye(q)[at_bound]])
-        hessian, linear, changed = _convexify(program, normals, np.concatenate([side, edge]))
+        high = np.minimum(np.concatenate([z_upper, free, (upper - program.constant)[inside]]), NO_BOUND)
+        low = np.maximum(np.concatenate([z_lower, -free, (lower - program.constant)[inside]]), -NO_BOUND)
+        hessian, linear = (program.hessian + program.hessian.T) / 2, program.linear.copy()
+        hessian[:old, :old] += bend.hessian
+        linear[:old] += bend.linear
+        hessian[range(old, q), range(old, q)] += bend.least
         sense = np.where(high - low <= 0.0, EQUATION, 0).astype(np.int32)
         rows = np.ascontiguousarray(program.rows[inside])
-        high, low = np.minimum(high, NO_BOUND), np.maximum(low, -NO_BOUND)
         for relaxed in (False, True):
             y, _, flag, info = self._daqp.solve(hessian, linear, rows, high, low, sense, **SETTINGS)
             if flag > 0:
                 prices = np.asarray(info["lam"])
-                is_active = np.abs(prices) > PRICED
-                active = inside[is_active[q:]], np.flatnonzero(is_active[:q])
-                same = all(map(np.array_equal, active, (inside[known], at_bound)))
-                return y, prices[q:], active, relaxed, same or not changed
+                return y, prices[q:], np.flatnonzero(np.abs(prices[: self.n]) > PRICED), relaxed
             if flag != INFEASIBLE:
                 return None
             sense[q:] = SOFT
         return None
 
-    def _finish(self, program: _Program, inside: IntArray, y: Array, priced: Array, relaxed: bool) -> Step:
+    def _finish(
+        self, program: _Program, inside: IntArray, y: Array, priced: Array, at_bound: IntArray, relaxed: bool
+    ) -> Step:
         """Return the whole step, with the multipliers of the eliminated rows, and keep what the next program begins with."""
         at, n = self._functions, self.n
         extended = np.append(y, 1.0)
@@ -206,23 +245,22 @@ class StepSolver:
             rest = -(at.gradient + bent)[n:] - at.rows_by_s.T @ multipliers
             rest, own = rest[program.eliminated], program.own
             multipliers[program.chosen] = rest / own if isinstance(own, np.ndarray) else own.solve(rest, "T")
-        at_bound = self._active[1]
         self.begin(multipliers)
-        self._active = self._active[0], at_bound[at_bound < n]
+        self._active = self._active[0], at_bound
         return Step(step, multipliers, -float(at.gradient @ step + 0.5 * step @ bent), relaxed)
 
 
-def _convexify(program: _Program, normals: Array, targets: Array) -> tuple[Array, Array, bool]:
-    """Return a positive definite Hessian, its linear term, and whether the Hessian had to change.
+def _make_bend(hessian: Array, normals: Array, targets: Array) -> _Bend:
+    """Return what makes a Hessian positive definite.
 
     Curvature across the rows that were active, ``normals`` y = ``targets``, is raised around a point on them: it changes nothing
     while they stay active. Negative curvature along them changes its sign.
     """
-    hessian = (program.hessian + program.hessian.T) / 2
+    q = len(hessian)
     curvature = np.linalg.eigvalsh(hessian)
     least = LEAST_CURVATURE * max(float(np.abs(curvature).max(initial=0.0)), 1e-3)
     if curvature[0] >= least:
-        return np.ascontiguousarray(hessian), program.linear, False
+        return _Bend(np.zeros((q, q)), np.zeros(q), least)
     length = np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
     u, s, vt = np.linalg.svd(normals / length[:, None], full_matrices=True)
     rank = int(np.sum(s > RANK * s.max(initial=0.0)))
@@ -231,12 +269,13 @@ def _convexify(program: _Program, normals: Array, targets: Array) -> tuple[Array
     values, directions = np.linalg.eigh(along.T @ hessian @ along)
     positive = np.maximum(np.abs(values), least)
     axes = along @ directions
-    hessian = hessian + (axes * (positive - values)) @ axes.T
-    mixed = across.T @ hessian @ axes
-    schur = across.T @ hessian @ across - (mixed / positive) @ mixed.T
-    raised = max(0.0, 10 * least - float(np.linalg.eigvalsh(schur)[0])) if rank else 0.0
+    bend = (axes * (positive - values)) @ axes.T
+    bent = hessian + bend
+    mixed = across.T @ bent @ axes
+    schur = across.T @ bent @ across - (mixed / positive) @ mixed.T
+    raised = max(0.0, MARGIN * np.abs(curvature).max() - float(np.linalg.eigvalsh(schur)[0])) if rank else 0.0
     projector = raised * across
-    return np.ascontiguousarray(hessian + projector @ across.T), program.linear - projector @ (across.T @ point), True
+    return _Bend(bend + projector @ across.T, -projector @ (across.T @ point), least)
 
 
 def _load_daqp() -> Any:

@@ -24,6 +24,8 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 # than this share of the variables' ranges.
 COST_ERROR, VIOLATION, SHORT = 1e-7, 1e-8, 1e-3
 SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays
+LEAST_COST = 0.1  # of which relative tolerances are taken
+LONGEST = 0.25  # step, as a share of the variables' ranges; shorter after a step that had to be shortened
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step that are tried
 PRICE_FACTOR = 2.0  # weight of the violation in the merit, in units of the largest multiplier
 MEMORY = 3  # a step may raise the merit above that of the last point, not above all of so many
@@ -42,6 +44,7 @@ class Replan:
     solver: str  #: that found x: ``"sqp"`` or ``"ipopt"``
     note: str  #: why it did not converge, or why IPOPT was used; else empty
     violated: tuple[ConstraintValue, ...]  #: violated constraints and by how much, worst first
+    guess: Guess  #: x and its multipliers in the lifted NLP
 
 
 def replanner(
@@ -119,7 +122,7 @@ class Replanner:
             run.improve(iterations, started + time_limit_s)
         found = run.result()
         if run.converged or found.feasible:
-            self._guess = run.guess()
+            self._guess = found.guess
         if not run.converged and math.isinf(time_limit_s):
             found = self._solve_by_ipopt(problem, found)
         if judge:
@@ -163,6 +166,7 @@ class Replanner:
             solver="ipopt",
             note=note,
             violated=self._exact.find_violated(self._exact.at(outcome.x, problem.p)),
+            guess=outcome.guess or found.guess,
         )
 
 
@@ -189,16 +193,17 @@ class _Run:
     def improve(self, iterations: int, deadline: float) -> None:
         """Take steps until one converges or a limit is reached."""
         merits: list[float] = []
+        longest = LONGEST
         while not self.converged:
             if self.iterations >= iterations or time.perf_counter() >= deadline:
                 self.note = f"stopped at the limit after {self.iterations} steps"
                 return
             at, n = self._at, self._n
-            w, cost = self._w, at.cost[0]
+            w, cost = self._w, float(at.cost[0])
+            size = max(abs(cost), LEAST_COST)
             at.differentiate(self._multipliers)
-            step = self._steps.solve(
-                self._lower - at.g, self._upper - at.g, self._z_lower - w[:n], self._z_upper - w[:n]
-            )
+            z_lower, z_upper = np.maximum(self._z_lower - w[:n], -longest), np.minimum(self._z_upper - w[:n], longest)
+            step = self._steps.solve(self._lower - at.g, self._upper - at.g, z_lower, z_upper)
             self.iterations += 1
             if step is None:
                 self.note = f"the quadratic program of step {self.iterations} failed"
@@ -207,18 +212,15 @@ class _Run:
             merits = [*merits[1 - MEMORY :], cost + weight * self._violation]
             for share in SHARES:
                 self._go_to(w + share * step.w)
-                if at.cost[0] + weight * self._violation <= max(merits) + 1e-12 * abs(cost):
+                if at.cost[0] + weight * self._violation <= max(merits) + 1e-12 * size:
                     break
             self._multipliers = self._multipliers + share * (step.multipliers - self._multipliers)
             self._keep_best()
             error = abs(at.cost[0] - cost + step.decrease)
-            length = np.abs(step.w[:n]).max(initial=0.0)
-            accurate = error <= COST_ERROR * max(abs(cost), 1e-9) and length <= SHORT
+            length = float(np.abs(step.w[:n]).max(initial=0.0))
+            longest = min(2.0 * longest, LONGEST) if share == 1.0 else share * length
+            accurate = error <= COST_ERROR * size and length <= SHORT
             self.converged = share == 1.0 and accurate and self._violation <= VIOLATION and not step.relaxed
-
-    def guess(self) -> Guess:
-        """Return the last point with its multipliers."""
-        return Guess(primal=self._w, bounds=np.zeros(len(self._w)), rows=self._multipliers, width=self._width)
 
     def result(self) -> Replan:
         """Return the optimum, else the best feasible point, else the last one with its violated rows."""
@@ -236,6 +238,9 @@ class _Run:
             solver="sqp",
             note=self.note,
             violated=() if feasible else self._list_violated(),
+            guess=Guess(
+                primal=self._w, bounds=np.zeros(len(self._w)), rows=self._multipliers.copy(), width=self._width
+            ),
         )
 
     def _go_to(self, w: Array) -> None:

@@ -1,0 +1,92 @@
+"""Planning again after 1,000 changes of the parameters: ``python -m benchmarks.onboard [--changes N] [PROBLEM...]``.
+
+Every limit and weight moves by up to 5 % of its default, independently. Each result is compared with IPOPT at its sharpest from
+that result (same basin), and with IPOPT from the optimum of the defaults.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+
+import numpy as np
+
+import nlp_gait
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.onboard.replanner import Replan
+from nlp_gait.backends.optima.optimum import SHARP
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+
+PROBLEMS = ("nao-ssp", "nao-dsp", "nao-cycle")
+CHANGE, SAME = 0.05, 1e-6  # relative
+COMPARED = 100  # results that are compared with IPOPT, at most
+
+
+def draw_change(problem: GaitProblem, rng: np.random.Generator) -> dict[str, float]:
+    """Return every limit and weight, moved by up to ``CHANGE`` of its default."""
+    moved = {q.name: q.default * (1.0 + CHANGE * rng.uniform(-1.0, 1.0)) for q in problem.own_parameters}
+    return {q.name: float(np.clip(moved[q.name], q.minimum, q.maximum)) for q in problem.own_parameters}
+
+
+def measure(name: str, changes: int, starts: int) -> None:
+    """Print one problem's times and shares."""
+    problem = nlp_gait.load(name)
+    solution = nlp_gait.solve(problem, starts=starts, solver=nlp_gait.IpoptSettings(compiled=True), workers=1)
+    plan = nlp_gait.replanner(problem, near=solution)
+    near = min(solution.starts, key=lambda outcome: outcome.rank)
+    rng = np.random.default_rng(1)
+    drawn = [draw_change(problem, rng) for _ in range(changes)]
+    plan.solve(drawn[0])  # buffers and caches
+    found: list[Replan] = []
+    wall, used = np.zeros(changes), np.zeros(changes)
+    for k, values in enumerate(drawn):
+        started, began = time.perf_counter(), time.thread_time()
+        found.append(plan.solve(values))
+        wall[k], used[k] = time.perf_counter() - started, time.thread_time() - began
+    settings = replace(SHARP, compiled=True).prepare(problem)
+    same, followed, compared = 0, 0, 0
+    for values, result in list(zip(drawn, found, strict=True))[:COMPARED]:
+        moved = problem.with_values(**values)
+        own = settings.run_from(moved, replace(near, guess=result.guess, x=result.x))
+        warm = settings.run_from(moved, near)
+        if own is None or warm is None or not (own.converged and warm.converged):
+            continue
+        compared += 1
+        cost = problem.objective.sign * result.objective
+        good = result.feasible and result.converged
+        same += good and abs(cost - own.cost) <= SAME * abs(own.cost)
+        followed += good and cost - warm.cost <= SAME * abs(warm.cost)
+    by_steps = sum(result.solver == "sqp" and result.converged for result in found)
+    violated = [
+        plan_violation(problem, values, result) for values, result in zip(drawn[:COMPARED], found, strict=False)
+    ]
+    print(
+        f"{name}: wall median {1e3 * np.median(wall):.2f}, 99th percentile {1e3 * np.percentile(wall, 99):.2f} ms; processor "
+        f"{1e3 * np.median(used):.2f}, {1e3 * np.percentile(used, 99):.2f} ms; steps median "
+        f"{np.median([result.iterations for result in found]):g}; {by_steps} of {changes} without IPOPT; same optimum {same}, "
+        f"not worse than IPOPT warm {followed} of {compared}; feasible for the exact functions "
+        f"{sum(v <= FEASIBILITY_TOLERANCE for v in violated)} of {len(violated)}",
+        flush=True,
+    )
+
+
+def plan_violation(problem: GaitProblem, values: dict[str, float], result: Replan) -> float:
+    """Return the exact violation of a result."""
+    return build_exact_model(problem).at(result.x, problem.with_values(**values).p).violation
+
+
+def main() -> None:
+    """Measure all problems."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.onboard", description=__doc__)
+    parser.add_argument("problems", nargs="*", default=PROBLEMS)
+    parser.add_argument("--changes", type=int, default=1000)
+    parser.add_argument("--starts", type=int, default=5, help="of IPOPT for the first optimum")
+    arguments = parser.parse_args()
+    for name in arguments.problems:
+        measure(name, arguments.changes, arguments.starts)
+
+
+if __name__ == "__main__":
+    main()
