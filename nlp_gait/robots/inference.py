@@ -75,18 +75,26 @@ def find_legs(robot: str, joints: Records, feet: Mapping[str, Mapping[str, Any]]
         left, right = (str(feet.get(side, {}).get("link")) for side in SIDES)
         return Legs((left, right), _split_chains(chains.get(left, []), chains.get(right, [])))
     found: list[tuple[float, Legs]] = []
+    others_m: list[tuple[float, int, tuple[str, str]]] = []
     for pair in combinations(sorted(chains), 2):
         own = _split_chains(chains[pair[0]], chains[pair[1]])
-        if all(len(chain) == LEG_JOINT_COUNT for chain in own) and _are_mirror_chains(*own):
+        count = len(own[0])
+        if count != len(own[1]) or not count or not _are_mirror_chains(*own):
+            continue
+        if count == LEG_JOINT_COUNT:
             found.append((own[0][0].place[2], Legs(pair, own)))
+        else:
+            others_m.append((own[0][0].place[2], count, pair))
     remedy = (
         'name them in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
         "(docs/custom-robots.md describes the supported legs)"
     )
     if not found:
+        height, count, pair = min(others_m, default=(0.0, 0, ("", "")))
+        lowest_pair = f"; the lowest pair, {pair[0]!r} and {pair[1]!r}, has legs of {count} joints" if count else ""
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other, with {LEG_JOINT_COUNT} turning joints each "
-            f"below the link where both legs meet; {remedy}"
+            f"below the link where both legs meet{lowest_pair}; {remedy}"
         )
     found.sort(key=lambda item: (item[0], item[1].feet))
     lowest, *others = [legs for height, legs in found if height < found[0][0] + CLEARLY_LOWER_M]

@@ -20,7 +20,7 @@ from nlp_gait.robots.mjcf import list_dependencies, mjcf_points, mjcf_record
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_name
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
-from nlp_gait.robots.urdf import collision_points, list_meshes, urdf_record
+from nlp_gait.robots.urdf import collision_points, find_moving_link, list_meshes, urdf_record
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
@@ -276,6 +276,9 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
             decode_value(Mapping[str, Any], record.raw, f"feet.{side}")
     links, joints, feet = ({k: dict(r.raw) for k, r in group.items()} for group in (file.links, file.joints, file.feet))
     with convert_errors(f"robot file {model!r}", RobotDataError):
+        for record in feet.values():  # a sole's link is often behind a fixed joint
+            if model.endswith(".urdf") and record.get("link") not in links:
+                record["link"] = find_moving_link(model, str(record.get("link")))
         legs = find_legs(name, joints, feet)
         if file.unphysical == "repair":
             repair_links(links, legs.links, faults[0], notes)

@@ -49,6 +49,10 @@ def make_tensor(moments: Sequence[float]) -> np.ndarray:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], dtype=float)
 
 
+# Smaller moments are placeholders, without influence on any motion: a sphere of 1 mg and 1 mm has 4e-13.
+NEGLIGIBLE_KGM2 = 1e-12
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
     """Rigid link."""
@@ -63,7 +67,7 @@ class Link:
         owner = f"link {self.name!r}"
         check_numbers(owner, self, positive=("mass_kg",))
         low, middle, high = np.linalg.eigvalsh(self.inertia_matrix)
-        slack = TRIANGLE_TOLERANCE * high
+        slack = max(TRIANGLE_TOLERANCE * high, NEGLIGIBLE_KGM2)
         if low < -slack or low + middle < high - slack:
             raise RobotDataError(
                 f"{owner}: inertia_com_kgm2 has principal moments {low:.3e}, {middle:.3e}, {high:.3e} kg m^2; a rigid body "

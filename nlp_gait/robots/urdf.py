@@ -58,6 +58,12 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
     }
 
 
+def find_moving_link(path: str, link: str) -> str:
+    """Return the link that turns with a link behind fixed joints, or the link itself; raises as ``urdf_record``."""
+    joints = {joint.child: joint for joint in _parse(_read_xml(path), path).joints}
+    return _find_carrier(link, joints)
+
+
 def collision_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
     """Return points of all collision shapes that move with a link, from its joint, along the root's axes at zero angles.
 

@@ -14,6 +14,7 @@ import pytest
 from nlp_gait.errors import GaitError, InputError, RobotDataError, warn_once
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
+from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import partner, partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
@@ -177,6 +178,31 @@ def test_what_matters_is_repaired_on_request(tmp_path: Path) -> None:
     robot = load_robot(override(crooked(tmp_path, text), unphysical="repair"))
     assert 0.0 < robot.links["A_knee_link"].mass_kg < 1e-4
     assert sum("repaired as requested" in note for note in robot.notes) == 2
+
+
+def test_a_foot_behind_a_fixed_joint_is_found(tmp_path: Path) -> None:
+    soles = ""
+    for x in "AB":
+        ends = f'<parent link="{x}_ankle_roll_link"/><child link="{x}_sole"/>'
+        soles += f'<link name="{x}_sole"/><joint name="{x}_weld" type="fixed">{ends}</joint>'
+    text = crooked_urdf().replace("</robot>", soles + "</robot>")
+    named = override(crooked(tmp_path, text), feet={"left": {"link": "A_sole"}, "right": {"link": "B_sole"}})
+    assert load_robot(named).feet["left"].link == "A_ankle_roll_link"
+
+
+def test_legs_of_another_number_of_joints_are_counted(tmp_path: Path) -> None:
+    text = crooked_urdf()
+    for x in "AB":
+        text = text.replace(f'<joint name="{x}_knee" type="revolute">', f'<joint name="{x}_knee" type="fixed">')
+    with pytest.raises(RobotDataError, match=r"'A_.*_link' and 'B_.*_link', has legs of 5 joints"):
+        load_robot(crooked(tmp_path, text))
+
+
+def test_placeholder_inertias_are_no_fault() -> None:
+    tiny = (4.9e-21, 3.5e-20, 5.4e-20, 0.0, 0.0, 0.0)
+    assert Link(name="a", mass_kg=0.1, com_m=(0.0, 0.0, 0.0), inertia_com_kgm2=tiny).mass_kg == 0.1
+    with pytest.raises(RobotDataError, match="principal moments"):
+        Link(name="a", mass_kg=0.1, com_m=(0.0, 0.0, 0.0), inertia_com_kgm2=tuple(1e12 * i for i in tiny))
 
 
 def test_exchanged_feet_are_refused(tmp_path: Path) -> None:
