@@ -20,6 +20,7 @@ from compare.cli.common import (
     progress_bar,
     say,
     say_error,
+    stderr,
     stdout,
 )
 from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
@@ -111,6 +112,8 @@ def compare(
     if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):
         raise InputError(f"no gait of {', '.join(p.title for p in settings.problems)} can be simulated; omit --engine")
     write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
+    if stderr.is_terminal:
+        say(f"watch it: nlp-gait report {out} --watch")
     with progress_bar("runs", len(study.tasks)) as advance:
         try:
             records = run_study(

@@ -67,14 +67,22 @@ def animate(
 ) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
 
-    Example: `nlp-gait animate best.json --out walk.gif` after `nlp-gait solve nao-ssp --out best.json`
+    An .html file is a page that plays the gait in 3-D, with power and balance margin.
+
+    Examples: `nlp-gait animate best.json --out walk.gif` after `nlp-gait solve nao-ssp --out best.json`,
+    `nlp-gait animate best.json --out walk.html`
     """
     from compare.drawing.animation import draw_frames, write_contact_sheet
     from compare.drawing.gait_figure import make_skeleton
+    from compare.report.gait_page import animate_gait
     from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
     loaded = stored.load()
     target = output_file(stored.result.with_suffix(".gif") if out is None else out)
+    if target.suffix.lower() == ".html":
+        animate_gait(loaded.problem, loaded.x, loaded.problem.name).write(target)
+        print_written(target)
+        return
     if target.suffix.lower() != SHEET:
         check_video_path(target)
     skeleton = make_skeleton(loaded, frames_per_s / speed)

@@ -56,6 +56,7 @@ def report(
     drive_options: DriveOptions,
     as_csv: bool = False,
     as_json: bool = False,
+    watch: bool = False,
 ) -> None:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
@@ -63,14 +64,15 @@ def report(
     evaluated again. Records whose numbers do not follow from it, or that contradict a proof, are excluded; then the exit status
     is 1.
 
-    With `--engine` the best gaits are simulated and stored, and the report says whether the engine confirms the model.
+    With `--engine` the best gaits are simulated and stored, and the report says whether the engine confirms the model. With
+    `--watch` the report follows a running study until Ctrl-C.
 
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
     """
     from compare.analysis.comparison import label_editions
     from compare.analysis.record_statistics import Weighting
-    from compare.report import FurtherFiles, write_report
+    from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
     from compare.study.evidence import read_evidence
     from compare.study.settings import read_manifest
 
@@ -83,6 +85,9 @@ def report(
             raise InputError(f"{flag} must be a finite number, got {weight}")
     weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
     name_all(code)
+    if watch:
+        say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
+        watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
     simulated = simulate_best(folder, records, drive_options.make()) if engine else []

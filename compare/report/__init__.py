@@ -2,5 +2,6 @@
 
 from compare.report.study_files import FurtherFiles
 from compare.report.study_report import rebuild_report, write_report
+from compare.report.watch import watch_report
 
-__all__ = ["FurtherFiles", "rebuild_report", "write_report"]
+__all__ = ["FurtherFiles", "rebuild_report", "watch_report", "write_report"]

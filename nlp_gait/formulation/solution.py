@@ -199,6 +199,14 @@ class Solution:
         plot_gait: Any = import_object(FUNCTIONS["plot_gait"])
         return plot_gait(self._restore(problem), self.x, self.solver)
 
+    def animate(self, problem: GaitProblem | None = None) -> Any:
+        """Return a page that plays the gait in 3-D, with power and balance margin; notebooks display it, ``write`` saves it.
+
+        The problem and the errors are as for ``signals``.
+        """
+        animate_gait: Any = import_object(FUNCTIONS["animate_gait"])
+        return animate_gait(self._restore(problem), self.x, self.solver)
+
     def _restore(self, problem: GaitProblem | None) -> GaitProblem:
         from nlp_gait.formulation.registry import load
 

@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
+import nlp_gait
 from compare.report import write_report
+from compare.report.gait_page import animate_gait
 from compare.study.record import RunRecord
 from compare.study.settings import Manifest
 from tests.browser import SCREENS, Visit, list_accessibility_faults, list_wide_parts, start_browser, visit
@@ -183,3 +185,15 @@ def test_what_a_page_loads_is_noticed(browser: Any, report: Path, tmp_path: Path
     probed.write_text(report.read_text(encoding="utf-8").replace("</main>", image + "</main>"), encoding="utf-8")
     with visit(browser, probed) as opened:
         assert any("127.0.0.1:9" in message for message in opened.messages)
+
+
+def test_a_solution_is_a_page_of_its_own_and_a_frame_in_notebooks(browser: Any, tmp_path: Path) -> None:
+    shown = animate_gait(nlp_gait.load("nao-dsp"), DSP_X, "paper")
+    (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><main>{shown._repr_html_()}</main>", encoding="utf-8")
+    shown.write(tmp_path / "gait.html")
+    moved = "Number(document.querySelector('canvas').dataset.time) > 20"
+    with visit(browser, tmp_path / "gait.html") as opened:
+        opened.page.wait_for_function(moved)
+        assert (opened.messages, opened.requests) == ([], [])
+    with visit(browser, tmp_path / "notebook.html") as opened:
+        opened.page.frames[1].wait_for_function(moved)
