@@ -42,6 +42,7 @@ def bench(
     submit: Path | None = None,
     verify: Path | None = None,
     rerun: float = 0.1,
+    leaderboard: Path | None = None,
     label: str = "",
     runs: int = RUNS,
     evaluations: int = EVALUATIONS,
@@ -76,6 +77,9 @@ def bench(
             _submit(submit)
         if verify is not None:
             _verify(verify, rerun, as_json)
+        return
+    if leaderboard is not None:
+        _write_leaderboard(leaderboard, out, as_json)
         return
     if audit:
         if algorithm is None:
@@ -192,3 +196,13 @@ def _verify(path: Path, rerun: float, as_json: bool) -> None:
     print_result(as_json, data, (), lambda: stdout.print("\n".join(finding.sentence for finding in findings)))
     if not data["holds"]:
         fail("the submission is rejected: see what does not hold")
+
+
+def _write_leaderboard(folder: Path, out: Path, as_json: bool) -> None:
+    """Write the pages of all submissions of a folder; status 1 if one is rejected."""
+    from compare.bench.public_pages import write_public_pages
+
+    written, rejected = write_public_pages(folder, make_writable_folder(out), progress=say)
+    print_result(as_json, {"rejected": rejected}, written, lambda: None)
+    if rejected:
+        fail(f"rejected: {'; '.join(rejected)}")

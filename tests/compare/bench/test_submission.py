@@ -14,6 +14,7 @@ import pytest
 from compare.archive.pack import write_archive
 from compare.archive.unpack import MANIFEST
 from compare.bench.baseline import make_bench_tasks, parse_seeds
+from compare.bench.public_pages import filter_instances, write_public_pages
 from compare.bench.submission import check_rules, pack_submission, verify_submission
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
@@ -109,3 +110,24 @@ def test_rules(tmp_path: Path) -> None:
     assert [f.what for f in check_rules(records[1:]) if not f.holds] == ["seeds of runs", "instances"]
     assert not check_rules([])[0].holds
     assert all(map(is_test_seed, parse_seeds("test:3")))
+
+
+def test_pages_rank_what_holds_and_name_what_does_not(submission: Path, tmp_path: Path) -> None:
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    (folder / "good.zip").write_bytes(submission.read_bytes())
+    (folder / "bad.zip").write_bytes(b"PK")
+    written, rejected = write_public_pages(folder, out)
+    assert len(rejected) == 1 and rejected[0].startswith("bad.zip: ")
+    index = (out / "index.html").read_text(encoding="utf-8")
+    assert "100 evaluations, 2 runs" in index and "bad.zip" in index
+    ranking = next(path for path in written if path.name == "ranking.html")
+    assert f'href="{ranking.parent.name}/ranking.html"' in index and "pso" in ranking.read_text(encoding="utf-8")
+
+
+def test_filters_are_parts_of_the_instances() -> None:
+    found = filter_instances(["walk12-w015", "ssp-v5", "gb2:ssp:0", "gb2:humanoid-ssp:0"])
+    assert found["all instances"] == ("walk12-w015", "ssp-v5", "gb2:ssp:0", "gb2:humanoid-ssp:0")
+    assert found["family ssp"] == ("gb2:ssp:0",) and found["family nao-ssp"] == ("ssp-v5",)
+    assert found["more than 10 variables"] == ("gb2:humanoid-ssp:0",)
+    assert set(filter_instances(["ssp-v5"])) == {"all instances"}
