@@ -65,16 +65,18 @@ def compare_runs(record: RunRecord, task: Task, records: Sequence[RunRecord]) ->
         if start is None:
             return f"run {record.run} of {task.polishes}, which it polishes, is missing"
     again = try_task(task, start)
-    for what, before, now in (
-        ("status", record.status, again.status),
-        ("x", record.x, again.x),
-        ("evaluations", record.evaluations, again.evaluations),
-        ("history", record.history, again.history),
-        ("number of failed evaluations", record.failed_evaluations, again.failed_evaluations),
-        ("number of iterations", record.iterations, again.iterations),
-        ("claim", record.claimed_objective, again.claimed_objective),
-        ("verdict", repr(record.verdict), repr(again.verdict)),  # as text, for NaN differs from itself
-    ):
+    names = (
+        "status",
+        "x",
+        "evaluations",
+        "history",
+        "failed_evaluations",
+        "iterations",
+        "claimed_objective",
+        "verdict",
+    )
+    for what in names:
+        before, now = (repr(getattr(of, what)) for of in (record, again))  # as text, for NaN differs from itself
         if before != now:
-            return f"its {what} differs: recorded {before!s:.100}, found {now!s:.100}"
+            return f"its {what.replace('_', ' ')} differs: recorded {before:.100}, found {now:.100}"
     return ""

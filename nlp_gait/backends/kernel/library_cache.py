@@ -76,7 +76,7 @@ def load_library(
 
 def store_library(built: Path, key: str) -> Path:
     """Copy a new library to the first folder that can be written to, and return its path."""
-    name = f"{key}-{_hash_file(built)}{SUFFIX}"
+    name = f"{key}-{_hash(built.read_bytes())}{SUFFIX}"
     for find_folder in (find_cache_folder, private_folder):
         folder = find_folder()
         try:
@@ -194,7 +194,7 @@ def _check_library(library: Path) -> str | None:
         if copy != library:
             shutil.copyfile(library, copy, follow_symlinks=False)
         is_safe = _find_danger(library.lstat(), stat.S_ISREG) is None
-        return str(copy) if is_safe and library.stem.endswith(_hash_file(copy)) else None
+        return str(copy) if is_safe and library.stem.endswith(_hash(copy.read_bytes())) else None
     folder = _open_folder(library.parent)
     descriptor = os.open(library.name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
     with open(descriptor, "rb") as file:
@@ -215,10 +215,6 @@ def _open_folder(folder: Path) -> int:
             return known
     _folders[folder] = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     return _folders[folder]
-
-
-def _hash_file(library: Path) -> str:
-    return _hash(library.read_bytes())
 
 
 def _hash(content: bytes) -> str:
