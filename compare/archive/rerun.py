@@ -76,7 +76,7 @@ def compare_runs(record: RunRecord, task: Task, records: Sequence[RunRecord]) ->
         "verdict",
     )
     for what in names:
-        before, now = (repr(getattr(of, what)) for of in (record, again))  # as text, for NaN differs from itself
-        if before != now:
-            return f"its {what.replace('_', ' ')} differs: recorded {before:.100}, found {now:.100}"
+        before, now = (getattr(of, what) for of in (record, again))
+        if before != now and repr(before) != repr(now):  # NaN differs from itself
+            return f"its {what.replace('_', ' ')} differs: recorded {before!r:.100}, found {now!r:.100}"
     return ""
