@@ -207,6 +207,20 @@ class Solution:
         animate_gait: Any = import_object(FUNCTIONS["animate_gait"])
         return animate_gait(self._restore(problem), self.x, self.solver)
 
+    def sensitivity(self, problem: GaitProblem | None = None) -> Any:
+        """Return a table of the derivatives of x and the objective with respect to all parameters.
+
+        It has ``value(quantity, parameter)`` in the quantity's unit per unit of the parameter, ``write_csv(path)``, and
+        ``reach``, how far each parameter may change.
+
+        The problem is as for ``signals``.
+
+        Raises:
+            InputError: the solver returned no multipliers, or x is not an isolated optimum.
+        """
+        tabulate: Any = import_object(FUNCTIONS["tabulate_sensitivities"])
+        return tabulate(self._restore(problem), self)
+
     def _restore(self, problem: GaitProblem | None) -> GaitProblem:
         from nlp_gait.formulation.registry import load
 

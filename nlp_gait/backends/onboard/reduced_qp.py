@@ -34,7 +34,7 @@ NO_BOUND = 1e30  # DAQP's infinity
 EQUATION, SOFT = 5, 8  # DAQP's marks of rows; a soft one may be violated
 INFEASIBLE = -1  # DAQP's exit flag
 # More |v| at zero than this depend on each other in the problems here: DAQP then fails after hundreds of iterations.
-MOST_KINKS = 30
+MOST_KINKS = 45
 SETTINGS = {"primal_tol": 1e-10, "dual_tol": 1e-10, "iter_limit": 200}
 
 

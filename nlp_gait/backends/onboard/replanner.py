@@ -25,7 +25,8 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 COST_ERROR, VIOLATION, SHORT = 1e-7, 1e-8, 1e-3
 SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays
 LEAST_COST = 0.1  # of which relative tolerances are taken
-LONGEST = 0.25  # step, as a share of the variables' ranges; shorter after a step that had to be shortened
+# Longest step, as a share of the variables' ranges: shorter after a step that had to be shortened, or whose program failed.
+LONGEST, SHORTEN, SHORTEST = 0.25, 2.5, 1e-3
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step that are tried
 PRICE_FACTOR = 2.0  # weight of the violation in the merit, in units of the largest multiplier
 MEMORY = 3  # a step may raise the merit above that of the last point, not above all of so many
@@ -205,6 +206,9 @@ class _Run:
             z_lower, z_upper = np.maximum(self._z_lower - w[:n], -longest), np.minimum(self._z_upper - w[:n], longest)
             step = self._steps.solve(self._lower - at.g, self._upper - at.g, z_lower, z_upper)
             self.iterations += 1
+            if step is None and longest > SHORTEST:
+                longest /= SHORTEN
+                continue
             if step is None:
                 self.note = f"the quadratic program of step {self.iterations} failed"
                 return
@@ -220,7 +224,7 @@ class _Run:
             length = float(np.abs(step.w[:n]).max(initial=0.0))
             longest = min(2.0 * longest, LONGEST) if share == 1.0 else share * length
             accurate = error <= COST_ERROR * size and length <= SHORT
-            self.converged = share == 1.0 and accurate and self._violation <= VIOLATION and not step.relaxed
+            self.converged = bool(share == 1.0 and accurate) and self._violation <= VIOLATION and not step.relaxed
 
     def result(self) -> Replan:
         """Return the optimum, else the best feasible point, else the last one with its violated rows."""

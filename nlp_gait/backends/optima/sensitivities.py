@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, column, solve_kkt
-from nlp_gait.errors import InputError
+from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, column, find_optimum, solve_kkt
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import write_text
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
+from nlp_gait.formulation.solution import Solution
 
 # Dependent active rows may contradict each other by this share of a row's change.
 CONTRADICTION = 1e-6
@@ -36,6 +39,40 @@ class Sensitivities:
     reach: Array
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SensitivityTable:
+    """Derivatives of a solution with respect to all parameters, with names and units; NaN where there is no derivative."""
+
+    quantities: tuple[tuple[str, str], ...]  #: (n + 1) name and unit of the objective, then of each variable
+    parameters: tuple[tuple[str, str], ...]  #: (k) name and unit of each parameter
+    values: Array  #: (n + 1, k) change of each quantity per unit of each parameter
+    reach: Array  #: (2, k) change of each parameter, down and up, up to which the derivatives are those of the same active bounds
+
+    def value(self, quantity: str, parameter: str) -> float:
+        """Return the change of a variable, or of the objective, per unit of a parameter; raises UnknownNameError."""
+        names, others = ([name for name, _ in pairs] for pairs in (self.quantities, self.parameters))
+        if quantity not in names:
+            raise unknown("quantity", quantity, names)
+        if parameter not in others:
+            raise unknown("parameter", parameter, others)
+        return float(self.values[names.index(quantity), others.index(parameter)])
+
+    def write_csv(self, path: Path) -> None:
+        """Write one row for each parameter; the unit is part of a column's name. Raises OutputError."""
+        header = [
+            "parameter",
+            "parameter_unit",
+            "reach_down",
+            "reach_up",
+            *(f"{name} [{u}]" for name, u in self.quantities),
+        ]
+        rows = [
+            [name, unit, *map(repr, [*self.reach[:, k].tolist(), *self.values[:, k].tolist()])]
+            for k, (name, unit) in enumerate(self.parameters)
+        ]
+        write_text(path, "".join(f"{','.join(row)}\n" for row in [header, *rows]))
+
+
 class _Change(NamedTuple):
     """Derivatives of cost, rows, their bounds and gradient of L at fixed w and multipliers, one column for each quantity."""
 
@@ -53,6 +90,22 @@ def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
     parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
     cost, *others = (np.array(part)[:, :-1] for part in parts)  # the last one is the sigmoid's width
     return _differentiate(optimum, _Change(cost[0], *others))
+
+
+def tabulate_sensitivities(problem: GaitProblem, solution: Solution) -> SensitivityTable:
+    """Return the derivatives of a solution's best start; InputError if it has no multipliers or there are no derivatives."""
+    found = parameter_sensitivities(find_optimum(problem, min(solution.starts, key=lambda outcome: outcome.rank)))
+    values = np.vstack([found.objective, found.x])
+    values[:, np.logical_not(found.defined)] = np.nan
+    return SensitivityTable(
+        quantities=(
+            (problem.objective.name, problem.objective.unit),
+            *((variable.name, variable.unit) for variable in problem.variables),
+        ),
+        parameters=tuple((parameter.name, parameter.unit) for parameter in problem.parameters),
+        values=values,
+        reach=found.reach,
+    )
 
 
 @lock_casadi

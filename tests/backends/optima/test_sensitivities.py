@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import casadi as ca
 import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait import load
+from nlp_gait import load, solve
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Constraint, GaitProblem
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -179,3 +181,17 @@ def test_a_model_with_other_rows_is_refused() -> None:
     other = load("walk12", intervals=10)
     with pytest.raises(InputError, match="other constraints"):
         model_sensitivities(at, [(other, other, 1.0)])
+
+
+def test_a_solution_lists_its_derivatives_with_units(tmp_path: Path) -> None:
+    """3 (limit - 1) at (limit, limit)."""
+    problem = toy(corner, limit=1.5)
+    table = solve(problem, starts=3).sensitivity(problem)
+    assert table.value("cost", "limit") == pytest.approx(3.0, abs=1e-8)
+    assert table.value("x", "limit") == pytest.approx(1.0, abs=1e-8)
+    with pytest.raises(UnknownNameError, match="quantity 'z'"):
+        table.value("z", "limit")
+    table.write_csv(tmp_path / "table.csv")
+    header, first, *others = (tmp_path / "table.csv").read_text().splitlines()
+    assert header == "parameter,parameter_unit,reach_down,reach_up,cost [J],x [m],y [m]" and len(others) == 4
+    assert first.startswith("limit,m,") and float(first.split(",")[4]) == table.value("cost", "limit")
