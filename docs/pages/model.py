@@ -10,8 +10,9 @@ import numpy as np
 
 from compare.drawing.figures import INK, new_figure, render_svg, style
 from docs.pages.markdown import code, page, table, write_all
+from docs.pages.problems import names
 from nlp_gait.backends.nlp import WIDTHS
-from nlp_gait.formulation import load, problem_names
+from nlp_gait.formulation import load
 from nlp_gait.robots import load_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -31,7 +32,7 @@ def write(folder: Path) -> None:
 def count_constraints() -> str:
     """Return the number of rows of each family, a line for each problem."""
     rows = []
-    for name in problem_names():
+    for name in names():
         problem = load(name)
         counts: dict[str, int] = {}
         for constraint in problem.assemble(problem.symbols(), Exact()).constraints:
