@@ -15,7 +15,6 @@ from benchmarks.difficulty import Best, Difficulty, Reached, difficulties
 from compare.analysis.published import load_published
 from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import plot_gait
-from compare.report.gait_page import animate_gait
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, load, problem_names
@@ -137,12 +136,7 @@ def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
     if best is None or problem.display.motion is None:
         return ""
     plot_gait(problem, best.x, problem.name).savefig(folder / f"{problem.name}.png", dpi=150)
-    picture = f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
-    if problem.display.skeleton is None:
-        return picture
-    return page(
-        picture, "```{raw} html\n" + animate_gait(problem, best.x, problem.name)._repr_html_() + "\n```"
-    ).strip()
+    return f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
 
 
 def best_section(problem: GaitProblem, found: Difficulty | None) -> str:
