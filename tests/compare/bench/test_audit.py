@@ -87,7 +87,7 @@ def test_an_unbiased_search_is_not_accused(name: str) -> None:
 @pytest.mark.slow
 def test_cma_es_is_not_accused() -> None:
     pytest.importorskip("cma")
-    assert run(algorithm("cma")).accusations == ()
+    assert run(algorithm("cma"), 3, 300).accusations == ()
 
 
 def test_every_change_keeps_the_problem() -> None:
