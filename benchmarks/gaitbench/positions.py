@@ -50,7 +50,8 @@ def describe(positions: list[float]) -> str:
     z = np.array(positions)
     bound, centre = np.mean(np.minimum(z, 1 - z) < AT_BOUND), np.mean(np.abs(z - 0.5) <= AT_CENTRE)
     test = kstest(z, "uniform")
-    return f"{100 * bound:.2f} % at a bound, {100 * centre:.2f} % at the centre, Kolmogorov-Smirnov {test.statistic:.3f}, p {test.pvalue:.2g}"
+    uniform = f"Kolmogorov-Smirnov {test.statistic:.3f}, p {test.pvalue:.2g}"
+    return f"{100 * bound:.2f} % at a bound, {100 * centre:.2f} % at the centre, {uniform}"
 
 
 if __name__ == "__main__":
