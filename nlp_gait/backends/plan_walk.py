@@ -17,7 +17,7 @@ from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.cycle_motion import STEP
-from nlp_gait.gaits.biped.walk import GREATEST_SPEED, LEAST_SPEED
+from nlp_gait.gaits.biped.walk import GREATEST_SPEED, LEAST_SPEED, start_from_cycle
 from nlp_gait.gaits.nao.body import load_nao
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -124,7 +124,8 @@ def plan_walk(
         problem = problem.with_values(**{LEAST_SPEED: speed_m_s, GREATEST_SPEED: speed_m_s})
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
-    return _solve(problem, starts, progress)
+    cycle = None if name == "nao-walk" else load("humanoid-cycle", robot=robot, intervals=intervals)
+    return _solve(problem, cycle, starts, progress)
 
 
 def find_walk(robot: str) -> str:
@@ -149,11 +150,16 @@ def _fix_step(problem: GaitProblem, distance_m: float) -> GaitProblem:
     return problem.fix(**{STEP: step_m})
 
 
-def _solve(problem: GaitProblem, starts: int, progress: Progress) -> WalkPlan:
+def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progress: Progress) -> WalkPlan:
+    """Solve a walk from start points, for which a cycle is solved first if it is given."""
     rng, best = np.random.default_rng(0), None
     solver = IpoptSettings(few_rows=False).prepare(problem, solves=MANY_SOLVES)
     for k in range(check_count("starts", starts)):
         x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
+        if cycle is not None:
+            gait = solve(cycle, seed=k, solver=IpoptSettings(few_rows=False), workers=1)
+            progress(f"start {k + 1}, cycle: {gait.status}")
+            x0 = start_from_cycle(problem, x0, gait.x)
         found = solve(problem, x0=x0, solver=solver, workers=1)
         progress(f"start {k + 1}: {found.status}")
         if best is None or found.starts[0].rank < best.starts[0].rank:

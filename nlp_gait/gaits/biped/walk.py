@@ -371,3 +371,17 @@ def start_walk(variables: Sequence[Variable], parameters: Mapping[str, float], r
     lower, upper = (np.array([parameters[f"{name}.{end}"] for name in x]) for end in ("lower", "upper"))
     noise = START_NOISE * np.array(widths) * rng.uniform(-1.0, 1.0, len(x))
     return np.asarray(np.clip(np.array(list(x.values())) + noise, lower, upper))
+
+
+def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float]) -> Array:
+    """Return a start point (n,) with the states and times of a cycle in all phases; ``start`` has what a cycle has not."""
+    found = walk.by_name(start)
+    for name in found:
+        same = name.replace("start_", "").replace("stop_", "").replace(STAND, "lift_off")
+        found[name] = cycle.get(TIMES["dsp"] if name == "shift_time_s" else same, found[name])
+    for name in (
+        f"hip_x_{STAND}_m",
+        "hip_x_start_lift_off_m",
+    ):  # a lift-off between both feet is ahead of one side by side
+        found[name] = 0.2 * found[STEP]
+    return np.asarray(np.clip(list(found.values()), walk.lower, walk.upper))
