@@ -108,8 +108,13 @@ def check_plain(data: Any) -> None:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a text file atomically and return its path; raises OutputError (no space, no permission, no folder)."""
+    return write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> Path:
+    """Write a file atomically and return its path; raises as ``write_text``."""
     with replace_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(content)
     return path
 
 

@@ -27,7 +27,7 @@ from types import ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
 from nlp_gait.errors import GaitError, UserCodeError, unknown
-from nlp_gait.files import check_path, read_bytes
+from nlp_gait.files import check_path, make_writable_folder, read_bytes, write_bytes
 
 T = TypeVar("T")
 Kind = Literal["problem", "algorithm"]
@@ -177,11 +177,9 @@ def unpack_code(packed: PackedCode) -> None:
     digest = hashlib.sha256(repr(sorted(packed.contents.items())).encode()).hexdigest()[:16]
     folder = Path(_make_folder_of_copies().name) / digest
     for name, content in packed.contents.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
+        path = make_writable_folder((folder / name).parent) / Path(name).name
         if not path.exists():
-            path.write_bytes(content)
-            path.chmod(0o700)  # it may be a program
+            write_bytes(path, content).chmod(0o700)  # it may be a program
     _copies[packed.home] = str(folder / packed.file)
 
 

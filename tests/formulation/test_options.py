@@ -29,6 +29,7 @@ OTHER: dict[str, Any] = {
     "samples_per_interval": 2,
     "motors": "limits",
     "drive_limits": False,
+    "angle_limits": False,
     "load_degree": 3,
     "duration_s": 3.0,
     "instance": "walk12-w100",
