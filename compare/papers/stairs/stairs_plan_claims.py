@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -99,12 +99,10 @@ def _name_cases(findings: StairsFindings) -> str:
     return f"case{'s' if len(findings.cases) > 1 else ''} {' / '.join(map(str, findings.cases))}"
 
 
-Checker = Callable[[StairsFindings], Check]
 PEAKS = {"acceleration": "peak_acceleration_rad_s2", "jerk": "peak_jerk_rad_s3"}  # in Table IV, and in our plans
 CONTINUOUS = 0.01  # largest jump that counts as none [m/s, m/s^2]
 STEPS = ("first", "landing")  # of a climb
 FOLLOWED_MM = 10.0  # largest distance of the planned ZMP from the actual one, the margin of our plans
-DRASTIC = 0.1  # share of the first pose's time
 LEAST_POSES = 100  # of the network, for a verdict on its times
 
 
@@ -149,27 +147,25 @@ def _measure_ankle(findings: StairsFindings, what: str, case: int) -> dict[str, 
     return {"acceleration": float(largest[0]), "jerk": float(max(largest[1:]))}
 
 
-def _compare_peaks(quantity: str) -> Checker:
-    def check(findings: StairsFindings) -> Check:
-        printed = [float(getattr(TABLE_4[case], quantity)) for case in findings.cases]
-        ours = [*_measure_peaks(findings, quantity, "jerk").values()]
-        return _require_plans(findings, compare_readings(printed, ours), "jerk")
-
-    return check
+def _check_hip_height(findings: StairsFindings) -> Check:
+    return _require_plans(findings, decide(True), "hip", dense=True)
 
 
-def _require_least_peak(quantity: str) -> Checker:
-    def check(findings: StairsFindings) -> Check:
-        peaks = np.array([row for what in PLANS for row in _measure_peaks(findings, quantity, what).values()])
-        if peaks.shape[1] < len(TABLE_4):
-            return decide(Verdict.NOT_SHOWN)
-        changes = 100 * (peaks[:, [0, 2]] / peaks[:, [DRAWN_CASE - 1]] - 1)
-        return _require_plans(findings, require_change(changes), *PLANS)
-
-    return check
+def _check_peaks(findings: StairsFindings, quantity: str) -> Check:
+    printed = [float(getattr(TABLE_4[case], quantity)) for case in findings.cases]
+    ours = [*_measure_peaks(findings, quantity, "jerk").values()]
+    return _require_plans(findings, compare_readings(printed, ours), "jerk")
 
 
-def _compare_jerk_changes(findings: StairsFindings) -> Check:
+def _check_least_peak(findings: StairsFindings, quantity: str) -> Check:
+    peaks = np.array([row for what in PLANS for row in _measure_peaks(findings, quantity, what).values()])
+    if peaks.shape[1] < len(TABLE_4):
+        return decide(Verdict.NOT_SHOWN)
+    changes = 100 * (peaks[:, [0, 2]] / peaks[:, [DRAWN_CASE - 1]] - 1)
+    return _require_plans(findings, require_change(changes), *PLANS)
+
+
+def _check_jerk_changes(findings: StairsFindings) -> Check:
     peaks = np.array([*_measure_peaks(findings, "jerk", "jerk").values()])
     if peaks.shape[1] < len(TABLE_4):
         return decide(Verdict.NOT_SHOWN, changes="one case only")
@@ -191,14 +187,11 @@ def _check_planned_zmp(findings: StairsFindings) -> Check:
     return decide([gap <= FOLLOWED_MM for gap in gaps], limit=FOLLOWED_MM)
 
 
-def _check_step(what: str) -> Checker:
-    def check(findings: StairsFindings) -> Check:
-        runs = [findings.best(what, case) for case in findings.cases]
-        margins = [(run.verdict.dense or run.verdict.indexes)["zmp_margin_min_m"] for run in runs]
-        between = "; ".join(list_infeasible(runs, dense=True)) or "nothing"
-        return _require_plans(findings, decide(min(margins) >= 0, between=between), what)
-
-    return check
+def _check_step(findings: StairsFindings, what: str) -> Check:
+    runs = [findings.best(what, case) for case in findings.cases]
+    margins = [(run.verdict.dense or run.verdict.indexes)["zmp_margin_min_m"] for run in runs]
+    between = "; ".join(list_infeasible(runs, dense=True)) or "nothing"
+    return _require_plans(findings, decide(min(margins) >= 0, between=between), what)
 
 
 def measure_shank_depth(findings: StairsFindings, what: str, case: int) -> float:
@@ -274,22 +267,18 @@ def _check_other_methods(findings: StairsFindings) -> Check:
     return decide(held, closed=closed, medians=texts, error=network[CLOSED_FORM]["largest_angle_error_rad"], **counts)
 
 
-def _compare_poses(held: Callable[[float, float], bool]) -> Checker:
-    """Return the check of the first and the median later pose [ms] by every rule."""
-
-    def check(findings: StairsFindings) -> Check:
-        network, texts, verdicts = findings.others["network"], [], []
-        for rule in RULES:
-            found = network[rule]
-            times = [1e3 * found["time_s"][0], 1e3 * np.median(found["time_s"][1:])]
-            steps = found["iterations"][0], np.median(found["iterations"][1:])
-            verdicts.append(held(*times))
-            texts.append(f"{rule} {times[0]:.3g}, then {times[1]:.3g} ms ({steps[0]}, then {steps[1]:g} iterations)")
-        poses = network["adam"]["poses"]
-        values = {"found": "; ".join(texts), "poses": poses, "least": LEAST_POSES}
-        return decide(verdicts if poses >= LEAST_POSES else Verdict.NOT_SHOWN, **values)
-
-    return check
+def _check_poses(findings: StairsFindings, share_of_first: float = math.inf, limit_ms: float = math.inf) -> Check:
+    """Check the time of the median later pose by every rule: in shares of that of the first pose, or in ms."""
+    network, texts, verdicts = findings.others["network"], [], []
+    for rule in RULES:
+        found = network[rule]
+        first, later = 1e3 * found["time_s"][0], 1e3 * np.median(found["time_s"][1:])
+        steps = found["iterations"][0], np.median(found["iterations"][1:])
+        verdicts.append(bool(later <= min(share_of_first * first, limit_ms)))
+        texts.append(f"{rule} {first:.3g}, then {later:.3g} ms ({steps[0]}, then {steps[1]:g} iterations)")
+    poses = network["adam"]["poses"]
+    values = {"found": "; ".join(texts), "poses": poses, "least": LEAST_POSES}
+    return decide(verdicts if poses >= LEAST_POSES else Verdict.NOT_SHOWN, **values)
 
 
 def _check_continuity(findings: StairsFindings) -> Check:
@@ -329,33 +318,13 @@ def _check_jerk_terms(_: StairsFindings) -> Check:
     return compare_levels(np.zeros(6), [*speeds, *places], speeds=speeds, places=places)
 
 
+def _check_ratio(_: StairsFindings, exponent: int) -> Check:
+    """Check the printed ratio against that of half a cycloid: run over rise, or rise over run for an exponent of -1."""
+    ratio = (math.pi / 2) ** exponent
+    return compare_levels(11 / 7, ratio, found=ratio)
+
+
 def _check_best_ratio(_: StairsFindings) -> Check:
     ratios = Series(1 / row.rise_run_ratio for row in TABLE_4.values())
     nearest = 1 + int(np.abs(np.subtract(ratios, math.pi / 2)).argmin())
     return decide(nearest == DRAWN_CASE, found=ratios, nearest=nearest)
-
-
-PLANNING_CHECKS: dict[str, Checker] = {
-    "hip-height": lambda findings: _require_plans(findings, decide(True), "hip", dense=True),
-    **{f"peak-{quantity}": _compare_peaks(quantity) for quantity in ("acceleration", "jerk")},
-    **{f"least-{quantity}": _require_least_peak(quantity) for quantity in ("acceleration", "jerk")},
-    "jerk-changes": _compare_jerk_changes,
-    "jerk-terms": _check_jerk_terms,
-    "cycloid-begin": _check_cycloid_begin,
-    "cycloid-end": _check_cycloid_end,
-    "continuity": _check_continuity,
-    "first-step": _check_step("first"),
-    "reverse-support": _check_step("landing"),
-    "collisions": _check_collisions,
-    "climb": _check_climb,
-    "zmp-planned": _check_planned_zmp,
-    "easier": _check_easier,
-    "adapts": _check_adaptation,
-    "network": _check_network,
-    "warm-network": _compare_poses(lambda first, later: later <= DRASTIC * first),
-    "other-methods": _check_other_methods,
-    "real-time": _compare_poses(lambda _, later: later <= 1e3 * QUANTUM),
-    "ratio": lambda _: compare_levels(11 / 7, math.pi / 2, found=math.pi / 2),
-    "ratio-name": lambda _: compare_levels(11 / 7, 2 / math.pi, found=2 / math.pi),
-    "ratio-best": _check_best_ratio,
-}

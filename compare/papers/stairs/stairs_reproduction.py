@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
 from compare.papers.stairs import stairs_effects, stairs_instants
@@ -182,5 +183,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    checks={**plan_claims.PLANNING_CHECKS, **tracking.TRACKING_CHECKS},
+    checks=bind_checks("stairs/stairs_claims.toml", {**vars(plan_claims), **vars(tracking)}),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
@@ -27,7 +27,6 @@ from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec, Task
-from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.bodies import rigid_bodies
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop
 from nlp_gait.gaits.stairs.planar_biped import LINKS
@@ -172,9 +171,6 @@ def read_index(run: RunRecord, index: str) -> float:
     return run.x[index] if index in run.x else run.verdict.indexes[index]
 
 
-Checker = Callable[[StairsFindings], Check]
-
-
 def _describe(values: Mapping[str, Series]) -> str:
     return "; ".join(f"{CHOICES[name].text}: {row}" for name, row in values.items())
 
@@ -199,26 +195,22 @@ def _require_steps(findings: StairsFindings, check: Check, names: Iterable[str])
     return require_feasible(check, list_infeasible(runs))
 
 
-def _compare_cases(quantity: str, compare: Callable[[Array, Array, Array], Check]) -> Checker:
-    """Return the check of a quantity of Table IV in cases 1 and 3 divided by that in case 2."""
+def _check_ratios(findings: StairsFindings, quantity: str, least: bool = False) -> Check:
+    """Check a quantity of Table IV in cases 1 and 3 divided by that in case 2.
 
-    def check(findings: StairsFindings) -> Check:
-        ours = _collect(findings, LEAST_ROWS[quantity], NEXT)
-        if len(findings.cases) < len(TABLE_4):
-            return decide(Verdict.NOT_SHOWN, ratios="one case only")
-        printed = [float(getattr(row, quantity)) for row in TABLE_4.values()]
-        theirs, *ratios = (np.array(row)[[0, 2]] / row[1] for row in (printed, *ours.values()))
-        shown = dict(zip(ours, map(Series, ratios), strict=True))
-        texts = {"ratios": _describe({name: row for name, row in shown.items() if name in READINGS})}
-        spreads = np.array([[measure_spread(findings, name)] for name in ours])
-        return _require_steps(findings, replace(compare(theirs, np.array(ratios), spreads), values=texts), ours)
-
-    return check
-
-
-def _require_least(_: Array, ours: Array, spreads: Array) -> Check:
-    """Return the check that case 2 has the least value, by more than the runs of a reading differ [%]."""
-    return require_change(100 * (ours - 1) - spreads)
+    Either by the printed ratios, or whether case 2 has the least value, by more than the runs of a reading differ [%].
+    """
+    ours = _collect(findings, LEAST_ROWS[quantity], NEXT)
+    if len(findings.cases) < len(TABLE_4):
+        return decide(Verdict.NOT_SHOWN, ratios="one case only")
+    printed = [float(getattr(row, quantity)) for row in TABLE_4.values()]
+    theirs, *ratios = (np.array(row)[[0, 2]] / row[1] for row in (printed, *ours.values()))
+    shown = dict(zip(ours, map(Series, ratios), strict=True))
+    texts = _describe({name: row for name, row in shown.items() if name in READINGS})
+    spreads = np.array([[measure_spread(findings, name)] for name in ours])
+    leads = 100 * (np.array(ratios) - 1) - spreads
+    check = require_change(leads, ratios=texts) if least else compare_readings(theirs, ratios, ratios=texts)
+    return _require_steps(findings, check, ours)
 
 
 def _check_balance(findings: StairsFindings) -> Check:
@@ -261,16 +253,12 @@ def _describe_instants(findings: StairsFindings, decides: Decides) -> str:
     return "; ".join(texts)
 
 
-def _check_instants(decides: Decides) -> Checker:
-    """Return the check that Algorithm 4 finishes the step with the ZMP in the polygon."""
-
-    def check(findings: StairsFindings) -> Check:
-        found = _get_instants(findings, decides).values()
-        held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found]
-        enough = findings.effort.instant_evaluations >= ANTS * ITERATIONS or all(held)
-        return decide(held if enough else Verdict.NOT_SHOWN)
-
-    return check
+def _check_instants(findings: StairsFindings, decides: Decides) -> Check:
+    """Check whether Algorithm 4 finishes the step with the ZMP in the polygon."""
+    found = _get_instants(findings, decides).values()
+    held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found]
+    enough = findings.effort.instant_evaluations >= ANTS * ITERATIONS or all(held)
+    return decide(held if enough else Verdict.NOT_SHOWN)
 
 
 def _describe_instant_times(findings: StairsFindings) -> str:
@@ -307,26 +295,22 @@ def _check_power(findings: StairsFindings) -> Check:
     return require_change(100 * (np.divide(without, with_power) - 1)[:, None])
 
 
-def _check_torso(index: str) -> Checker:
-    """Return the check that the tuned torso pitch saves energy [%] or adds ZMP margin [mm] to an upright one, on average.
+def _check_torso(findings: StairsFindings, index: str) -> Check:
+    """Check whether the tuned torso pitch saves energy [%] or adds ZMP margin [mm] to an upright one, on average.
 
     Under each reading with the same plan and gains; and for our plan of least energy against one that was made for an upright
     torso. A step whose ZMP leaves the polygon upright is no comparison of energies.
     """
-
-    def check(findings: StairsFindings) -> Check:
-        tuned, own = _collect(findings, index), _collect_printed(findings, f"upright_{index}")
-        upright = {name: _measure_upright(findings, name) for name in tuned}
-        values = {name: Series(row[index] for row in rows) for name, rows in upright.items()}
-        stays = [name for name, rows in upright.items() if min(row["zmp_margin_min_m"] for row in rows) >= 0]
-        names = stays if index == "energy_J" else tuned
-        pairs = [*((tuned[name], values[name]) for name in names), (tuned[OURS], own)]
-        better, worse = np.array([[sum(row) for row in pair] for pair in pairs]).T
-        found = "; ".join(f"{CHOICES[name].text}: {row} against {values[name]}" for name, row in tuned.items())
-        changes = 100 * (1 - better / worse) if index == "energy_J" else 1e3 * (better - worse) / len(own)
-        return require_change(changes[:, None], found=found, own=own)
-
-    return check
+    tuned, own = _collect(findings, index), _collect_printed(findings, f"upright_{index}")
+    upright = {name: _measure_upright(findings, name) for name in tuned}
+    values = {name: Series(row[index] for row in rows) for name, rows in upright.items()}
+    stays = [name for name, rows in upright.items() if min(row["zmp_margin_min_m"] for row in rows) >= 0]
+    names = stays if index == "energy_J" else tuned
+    pairs = [*((tuned[name], values[name]) for name in names), (tuned[OURS], own)]
+    better, worse = np.array([[sum(row) for row in pair] for pair in pairs]).T
+    found = "; ".join(f"{CHOICES[name].text}: {row} against {values[name]}" for name, row in tuned.items())
+    changes = 100 * (1 - better / worse) if index == "energy_J" else 1e3 * (better - worse) / len(own)
+    return require_change(changes[:, None], found=found, own=own)
 
 
 def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, float]]:
@@ -336,21 +320,3 @@ def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, f
         gains = get_point(get_best(findings, case, name))[:2]
         found.append(evaluate(make_choice_spec(findings, case, name).load(), [*gains, np.pi / 2]).indexes)
     return found
-
-
-TRACKING_CHECKS: dict[str, Checker] = {
-    "cost-energy": _check_cost_against_energy,
-    **{f"least-{name}": _compare_cases(name, _require_least) for name in LEAST_ROWS},
-    **{
-        f"ratios-{name}": _compare_cases(name, lambda theirs, ours, _: compare_readings(theirs, ours))
-        for name in LEAST_ROWS
-    },
-    "balance": _check_balance,
-    "follow": _check_following,
-    "printed-gains": _check_printed_gains,
-    "torso-margin": _check_torso("zmp_margin_min_m"),
-    "torso-energy": _check_torso("energy_J"),
-    "power-term": _check_power,
-    "dynamics": _check_dynamics,
-    **{f"instants-{decides}": _check_instants(decides) for decides in get_args(Decides)},
-}
