@@ -26,6 +26,10 @@ COMPETITIVE = 0.02  # of the true front's hypervolume, behind the best
 NEAR = 0.9  # share of the true front's hypervolume that counts as near it
 KNEES = 2
 
+WORDS = {"hypervolume": "hypervolume ", "igd": "distance "}  # where several measures decide
+# Factor and unit in which a measure is shown.
+SHOWN = {"hypervolume": (100.0, " %"), "igd": (1.0, ""), "feasible": (100.0, " %"), "time_s": (1.0, " s")}
+
 Tested = tuple[bool, str]
 """Whether a claim holds in one phase with one budget, and the numbers."""
 
@@ -49,6 +53,11 @@ class Measures:
         reached = self.hypervolume >= share
         at = np.where(reached.any(axis=1), self.evaluations[reached.argmax(axis=1)], np.inf)
         return np.asarray(at)
+
+    def get_end(self, measure: str) -> Array:
+        """Return (R,) a measure at the last look."""
+        values: Array = getattr(self, measure)
+        return values if values.ndim == 1 else values[:, -1]
 
     def find_look(self, evaluations: float) -> int:
         """Return the number of the last look within some evaluations, or of the first look."""
@@ -150,6 +159,20 @@ def _check(is_true: Callable[[dict[str, Measures]], Tested], findings: ParetoFin
     )
 
 
+def _check_extreme(findings: ParetoFindings, search: str, ends: Mapping[str, str]) -> Check:
+    """Check whether a search has the least or the greatest median of each measure, significantly before the next."""
+    return _check(partial(_is_extreme_at_ends, search, ends), findings)
+
+
+def _is_extreme_at_ends(search: str, ends: Mapping[str, str], runs: dict[str, Measures]) -> Tested:
+    tested, best = {}, {"least": min, "greatest": max}
+    for measure, end in ends.items():
+        samples = {name: m.get_end(measure) for name, m in runs.items()}
+        tested[measure] = _is_extreme(samples, search, best[end], *SHOWN[measure])
+    numbers = "; ".join(f"{WORDS.get(measure, '')}{text}" for measure, (_, text) in tested.items())
+    return all(holds for holds, _ in tested.values()), numbers
+
+
 def _check_knees(findings: ParetoFindings) -> Check:
     return _decide((phase.problem.name, _has_two_knees(phase)) for phase in findings.phases)
 
@@ -160,14 +183,6 @@ def _decide(named_cases: Iterable[tuple[str, Tested]]) -> Check:
     verdicts = {True: Verdict.HOLDS, False: Verdict.FAILS}
     found = "; ".join(f"{case}: {numbers}: {verdicts[holds]}" for case, (holds, numbers) in cases.items())
     return decide(held, found=found, early=100 * EARLY, competitive=100 * COMPETITIVE)
-
-
-def _is_best(runs: dict[str, Measures]) -> Tested:
-    return _is_extreme_at_end(runs, "NSGA2", max, min)
-
-
-def _is_poor(runs: dict[str, Measures]) -> Tested:
-    return _is_extreme_at_end(runs, "CMOEAD", min, max)
 
 
 def _is_moderate(runs: dict[str, Measures]) -> Tested:
@@ -195,23 +210,6 @@ def _is_competitive(runs: dict[str, Measures]) -> Tested:
     return behind <= COMPETITIVE, f"{100 * behind:.2f} % behind {NAMES[_first(volume, max)]}"
 
 
-def _is_least_feasible(runs: dict[str, Measures]) -> Tested:
-    return _is_extreme({n: m.feasible for n, m in runs.items()}, "DCNSGA3", min, 100.0, " %")
-
-
-def _is_costly(runs: dict[str, Measures]) -> Tested:
-    return _is_extreme({n: m.time_s for n, m in runs.items()}, "CMOEAD", max, 1.0, " s")
-
-
-def _is_extreme_at_end(
-    runs: dict[str, Measures], name: str, of_volume: Callable[..., str], of_distance: Callable[..., str]
-) -> Tested:
-    """Whether a search is first or last by both measures at the end, significantly before the next one."""
-    volume, volumes = _is_extreme({n: m.hypervolume[:, -1] for n, m in runs.items()}, name, of_volume, 100.0, " %")
-    distance, distances = _is_extreme({n: m.igd[:, -1] for n, m in runs.items()}, name, of_distance, 1.0, "")
-    return volume and distance, f"hypervolume {volumes}; distance {distances}"
-
-
 def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], factor: float, unit: str) -> Tested:
     """Whether a search has the least or greatest median, significantly before the next one."""
     medians = {n: float(np.median(values)) for n, values in samples.items()}
@@ -229,8 +227,10 @@ def _has_two_knees(phase: PhaseFindings) -> Tested:
 
 def _get_ends(runs: dict[str, Measures]) -> tuple[dict[str, float], dict[str, float]]:
     """Median hypervolume and distance at the end of all runs."""
-    volume = {name: float(np.median(m.hypervolume[:, -1])) for name, m in runs.items()}
-    return volume, {name: float(np.median(m.igd[:, -1])) for name, m in runs.items()}
+    volume, distance = (
+        {name: float(np.median(m.get_end(measure))) for name, m in runs.items()} for measure in ("hypervolume", "igd")
+    )
+    return volume, distance
 
 
 def _format_count(value: float) -> str:
@@ -241,13 +241,6 @@ def _first(values: dict[str, float], best: Callable[..., str]) -> str:
     return best(values, key=lambda name: values[name])
 
 
-CHECKS: dict[str, Callable[[ParetoFindings], Check]] = {
-    "best": partial(_check, _is_best),
-    "faster": partial(_check, _is_faster),
-    "competitive": partial(_check, _is_competitive),
-    "moderate": partial(_check, _is_moderate),
-    "constrained": partial(_check, _is_least_feasible),
-    "poor": partial(_check, _is_poor),
-    "costly": partial(_check, _is_costly),
-    "knees": _check_knees,
-}
+_check_faster = partial(_check, _is_faster)
+_check_competitive = partial(_check, _is_competitive)
+_check_moderate = partial(_check, _is_moderate)

@@ -10,10 +10,10 @@ import numpy as np
 
 from compare.analysis.units import axis_label, join_words
 from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_axes
-from compare.papers.claims import Verdict
+from compare.papers.claims import Verdict, bind_checks
+from compare.papers.nao_pareto import nao_pareto_claims
 from compare.papers.nao_pareto import nao_pareto_runs as runs
 from compare.papers.nao_pareto.nao_pareto_claims import (
-    CHECKS,
     EVEN_POINTS,
     NAMES,
     NEAR,
@@ -195,5 +195,5 @@ REPRODUCTION = Reproduction(
     values=compute_values,
     tables=make_tables,
     figures=draw_figures,
-    checks=CHECKS,
+    checks=bind_checks("nao_pareto/nao_pareto_claims.toml", vars(nao_pareto_claims)),
 )
