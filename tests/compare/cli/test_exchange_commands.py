@@ -131,7 +131,8 @@ def test_instances_are_problems_everywhere(tmp_path: Path) -> None:
     assert as_json("evaluate", ID, "--x", x)["feasible"]
     solved = as_json("solve", drawn, "--starts", "2", "--out", tmp_path / "best.json")
     assert solved["objective"] == pytest.approx(-gaitbench.load(drawn).best_known, rel=1e-5)
-    assert as_json("evaluate", tmp_path / "best.json")["feasible"]
+    best = ",".join(map(repr, solved["x"].values()))
+    assert as_json("evaluate", drawn, "--x", best)["feasible"]
     found = as_json("export-objective", drawn, "--to", tmp_path / "c")
     assert any(name.endswith("gaitbench_gb2_walk12_long_3.h") for name in found["files"])
     assert "unknown family of GaitBench 2" in one_sentence("compare", "gb2:absent:3", "--out", tmp_path / "s")
