@@ -11,9 +11,10 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from compare.bench.baseline import BASELINE, RUNS, load_baseline, make_bench_tasks, pack_records
+from compare.bench.baseline import BASELINE, RUNS, load_baseline, make_bench_study, pack_records
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
+from compare.study.settings import SolverSpec
 from compare.study.task import Task
 from nlp_gait import gaitbench
 
@@ -40,7 +41,7 @@ def main() -> None:
         for solver in solvers:
             started = time.perf_counter()
             study = Study(
-                tasks=tuple(limited(t) for t in make_bench_tasks([id], solver)),
+                tasks=tuple(map(limited, make_bench_study([id], SolverSpec(name=solver)).tasks())),
                 folder=arguments.work,
                 jobs=arguments.jobs,
             )

@@ -9,16 +9,15 @@ import gzip
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from compare.study.record import History, RunRecord, Times, Verdict
-from compare.study.task import ProblemSpec, Stop, Task
-from metaheuristics.interface import Algorithm
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.task import ProblemSpec, Stop
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
@@ -30,7 +29,6 @@ from nlp_gait.gaitbench.generated import list_test_seeds, make_id
 # Rules: the same runs, budget and seeds for all solvers.
 RUNS = 15
 EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
-SEED = 0
 BASELINE = tuple("random pso ga aco aco-grid cma de pymoo:GA pymoo:DE pymoo:ISRES slsqp ipopt".split())
 FOLDER = Path(__file__).with_name("records")
 SEEDS = re.compile(r"([0-9]{1,12}):([0-9]{1,12})")
@@ -72,27 +70,12 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     return seeds
 
 
-def make_bench_tasks(
-    instances: Sequence[str],
-    solver: str | Algorithm,
-    *,
-    settings: Mapping[str, Any] | None = None,
-    label: str = "",
-    runs: int = RUNS,
-    evaluations: int = EVALUATIONS,
-    time_limit_s: float | None = None,
-) -> tuple[Task, ...]:
-    """Return every run of a solver on some instances."""
-    task = Task(
-        problem=ProblemSpec(name=instances[0]),
-        solver=solver,
-        settings=settings or {},
-        label=label,
-        stop=Stop(evaluations=evaluations, time_limit_s=time_limit_s),
-        seed=SEED,
-    )
-    specs = [ProblemSpec(name=id) for id in instances]
-    return tuple(replace(task, problem=spec, run=run) for spec in specs for run in range(runs))
+def make_bench_study(
+    instances: Sequence[str], *solvers: SolverSpec, runs: int = RUNS, evaluations: int = EVALUATIONS
+) -> StudySettings:
+    """Return the study of some solvers on some instances; run k has the seed k."""
+    problems = tuple(ProblemSpec(name=id) for id in instances)
+    return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
 def pack_records(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> Path:

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
-from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_tasks
+from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import command
 from compare.cli.common import (
     describe_command,
@@ -67,8 +67,7 @@ def bench(
     from compare.report.writing import add_session, write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
-    from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
-    from compare.study.task import ProblemSpec, Stop
+    from compare.study.settings import Session, SolverSpec, write_manifest
     from nlp_gait.backends.kernel.compiled import available_cores
 
     if submit is not None or verify is not None:
@@ -96,23 +95,13 @@ def bench(
     records: list[RunRecord] = []
     name: str | None = None
     if solvers:
-        tasks = [
-            task
-            for solver, own in solvers.items()
-            for task in make_bench_tasks(chosen, solver, label=own, runs=runs, evaluations=evaluations)
-        ]
-        study = Study(tasks=tuple(tasks), folder=out, jobs=jobs or available_cores(), scheduler=scheduler)
+        specs = [SolverSpec(name=solver, label=own) for solver, own in solvers.items()]
+        settings = make_bench_study(chosen, *specs, runs=runs, evaluations=evaluations)
+        study = Study(tasks=settings.tasks(), folder=out, jobs=jobs or available_cores(), scheduler=scheduler)
         name = study.tasks[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         check_study(study)
-        named = tuple(SolverSpec(name=solver, label=own) for solver, own in solvers.items())
-        settings = StudySettings(
-            problems=tuple(ProblemSpec(name=id) for id in chosen),
-            solvers=named,
-            runs=runs,
-            stop=Stop(evaluations=evaluations),
-        )
         write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
         with progress_bar(f"{name or 'all'} runs", len(study.tasks)) as advance:
             records, stopped = until_interrupted(
@@ -158,9 +147,10 @@ def bench(
 def _audit(algorithm: str, as_json: bool) -> None:
     """Audit a search and print what was found."""
     from compare.bench.audit import INSTANCES, audit_search
+    from compare.study.settings import SolverSpec
     from compare.study.task import check_task
 
-    task = make_bench_tasks(INSTANCES[:1], algorithm)[0]
+    task = make_bench_study(INSTANCES[:1], SolverSpec(name=algorithm)).tasks()[0]
     if not task.is_search:
         raise InputError(f"--audit examines searches, and {algorithm} uses gradients; choose a search")
     check_task(task)

@@ -220,6 +220,8 @@ Reasons = list[list[str]]
 # Relative difference of the last value of a history from the judged one: exact for searches, lifted for NLP solvers, and rounded
 # for imported runs.
 END_OF_SEARCH, END_OF_SOLVER, END_OF_IMPORT = 1e-9, 1e-5, 1e-3
+# Reason by which every search ends whose budget is used, see ``metaheuristics.minimize``.
+BUDGET_USED = "evaluation budget used"
 # Histories with at least this many different values are never equal by chance.
 TELLING = 3
 
@@ -259,6 +261,11 @@ def check_history(record: RunRecord) -> Iterator[str]:
         tolerance = END_OF_SEARCH if is_search else END_OF_IMPORT if "imported" in definition else END_OF_SOLVER
         if not abs(last - judged) <= tolerance * max(abs(last), abs(judged)):
             yield f"its history ends at {last:.9g}, but the judge finds {judged:.9g}"
+    counts = history.evaluations
+    if is_search and any(a >= b for a, b in itertools.pairwise((0, *counts))):
+        yield "its history has two entries at the same number of evaluations"
+    if is_search and len(counts) > record.iterations:
+        yield f"its history has {len(counts)} entries, more than its {record.iterations} iterations"
     if any(a > b for a, b in itertools.pairwise((0.0, *times.history))):
         yield "the times of its history do not ascend from 0"
     if any(value < 0.0 for value in (times.build, times.compile, times.solve, times.objective)):
@@ -284,6 +291,8 @@ def check_claims(record: RunRecord) -> Iterator[str]:
     budget = (definition.get("stop") or {}).get("evaluations")
     if is_search and budget is not None and f > budget:
         yield f"it counts {f} evaluations, more than its budget of {budget}"
+    if is_search and budget is not None and (f == budget) != (BUDGET_USED in record.status.split("; ")):
+        yield f"it counts {f} of {budget} evaluations, but ended by: {record.status}"
     counted = record.history.evaluations[-1] if record.history.evaluations else f
     if counted > f or (is_search and counted != f):
         yield f"its history ends after {counted} evaluations, but it counts {f}"

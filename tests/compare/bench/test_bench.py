@@ -12,12 +12,13 @@ import pytest
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import TARGETS
-from compare.bench.baseline import BASELINE, FOLDER, RUNS, list_instances, load_baseline, make_bench_tasks, pack_records
+from compare.bench.baseline import BASELINE, FOLDER, RUNS, list_instances, load_baseline, make_bench_study, pack_records
 from compare.bench.leaderboard import rank_solvers
 from compare.bench.page import make_leaderboard_page
 from compare.report.writing import write_document
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
+from compare.study.settings import SolverSpec
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError
 
@@ -27,11 +28,8 @@ ID = "walk12-w015"
 @pytest.fixture(scope="module")
 def runs() -> list[RunRecord]:
     """A few runs of two solvers."""
-    return [
-        record
-        for solver in ("pso", "ipopt")
-        for record in run_study(Study(tasks=make_bench_tasks([ID], solver, runs=3, evaluations=1000)))
-    ]
+    solvers = (SolverSpec(name="pso"), SolverSpec(name="ipopt"))
+    return run_study(Study(tasks=make_bench_study([ID], *solvers, runs=3, evaluations=1000).tasks()))
 
 
 def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_path: Path) -> None:

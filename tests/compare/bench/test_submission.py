@@ -13,13 +13,12 @@ import pytest
 
 from compare.archive.pack import write_archive
 from compare.archive.unpack import MANIFEST
-from compare.bench.baseline import make_bench_tasks, parse_seeds
+from compare.bench.baseline import make_bench_study, parse_seeds
 from compare.bench.public_pages import filter_instances, write_public_pages
 from compare.bench.submission import check_rules, pack_submission, verify_submission
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
-from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
-from compare.study.task import ProblemSpec, Stop
+from compare.study.settings import Session, SolverSpec, write_manifest
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.generated import is_test_seed
 
@@ -30,15 +29,9 @@ UNCHECKED = ("time_s", "origin", "solver_version", "session")
 
 
 def run(folder: Path, instances: tuple[str, ...] = (ID,)) -> list[RunRecord]:
-    tasks = make_bench_tasks(instances, "pso", runs=2, evaluations=100)
-    settings = StudySettings(
-        problems=tuple(ProblemSpec(name=id) for id in instances),
-        solvers=(SolverSpec(name="pso"),),
-        runs=2,
-        stop=Stop(evaluations=100),
-    )
+    settings = make_bench_study(instances, SolverSpec(name="pso"), runs=2, evaluations=100)
     write_manifest(folder, settings, Session.begin("nlp-gait bench", "1"))
-    return run_study(Study(tasks=tasks, folder=folder))
+    return run_study(Study(tasks=settings.tasks(), folder=folder))
 
 
 @pytest.fixture(scope="module")
