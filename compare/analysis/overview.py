@@ -6,10 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
+from statistics import mean, median
 
-from compare.analysis.comparison import Comparison, index_solvers
-from compare.analysis.record_statistics import tie
+from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
+from compare.analysis.record_statistics import holm, signed_rank, tie
 from compare.analysis.units import join_words, percent
 from compare.analysis.verdict import FOUND, SIGNIFICANT, Pair, compare_pairs
 from nlp_gait.backends.identity import SOURCE
@@ -30,12 +30,14 @@ class Ranking:
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """Number of problems on which a solver differs from another one by the rank-sum test, Holm-corrected on each problem."""
+    """A solver against another one: on how many problems the rank-sum test, Holm-corrected on each, finds a difference."""
 
     other: str
     wins: int
     ties: int
     losses: int
+    mean_a12: float  #: probability that a run of the solver is better, mean over the problems
+    signed_rank: float  #: p-value over the median gaps of the problems, Holm-corrected over the other solvers
 
 
 def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
@@ -65,16 +67,31 @@ def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
 def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     """Return how often a solver is significantly better or worse than each other one that has as many runs to test."""
     tested: dict[str, list[Pair]] = {}
+    gaps: dict[str, list[tuple[float, float]]] = {}  # medians of the solver and of the other one
     for comparison in comparisons:
+        medians = {s.name: _median_gap(comparison, s) for s in comparison.solvers}
         for pair in compare_pairs(comparison):
             if solver in (pair.first, pair.second):
-                tested.setdefault(pair.second if pair.first == solver else pair.first, []).append(pair)
-    records = []
-    for other, pairs in tested.items():
-        wins = sum(pair.rank_sum < SIGNIFICANT and pair.first == solver for pair in pairs)
-        losses = sum(pair.rank_sum < SIGNIFICANT and pair.first == other for pair in pairs)
-        records.append(Score(other=other, wins=wins, ties=len(pairs) - wins - losses, losses=losses))
-    return records
+                other = pair.second if pair.first == solver else pair.first
+                tested.setdefault(other, []).append(pair)
+                gaps.setdefault(other, []).append((medians[solver], medians[other]))
+    signed = holm([signed_rank(*zip(*pairs, strict=True)) for pairs in gaps.values()])
+    return [
+        Score(
+            other=other,
+            wins=(wins := sum(pair.rank_sum < SIGNIFICANT and pair.first == solver for pair in pairs)),
+            losses=(losses := sum(pair.rank_sum < SIGNIFICANT and pair.first == other for pair in pairs)),
+            ties=len(pairs) - wins - losses,
+            mean_a12=mean(pair.a12 if pair.first == solver else 1.0 - pair.a12 for pair in pairs),
+            signed_rank=float(p),
+        )
+        for (other, pairs), p in zip(tested.items(), signed, strict=True)
+    ]
+
+
+def _median_gap(comparison: Comparison, solver: SolverRuns) -> float:
+    """Return the gap of the median, infinite if half of the runs or more are infeasible."""
+    return comparison.gap(solver.median_cost) if math.isfinite(solver.median_cost) else math.inf
 
 
 def list_user_solvers(comparisons: Sequence[Comparison]) -> list[str]:
@@ -94,7 +111,7 @@ def write_overall_verdict(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
         sentences.append(
             f"Mean rank of the medians over {len(comparisons)} problems: {ranks}. {describe_tests(ranking)}".strip()
         )
-        gaps = {name: [c.gap(s[name].median_cost) for c, s in zip(comparisons, found, strict=True)] for name in names}
+        gaps = {name: [_median_gap(c, s[name]) for c, s in zip(comparisons, found, strict=True)] for name in names}
         middle = ((name, median(gaps[name])) for name in ranking.mean_ranks)
         typical = join_words(
             f"{name} {percent(0.0 if gap <= FOUND else gap) if math.isfinite(gap) else 'mostly infeasible'}"

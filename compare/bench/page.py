@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from compare.analysis.comparison import Comparison
+from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
 from compare.bench.baseline import EVALUATIONS, RUNS
@@ -35,7 +36,7 @@ def make_leaderboard_page(
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 drawing=plot_suite_ecdf(board.comparisons),
             ),
-            *(() if solver is None else (_make_duels(board, solver),)),
+            *(() if solver is None else (_make_scores(board, solver),)),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
                 title="How it was measured",
@@ -57,14 +58,14 @@ def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
     """Return the result of a solver in sentences."""
     place = board.place(solver)
     standing = board.standings[place - 1]
-    duels = board.duels(solver)
-    won = sum(duel.better > duel.worse for duel in duels)
-    lost = sum(duel.worse > duel.better for duel in duels)
+    scores = count_wins(board.comparisons, solver)
+    won = sum(score.wins > score.losses for score in scores)
+    lost = sum(score.losses > score.wins for score in scores)
     return (
         f"{solver} takes place {place} of {len(board.standings)} by expected running time (mean rank "
         f"{standing.mean_rank:.2f}) and place {standing.solved_rank} by solved targets ({100 * standing.solved:.1f} %).",
         f"{100 * standing.feasible:.0f} % of its runs end feasible.",
-        f"It is better than {won} of the other {len(duels)} solvers on more instances than it is worse, and worse than {lost} "
+        f"It is better than {won} of the other {len(scores)} solvers on more instances than it is worse, and worse than {lost} "
         "(rank-sum tests at 5 %, Holm-corrected).",
     )
 
@@ -109,17 +110,18 @@ def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]
     return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), count(costs[solver]), place)
 
 
-def _make_duels(board: Leaderboard, solver: str) -> Section:
+def _make_scores(board: Leaderboard, solver: str) -> Section:
     rows = [
-        (d.other, str(d.better), str(d.worse), str(d.undecided), f"{d.mean_a12:.3f}", f"{d.signed_rank:.2g}")
-        for d in board.duels(solver)
+        (s.other, str(s.wins), str(s.losses), str(s.ties), f"{s.mean_a12:.3f}", f"{s.signed_rank:.2g}")
+        for s in sorted(count_wins(board.comparisons, solver), key=lambda score: board.place(score.other))
     ]
     header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
     return Section(
         title=f"{solver} against each of the others",
         parts=(
-            "Instances on which the rank-sum test of the final gaps finds a difference at 5 %, Holm-corrected over all solvers "
-            "and instances; gaps below 1e-6 % count as none. A12 is the probability that a run of this solver ends better. The "
+            "Instances on which the rank-sum test of the final objectives finds a difference at 5 %, Holm-corrected over all "
+            "pairs of solvers on the instance; differences within the judge's tolerance are ties. A12 is the probability that a "
+            "run of this solver ends better. The "
             "signed-rank test compares the median gaps of all instances, Holm-corrected over the solvers.",
             text_table(header, rows),
         ),

@@ -26,7 +26,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_count, unknown
 from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.gaitbench.definitions import BY_ID, Definition, get_definition
-from nlp_gait.gaitbench.transform import AffineMap
+from nlp_gait.gaitbench.transform import AffineMap, rotate_pairs
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.perturbation import perturbed_name
 
@@ -76,6 +76,10 @@ class Draw:
         """Return a number of [0, 1)."""
         digest = hashlib.sha256(f"{PREFIX}:{self.family}:{self.seed}:{name}".encode()).digest()
         return float((int.from_bytes(digest[:8], "big") >> 11) / 2**53)
+
+    def sign(self, name: str) -> float:
+        """Return 1 or -1."""
+        return 1.0 if self.share(name) < 0.5 else -1.0
 
     def within(self, name: str, ends: Range) -> float:
         """Return a number between two ends, of six digits."""
@@ -183,16 +187,14 @@ def draw_box(problem: GaitProblem, id: str) -> AffineMap:
     names, n = problem.names, len(problem.names)
     ends = np.array([family.typical.get(name, (0.0, 1.0)) for name in names])
     centre, reach = ends.mean(axis=1), (ends[:, 1] - ends[:, 0]) / 2
-    rotation = np.eye(n)
     order = sorted(range(n), key=lambda k: draw.share(f"order {names[k]}"))
-    for i, j in zip(order[::2], order[1::2], strict=False):
-        angle = draw.within(f"angle {names[i]}", ANGLES) * (1 if draw.share(f"side {names[i]}") < 0.5 else -1)
-        rotation[np.ix_([i, j], [i, j])] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    angles = [draw.within(f"angle {names[i]}", ANGLES) * draw.sign(f"side {names[i]}") for i in order[: n - n % 2 : 2]]
+    rotation = rotate_pairs(order, angles)
     extent = np.abs(rotation.T) @ reach + FREE
     width = np.maximum([draw.within(f"width {name}", WIDTHS) for name in names], 2 * extent)
     share = np.array([draw.share(f"place {name}") for name in names])
     place = extent / width + share * (1 - 2 * extent / width)
-    mirror = np.array([1.0 if draw.share(f"mirror {name}") < 0.5 else -1.0 for name in names])
+    mirror = np.array([draw.sign(f"mirror {name}") for name in names])
     matrix = problem.scale[:, None] * rotation * (width * mirror)
     return AffineMap(
         matrix=matrix,

@@ -5,6 +5,7 @@ Objective, feasible set and optimum stay what they are; only where they are in t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -37,6 +38,14 @@ class AffineMap:
     def backward(self, x: Array) -> Array:
         """Return z (..., n) of x (..., n)."""
         return np.asarray(np.linalg.solve(self.matrix, (x - self.offset).T).T)
+
+
+def rotate_pairs(order: Sequence[int] | Array, angles: Sequence[float]) -> Array:
+    """Return the matrix (n, n) that rotates the first two variables of an order, the next two, ..., by angles (n // 2,) [rad]."""
+    matrix = np.eye(len(order))
+    for i, j, angle in zip(order[::2], order[1::2], angles, strict=False):
+        matrix[np.ix_([i, j], [i, j])] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    return matrix
 
 
 def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[str] = ()) -> GaitProblem:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import compare_problems
+from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import TARGETS
 from compare.bench.baseline import BASELINE, FOLDER, RUNS, list_instances, load_baseline, make_bench_study, pack_records
 from compare.bench.leaderboard import rank_solvers
@@ -69,13 +70,15 @@ def test_everything_of_the_small_suite_is_shipped() -> None:
 
 def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
     board = rank_solvers(["walk12-w015", "ssp-v5"])
-    duels = {s.solver: {duel.other: duel for duel in board.duels(s.solver)} for s in board.standings}
+    duels = {
+        s.solver: {score.other: score for score in count_wins(board.comparisons, s.solver)} for s in board.standings
+    }
     for solver, own in duels.items():
         for other, duel in own.items():
             back = duels[other][solver]
-            assert (duel.better, duel.worse, duel.undecided) == (back.worse, back.better, back.undecided)
+            assert (duel.wins, duel.losses, duel.ties) == (back.losses, back.wins, back.ties)
             assert duel.mean_a12 == pytest.approx(1.0 - back.mean_a12)
-    assert duels["pso"]["random"].better == 2 and duels["random"]["pso"].worse == 2
+    assert duels["pso"]["random"].wins == 2 and duels["random"]["pso"].losses == 2
 
 
 def test_no_shipped_run_is_better_than_the_best_known() -> None:
@@ -110,8 +113,8 @@ def test_places_follow_from_expected_running_times() -> None:
     with_twin = {s.solver: s for s in rank_solvers(ids, twin).standings}
     assert with_twin["twin"].mean_rank == with_twin[first].mean_rank
     assert with_twin["twin"].solved == with_twin[first].solved
-    duel = next(d for d in rank_solvers(ids, twin).duels("twin") if d.other == first)
-    assert (duel.better, duel.worse, duel.undecided, duel.mean_a12, duel.signed_rank) == (0, 0, len(ids), 0.5, 1.0)
+    duel = next(d for d in count_wins(rank_solvers(ids, twin).comparisons, "twin") if d.other == first)
+    assert (duel.wins, duel.losses, duel.ties, duel.mean_a12, duel.signed_rank) == (0, 0, len(ids), 0.5, 1.0)
 
 
 def test_a_solver_that_finds_nothing_is_last() -> None:
@@ -130,7 +133,7 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
     board = rank_solvers(ids, failed)
     last = board.standings[-1]
     assert (last.solver, last.solved, last.feasible, set(last.reached)) == ("nothing", 0.0, 0.0, {0})
-    assert all(duel.worse == len(ids) and duel.mean_a12 == 0.0 for duel in board.duels("nothing"))
+    assert all(duel.mean_a12 == 0.0 and duel.wins == 0 for duel in count_wins(board.comparisons, "nothing"))
 
 
 @pytest.mark.slow
