@@ -2,6 +2,6 @@
 
 from compare.archive.pack import pack_study
 from compare.archive.unpack import unpack_archive
-from compare.archive.verify import Finding, verify_archive, verify_folder
+from compare.archive.verify import Finding, Verification, verify_archive, verify_folder
 
-__all__ = ["Finding", "pack_study", "unpack_archive", "verify_archive", "verify_folder"]
+__all__ = ["Finding", "Verification", "pack_study", "unpack_archive", "verify_archive", "verify_folder"]

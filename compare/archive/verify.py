@@ -44,13 +44,30 @@ class Finding(NamedTuple):
         return f"{self.what}: {'holds' if self.holds else 'DOES NOT HOLD'}: {self.detail}"
 
 
-def verify_archive(path: Path, *, share: float = 0.0, progress: Progress = ignore_progress) -> list[Finding]:
-    """Check an archive as ``verify_folder``, and its hashes; raises InputError if it cannot be unpacked."""
+class Verification(NamedTuple):
+    """All checks, and the records that passed theirs."""
+
+    findings: list[Finding]
+    records: list[RunRecord]
+
+
+def verify_archive(
+    path: Path, *, share: float = 0.0, has_report: bool = True, progress: Progress = ignore_progress
+) -> Verification:
+    """Check an archive as ``verify_folder``, its hashes and its user code; raises InputError if it cannot be unpacked.
+
+    ``has_report`` says whether its report must follow from the records.
+    """
     with make_temporary_folder("nlp-gait-verify-") as folder:
         manifest, differences = unpack_archive(path, folder)
         detail = "; ".join(differences) or f"{len(manifest.files)} files have their SHA-256 of the manifest"
-        found = verify_folder(folder, share=share, robots=manifest.robots, is_archive=True, progress=progress)
-        return [Finding("manifest", not differences, detail), *found]
+        found = verify_folder(folder, share=share, robots=manifest.robots, progress=progress)
+        findings = [Finding("manifest", not differences, detail), *found.findings]
+        if found.records:
+            findings += _check_code_files(folder, found.records)
+        if found.records and has_report:
+            findings.append(_check_report(folder, found.records))
+        return Verification(findings, found.records)
 
 
 def verify_folder(
@@ -58,16 +75,14 @@ def verify_folder(
     *,
     share: float = 0.0,
     robots: Mapping[str, str] | None = None,
-    is_archive: bool = False,
     progress: Progress = ignore_progress,
-) -> list[Finding]:
+) -> Verification:
     """Check everything in a study's folder that can be checked.
 
     Args:
         folder: of the study.
         share: of the runs that are repeated, drawn at random, from 0 to 1; at least one if it is positive.
         robots: files that stand for the options of problems that name files, relative to the folder.
-        is_archive: whether the report must follow from the records, and user code be included.
         progress: receives a line for each repeated run.
     """
     places = {option: str(folder / file) for option, file in (robots or {}).items()}
@@ -78,22 +93,20 @@ def verify_folder(
     try:
         records, excluded = read_evidence(folder, "all", find_problem)
     except InputError as error:
-        return [Finding("records", False, str(error))]
+        return Verification([Finding("records", False, str(error))], [])
     count, wrong = len(records) + len(excluded), "; ".join(exclusion.sentence for exclusion in excluded)
     detail = (
         f"{len(excluded)} of {count} are no evidence: {wrong}" if excluded else f"all {count} follow from their points"
     )
     findings = [Finding("records", not excluded, detail + ", also between the samples" * (not excluded))]
-    manifest = Manifest(settings=None, sessions=())
     try:
-        manifest = read_manifest(folder)
-        findings.append(_check_sessions(records, manifest))
+        findings.append(_check_sessions(records, read_manifest(folder)))
     except InputError as error:
         findings.append(Finding(FILE, False, str(error)))
     findings += [_check_certificate(path) for path in sorted((folder / "certificates").glob("*.json"))]
-    if is_archive:
-        findings += [*_check_code_files(folder, records), _check_report(folder, records, manifest)]
-    return [*findings, *(_repeat_runs(records, share, places, progress) if share > 0.0 else ())]
+    if share > 0.0:
+        findings += _repeat_runs(records, share, places, progress)
+    return Verification(findings, records)
 
 
 def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> Finding:
@@ -146,12 +159,12 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
     return findings
 
 
-def _check_report(folder: Path, records: Sequence[RunRecord], manifest: Manifest) -> Finding:
+def _check_report(folder: Path, records: Sequence[RunRecord]) -> Finding:
     """Write the report again, and compare its text."""
     labelled = label_editions(records)
     try:
         simulated = load_simulations(folder, select_best_gaits(labelled))
-        again = markdown_page(make_study_document(labelled, manifest, simulated=simulated)).split("\n")
+        again = markdown_page(make_study_document(labelled, read_manifest(folder), simulated=simulated)).split("\n")
         known = (folder / REPORT).read_text(encoding="utf-8").split("\n")
     except (GaitError, OSError, UnicodeError) as error:
         return Finding(REPORT, False, str(error))

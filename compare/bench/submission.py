@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from compare.archive.pack import pack_study
-from compare.archive.unpack import unpack_archive
-from compare.archive.verify import Finding, verify_folder
+from compare.archive.verify import Finding, Verification, verify_archive
 from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
 from nlp_gait.errors import InputError
-from nlp_gait.files import make_temporary_folder
 from nlp_gait.gaitbench.generated import TEST_SEEDS, is_generated, is_test_seed, parse_id
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -36,10 +34,8 @@ def pack_submission(folder: Path, out: Path) -> Path:
     return pack_study(folder, records, out)
 
 
-def verify_submission(
-    path: Path, *, share: float, progress: Progress = ignore_progress
-) -> tuple[list[Finding], list[RunRecord]]:
-    """Judge every final point of a submission again, repeat a share of its runs, and check the rules; also return its records.
+def verify_submission(path: Path, *, share: float, progress: Progress = ignore_progress) -> Verification:
+    """Judge every final point of a submission again, repeat a share of its runs, and check the rules.
 
     Args:
         path: the file; its user code runs only if the caller has allowed it.
@@ -49,17 +45,8 @@ def verify_submission(
     Raises:
         InputError: the file cannot be unpacked.
     """
-    with make_temporary_folder("nlp-gait-submission-") as folder:
-        _, differences = unpack_archive(path, folder)
-        found = [
-            Finding("files", not differences, "; ".join(differences) or "all have the hash that the manifest states")
-        ]
-        found += verify_folder(folder, share=share, progress=progress)
-        try:
-            records, _ = read_evidence(folder, "all")
-        except InputError:  # already a finding
-            records = []
-    return [*found, *check_rules(records)], records
+    findings, records = verify_archive(path, share=share, has_report=False, progress=progress)
+    return Verification([*findings, *check_rules(records)], records)
 
 
 def check_rules(records: Sequence[RunRecord]) -> list[Finding]:

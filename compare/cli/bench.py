@@ -20,6 +20,7 @@ from compare.cli.common import (
     stdout,
     until_interrupted,
 )
+from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
@@ -64,6 +65,7 @@ def bench(
     from compare.bench.baseline import list_instances
     from compare.bench.leaderboard import rank_solvers
     from compare.bench.page import make_leaderboard_page, make_verdict
+    from compare.bench.submission import SUFFIX, pack_submission, verify_submission
     from compare.report.writing import add_session, write_document
     from compare.study.record import RunRecord
     from compare.study.run_study import Study, check_study, run_study
@@ -73,16 +75,14 @@ def bench(
     if submit is not None or verify is not None:
         name_all([algorithm] if algorithm and is_reference(algorithm) else [])
         if submit is not None:
-            _submit(submit)
+            print_written(pack_submission(submit, output_file(submit.with_name(f"{submit.name}-submission{SUFFIX}"))))
         if verify is not None:
-            _verify(verify, rerun, as_json)
+            print_findings(verify_submission(verify, share=rerun, progress=say).findings, as_json)
         return
     if leaderboard is not None:
         _write_leaderboard(leaderboard, out, as_json)
         return
     if audit:
-        if algorithm is None:
-            raise InputError("--audit examines one search: name it with --algorithm")
         _audit(algorithm, as_json)
         return
     chosen = choose_instances(suite, instances, families, seeds)
@@ -136,20 +136,19 @@ def bench(
         "instances": list(chosen),
         "solver": name,
         "rank": None if name is None else board.place(name),
-        "standings": [
-            {"solver": s.solver, "mean_rank": s.mean_rank, "solved": s.solved, "feasible": s.feasible}
-            for s in board.standings
-        ],
+        "standings": [asdict(standing) for standing in board.standings],
     }
     print_result(as_json, data, written, tables)
 
 
-def _audit(algorithm: str, as_json: bool) -> None:
+def _audit(algorithm: str | None, as_json: bool) -> None:
     """Audit a search and print what was found."""
     from compare.bench.audit import INSTANCES, audit_search
     from compare.study.settings import SolverSpec
     from compare.study.task import check_task
 
+    if algorithm is None:
+        raise InputError("--audit examines one search: name it with --algorithm")
     task = make_bench_study(INSTANCES[:1], SolverSpec(name=algorithm)).tasks()[0]
     if not task.is_search:
         raise InputError(f"--audit examines searches, and {algorithm} uses gradients; choose a search")
@@ -168,24 +167,6 @@ def _audit(algorithm: str, as_json: bool) -> None:
 
     effects = [{**asdict(effect), "verdict": effect.verdict} for effect in found.effects]
     print_result(as_json, {**asdict(found), "effects": effects, "accusations": list(found.accusations)}, (), tables)
-
-
-def _submit(folder: Path) -> None:
-    """Write the submission next to its folder."""
-    from compare.bench.submission import SUFFIX, pack_submission
-
-    print_written(pack_submission(folder, output_file(folder.with_name(f"{folder.name}-submission{SUFFIX}"))))
-
-
-def _verify(path: Path, rerun: float, as_json: bool) -> None:
-    """Verify a submission; status 1 if anything does not hold."""
-    from compare.bench.submission import verify_submission
-
-    findings, _ = verify_submission(path, share=rerun, progress=say)
-    data = {"holds": all(f.holds for f in findings), "findings": [f._asdict() for f in findings]}
-    print_result(as_json, data, (), lambda: stdout.print("\n".join(finding.sentence for finding in findings)))
-    if not data["holds"]:
-        fail("the submission is rejected: see what does not hold")
 
 
 def _write_leaderboard(folder: Path, out: Path, as_json: bool) -> None:

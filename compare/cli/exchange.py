@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from compare.cli.command import command
 from compare.cli.common import end_if_excluded, fail, print_json, print_result, print_written, progress_bar, say, stdout
@@ -11,6 +12,9 @@ from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.options import RESULTS, NamedProblem, name_all
 from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
+
+if TYPE_CHECKING:
+    from compare.archive import Finding
 
 
 @command
@@ -116,7 +120,12 @@ def verify(*, study: Path, rerun: str = "0%", code: list[str] | None = None, as_
     name_all(code)
     with progress_bar("repeated runs", None) as advance:
         check = verify_folder if study.is_dir() else verify_archive
-        findings = check(study, share=share, progress=advance)
+        findings = check(study, share=share, progress=advance).findings
+    print_findings(findings, as_json)
+
+
+def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
+    """Print what a verification found, and end with status 1 if anything does not hold."""
     wrong = [finding for finding in findings if not finding.holds]
     if as_json:
         print_json({"holds": not wrong, "findings": [finding._asdict() for finding in findings]})

@@ -59,7 +59,7 @@ def verify(content: bytes, folder: Path, **options: object) -> list[Finding]:
         manifest, differences = unpack_archive(path, folder / "unpacked")
     except InputError as error:
         return [Finding("archive", False, str(error))]
-    found = verify_folder(folder / "unpacked", robots=manifest.robots, **options)  # type: ignore[arg-type]
+    found = verify_folder(folder / "unpacked", robots=manifest.robots, **options).findings  # type: ignore[arg-type]
     return [Finding("manifest", not differences, "; ".join(differences)), *found]
 
 
@@ -207,7 +207,7 @@ def test_user_code_and_robots_travel_with_the_archive(
     monkeypatch.chdir(away)
     manifest, differences = unpack_archive(archive, away / "unpacked")
     assert {p.name for p in (away / "unpacked" / "code").iterdir()} == {"mine.py", "helper.py"} and not differences
-    findings = verify_folder(away / "unpacked", robots=manifest.robots)
+    findings = verify_folder(away / "unpacked", robots=manifest.robots).findings
     assert [f.sentence for f in findings if not f.holds] == []
     (away / "unpacked" / "code" / "helper.py").write_text("def middle(a, b):\n    return a\n")
     assert [f.holds for f in _check_code_files(away / "unpacked", read_records(away / "unpacked"))] == [False]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from compare.archive.unpack import MANIFEST
 from compare.bench.baseline import make_bench_study, parse_seeds
 from compare.bench.public_pages import filter_instances, write_public_pages
 from compare.bench.submission import check_rules, pack_submission, verify_submission
+from compare.study.evidence import check_claims, check_history
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.settings import Session, SolverSpec, write_manifest
@@ -124,3 +126,27 @@ def test_filters_are_parts_of_the_instances() -> None:
     assert found["family ssp"] == ("gb2:ssp:0",) and found["family nao-ssp"] == ("ssp-v5",)
     assert found["more than 10 variables"] == ("gb2:humanoid-ssp:0",)
     assert set(filter_instances(["ssp-v5"])) == {"all instances"}
+
+
+def test_a_forged_history_is_found_without_repeating_its_run(tmp_path: Path) -> None:
+    """What contradicts the run's own counts, its end or the judge is found; an improvement moved to an earlier entry is not."""
+    record = run(tmp_path)[0]
+    history, last = record.history, record.verdict.objective
+    assert not [*check_history(record), *check_claims(record)]
+    sooner = replace(history, evaluations=(10, *history.evaluations[1:]))
+    assert not [*check_history(replace(record, history=sooner))]
+    worse = last + (1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0)
+    forged: dict[str, dict[str, Any]] = {
+        "worsens": {"history": replace(history, objective=(last, worse))},
+        "but the judge finds": {"history": replace(history, objective=(last + 1.0, last + 1.0))},
+        "two entries at the same number": {"history": replace(history, evaluations=(100, 100))},
+        "more than its 1 iterations": {"iterations": 1},
+        "it counts 60 of 100 evaluations": {
+            "evaluations": {"f": 60},
+            "history": replace(history, evaluations=(50, 60)),
+        },
+        "ended by: no better point": {"status": "no better point in 5 generations"},
+    }
+    for words, changes in forged.items():
+        found = replace(record, **changes)
+        assert any(words in reason for reason in (*check_history(found), *check_claims(found))), words
