@@ -193,7 +193,7 @@ def make_change(best: Array, change: str, seed: int) -> AffineMap:
         matrix, lower, upper = np.diag(1.0 / factors), lower * factors, upper * factors
     elif change == "rotated":
         order = other.permutation(n)
-        matrix = rotate_pairs(order, [ANGLE] * (n // 2))
+        matrix = rotate_pairs(order.tolist(), [ANGLE] * (n // 2))
         offset = best - matrix @ best
     elif change == "permuted":
         order = other.permutation(n)

@@ -40,7 +40,7 @@ class AffineMap:
         return np.asarray(np.linalg.solve(self.matrix, (x - self.offset).T).T)
 
 
-def rotate_pairs(order: Sequence[int] | Array, angles: Sequence[float]) -> Array:
+def rotate_pairs(order: Sequence[int], angles: Sequence[float]) -> Array:
     """Return the matrix (n, n) that rotates the first two variables of an order, the next two, ..., by angles (n // 2,) [rad]."""
     matrix = np.eye(len(order))
     for i, j, angle in zip(order[::2], order[1::2], angles, strict=False):
