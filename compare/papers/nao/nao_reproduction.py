@@ -353,10 +353,10 @@ def _list_tests(phase: PhaseFindings) -> Rows:
         tests.append(
             (f"here, {NAMES[name]}", phase.test(name), a12(phase.final_powers(name), phase.final_powers("ga")))
         )
-    rows: list[list[Value]] = []
-    for name, test, share in tests:
-        rows.append([phase.paper.title, name, test.rank_sum, test.z, test.p_two_sided, test.p_less, share])
-    return rows
+    return [
+        [phase.paper.title, name, test.rank_sum, test.z, test.p_two_sided, test.p_less, share]
+        for name, test, share in tests
+    ]
 
 
 def compute_implied_a12(phase: PhaseFindings) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compare.analysis.units import axis_label, join_words
-from compare.drawing.figures import COLOURS, LEGEND_ROW_IN, new_figure, use_log_axes
+from compare.drawing.figures import COLOURS, add_legend_below, new_figure, use_log_axes
 from compare.papers.claims import Verdict, bind_checks
 from compare.papers.nao_pareto import nao_pareto_claims
 from compare.papers.nao_pareto import nao_pareto_runs as runs
@@ -34,7 +34,6 @@ from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -154,7 +153,7 @@ def _draw_running(phase: PhaseFindings) -> Figure:
     for axes in (left, right):
         axes.set_xlabel("evaluations")
         use_log_axes(axes, both=True)
-    _add_legend(figure, left, 4)
+    add_legend_below(figure)
     return figure
 
 
@@ -178,14 +177,8 @@ def _draw_fronts(phase: PhaseFindings) -> Figure:
         axes.set_xlabel(axis_label(criterion.name, criterion.unit))
     for axes in figure.axes[::2]:
         axes.set_ylabel("power [W]")
-    _add_legend(figure, figure.axes[0], 2)
+    add_legend_below(figure)
     return figure
-
-
-def _add_legend(figure: Figure, axes: Axes, columns: int) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.set_figheight(figure.get_figheight() + LEGEND_ROW_IN)
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 REPRODUCTION = Reproduction(

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from compare.papers.stairs.stairs_choices import CHOICES, OURS, PLAN_CHOICES, PRINTED
-from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, TABLE_4
-from compare.papers.stairs.stairs_planning import PLANS, describe_plan, get_choice, list_choice_plans, move
+from compare.papers.claims import Series
+from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, OURS, PLAN_CHOICES, PRINTED, TABLE_4
+from compare.papers.stairs.stairs_planning import (
+    PLANS,
+    describe_plan,
+    get_choice,
+    list_choice_plans,
+    measure_hip_speeds,
+    move,
+)
 from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings
 from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec, measure_spread
 from nlp_gait.formulation import Array
@@ -34,20 +41,20 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
     learned = [findings.others[f"learned-{case}"] for case in cases]
     planned = {name or OURS: _describe_plans(findings, name) for name in ("", *PLAN_CHOICES)}
     return {
-        "inertia_J": {what: _join(energy for energy, _ in rows) for what, rows in moments.items()},
-        "inertia_mm": {what: _join(margin for _, margin in rows) for what, rows in moments.items()},
+        "inertia_J": {what: Series(energy for energy, _ in rows) for what, rows in moments.items()},
+        "inertia_mm": {what: Series(margin for _, margin in rows) for what, rows in moments.items()},
         "edge_mm": {
-            what: _join(measure_depth(findings, what, DRAWN_CASE, setback) for setback in SETBACKS) for what in PLANS
+            what: Series(measure_depth(findings, what, DRAWN_CASE, setback) for setback in SETBACKS) for what in PLANS
         },
-        "zmp_gap_mm": {what: _join(measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
-        "start_m_s": _join(measure_hip_speeds(findings, "jerk", case)[0] for case in cases),
-        "centre_mm": {what: _join(_measure_centre(findings, what, case) for case in cases) for what in PLANS},
+        "zmp_gap_mm": {what: Series(measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
+        "start_m_s": Series(measure_hip_speeds(findings, "jerk", case)[0] for case in cases),
+        "centre_mm": {what: Series(_measure_centre(findings, what, case) for case in cases) for what in PLANS},
         "search_gap": max(measure_spread(findings, name) for name in findings.effort.choices),
-        "turn_rad": {name: _join(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
-        "learned": [_join(row[name] for row in learned) for name in LEARNED],
-        "first": [_join(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
+        "turn_rad": {name: Series(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
+        "learned": [Series(row[name] for row in learned) for name in LEARNED],
+        "first": [Series(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
         "colony": {
-            solver: _join(findings.best("track", case, solver).verdict.objective for case in cases)
+            solver: Series(findings.best("track", case, solver).verdict.objective for case in cases)
             for solver in findings.track_solvers
         },
         "printed_effort": ANTS * ITERATIONS,
@@ -82,7 +89,7 @@ def _describe_step(findings: StairsFindings, name: str) -> str:
     if name not in findings.effort.choices:
         return NOT_COMPUTED
     steps = [get_best(findings, case, name).verdict for case in findings.cases]
-    cost, energy = (_join(step.indexes[index] for step in steps) for index in ("controller_cost", "energy_J"))
+    cost, energy = (Series(step.indexes[index] for step in steps) for index in ("controller_cost", "energy_J"))
     return f"mean of (53) {cost}, {energy} J" + ("" if all(step.feasible for step in steps) else ", not feasible")
 
 
@@ -117,13 +124,6 @@ def measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
     return 1e3 * float(np.abs(arrays["zmp"][:, 0] + tread - planned).max())
 
 
-def measure_hip_speeds(findings: StairsFindings, what: str, case: int) -> tuple[float, float]:
-    """Return the forward speeds of the hip at the start and the end of a plan [m/s]."""
-    arrays = move(findings, what, case)[0].arrays
-    rates = np.diff(arrays["hip"][:, 0])[[0, -1]] / np.diff(arrays["t"])[[0, -1]]
-    return float(rates[0]), float(rates[1])
-
-
 def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
     """Return how far the centre of gravity of all links is below the hip at the start of a plan [mm]."""
     rods, angles = toe_foot_biped().rods, move(findings, what, case)[0].arrays["link_q"][0]
@@ -137,7 +137,3 @@ def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:
     problem, x = make_choice_spec(findings, case, name).load(), get_best(findings, case, name).x
     rates = problem.signals(np.array(list(x.values()))).arrays["link_qd"]
     return QUANTUM * float(np.abs(rates).max())
-
-
-def _join(values: Iterable[float]) -> str:
-    return " / ".join(f"{value:.4g}" for value in values)

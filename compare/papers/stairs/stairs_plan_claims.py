@@ -20,12 +20,13 @@ from compare.papers.claims import (
     require_feasible,
 )
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible
-from compare.papers.stairs.stairs_effects import measure_depth, measure_hip_speeds, measure_zmp_gap
+from compare.papers.stairs.stairs_effects import measure_depth, measure_zmp_gap
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_planning import (
     PLANS,
     describe_climb,
     get_choice,
+    measure_hip_speeds,
     move,
 )
 from compare.papers.stairs.stairs_printed import measure_printed_equations, measure_slide

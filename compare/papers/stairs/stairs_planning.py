@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from compare.papers.paper_runs import choose_best, get_point, make_computation, make_start_tasks
-from compare.papers.stairs.stairs_choices import PLAN_CHOICES
-from compare.papers.stairs.stairs_paper import TABLE_4
+from compare.papers.stairs.stairs_paper import PLAN_CHOICES, TABLE_4
 from compare.papers.stairs.stairs_runs import (
     DRAWN_CASE,
     StairsFindings,
@@ -109,6 +108,13 @@ def _move(findings: StairsFindings, what: str, case: int) -> tuple[Signals, dict
     return signals, {limb.side: limb.points[:, :, [0, 2]] for limb in drawn.limbs if limb.side in (LEFT, RIGHT)}
 
 
+def measure_hip_speeds(findings: StairsFindings, what: str, case: int) -> tuple[float, float]:
+    """Return the forward speeds of the hip at the start and the end of a plan [m/s]."""
+    arrays = move(findings, what, case)[0].arrays
+    rates = np.diff(arrays["hip"][:, 0])[[0, -1]] / np.diff(arrays["t"])[[0, -1]]
+    return float(rates[0]), float(rates[1])
+
+
 def make_planning_computations(findings: StairsFindings) -> Iterator[Computation]:
     """Yield simulations of the ideal and of both plans."""
     for case in findings.cases:
@@ -190,13 +196,9 @@ def _list_step(findings: StairsFindings, case: int, what: str) -> list[Value]:
         "landing": "next, with reverse double support",
         "jerk": "next, flat stance foot",
     }
-    arrays = move(findings, what, case)[0].arrays
-    speeds = [
-        float((arrays["hip"][i + 1, 0] - arrays["hip"][i, 0]) / (arrays["t"][i + 1] - arrays["t"][i])) for i in (0, -2)
-    ]
     others = [indexes[name] for name in ("energy_J", "peak_jerk_rad_s3", "peak_torque_Nm")]
     margin = 1e3 * indexes["zmp_margin_min_m"]
-    return [case, names[what], verdict.feasible, margin, *others, *speeds]
+    return [case, names[what], verdict.feasible, margin, *others, *measure_hip_speeds(findings, what, case)]
 
 
 def _list_ideal(findings: StairsFindings, case: int) -> list[Value]:

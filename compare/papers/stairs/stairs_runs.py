@@ -20,9 +20,19 @@ from compare.papers.paper_runs import (
     make_search_tasks,
     make_start_tasks,
 )
-from compare.papers.stairs.stairs_choices import CHOICES, INSTANTS, OURS, PLAN_CHOICES, PRINTED
 from compare.papers.stairs.stairs_instants import Decides
-from compare.papers.stairs.stairs_paper import ANTS, EVAPORATION, ITERATIONS, TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import (
+    ANTS,
+    CHOICES,
+    EVAPORATION,
+    INSTANTS,
+    ITERATIONS,
+    OURS,
+    PLAN_CHOICES,
+    PRINTED,
+    TABLE_3,
+    TABLE_4,
+)
 from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task

@@ -12,9 +12,8 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.claims import Check, Series, Verdict, compare_readings, decide, require_change, require_feasible
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible, make_computation, make_search_tasks
-from compare.papers.stairs.stairs_choices import CHOICES, OURS, PRINTED
 from compare.papers.stairs.stairs_instants import Decides, Instants, track_by_instants
-from compare.papers.stairs.stairs_paper import ANTS, ITERATIONS, PAPER, TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, OURS, PAPER, PRINTED, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import (
     ACO,
     ALGORITHMS,

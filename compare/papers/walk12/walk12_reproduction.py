@@ -237,11 +237,7 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "simpson_f1max": simpson[-1].verdict.objective * F1MAX,
         **{name: "none is shipped" if bound is None else f"{bound:.6f}" for name, bound in bounds.items()},
         "ga_900": float(np.median([f for f in earlier if f is not None])),
-        "ga_median": float(np.median(list_f(ga["ga"]))),
-        "ga_no_elite": float(np.median(list_f(ga["ga-no-elite"]))),
-        "ga_tournament_3": float(np.median(list_f(ga["ga-tournament-3"]))),
-        "ga_plus": float(np.median(list_f(ga["ga-plus"]))),
-        "ga_chromosome": float(np.median(list_f(ga["ga-chromosome"]))),
+        "ga_medians": {name: float(np.median(list_f(records))) for name, records in ga.items()},
     }
 
 
