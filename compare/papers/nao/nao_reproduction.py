@@ -260,18 +260,12 @@ def make_tables(findings: NaoFindings) -> dict[str, Rows]:
 def _list_variables(phase: PhaseFindings) -> Rows:
     """Tables 6, 8: the optimal solutions; of the searches the run of median power."""
     other = phase.optimum_with("v6")
-    rows = []
+    rows: list[list[Value]] = []
     for i, variable in enumerate(phase.problem.variables):
-        ours = {name: phase.median(name).x[variable.name] for name in nao.SEARCHES}
-        paper = {name: phase.paper.optima[name].x[i] for name in ALGORITHMS}
-        row: list[Value] = [
-            f"x{i + 1} {variable.name} [{variable.unit}]",
-            paper["pso"],
-            ours["pso-constant"],
-            ours["pso"],
-        ]
-        row += [paper["ga"], ours["ga"], phase.optimum.x[variable.name], other.x[variable.name] if other else None]
-        rows.append(row)
+        name, (of_pso, of_ga) = variable.name, (phase.paper.optima[search].x[i] for search in ALGORITHMS)
+        constant, damped, ga = (phase.median(search).x[name] for search in nao.SEARCHES)
+        found = [of_pso, constant, damped, of_ga, ga, phase.optimum.x[name]]
+        rows.append([f"x{i + 1} {name} [{variable.unit}]", *found, other.x[name] if other else None])
     return rows
 
 
@@ -312,10 +306,9 @@ def _list_variants(phase: PhaseFindings) -> Rows:
     """Median power of each choice that the paper leaves open, against both kinds of PSO and GA."""
     rows: list[list[Value]] = []
     for name in (*nao.SEARCHES, *phase.variants):
-        powers = phase.final_powers(name)
-        p = [phase.test(name, other).p_two_sided for other in nao.SEARCHES]
-        feasible = sum(map(math.isfinite, powers))
-        rows.append([phase.paper.title, NAMES.get(name, name), len(powers), feasible, float(np.median(powers)), *p])
+        powers, p = phase.final_powers(name), [phase.test(name, other).p_two_sided for other in nao.SEARCHES]
+        ends = [len(powers), sum(map(math.isfinite, powers)), float(np.median(powers))]
+        rows.append([phase.paper.title, NAMES.get(name, name), *ends, *p])
     return rows
 
 

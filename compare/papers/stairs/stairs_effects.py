@@ -38,7 +38,6 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
     cases = findings.cases
     motions = {what: move(findings, what, DRAWN_CASE) for what in PLANS}
     moments = {what: [_change_inertia(motions[what][0].arrays, share) for share in INERTIAS] for what in PLANS}
-    learned = [findings.others[f"learned-{case}"] for case in cases]
     planned = {name or OURS: _describe_plans(findings, name) for name in ("", *PLAN_CHOICES)}
     return {
         "inertia_J": {what: Series(energy for energy, _ in rows) for what, rows in moments.items()},
@@ -51,7 +50,7 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
         "centre_mm": {what: Series(_measure_centre(findings, what, case) for case in cases) for what in PLANS},
         "search_gap": max(measure_spread(findings, name) for name in findings.effort.choices),
         "turn_rad": {name: Series(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
-        "learned": [Series(row[name] for row in learned) for name in LEARNED],
+        "learned": [findings.collect("learned", name) for name in LEARNED],
         "first": [Series(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
         "colony": {
             solver: Series(findings.best("track", case, solver).verdict.objective for case in cases)

@@ -44,16 +44,9 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
         choice = PLAN_CHOICES[name]
         for what in list_choice_plans(name):
             spec = make_plan_spec(effort, DRAWN_CASE, what)
-            yield _make_task(
-                replace(
-                    spec,
-                    options={**spec.options, **choice.options},
-                    values={**spec.values, **choice.values},
-                    label=f"{what}-{DRAWN_CASE}-{name}",
-                ),
-                findings.best(what, DRAWN_CASE),
-                effort.plan_settings,
-            )
+            spec = replace(spec, options={**spec.options, **choice.options}, values={**spec.values, **choice.values})
+            best, spec = findings.best(what, DRAWN_CASE), replace(spec, label=f"{what}-{DRAWN_CASE}-{name}")
+            yield _make_task(spec, best, effort.plan_settings)
     for case in findings.cases:
         settings = effort.plan_settings
         yield from make_start_tasks(make_plan_spec(effort, case, "hip"), effort.hip_starts, settings=settings)

@@ -11,6 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import evaluate
+from compare.papers.claims import Series
 from compare.papers.paper_runs import (
     Effort,
     Runs,
@@ -214,6 +215,10 @@ class StairsFindings:
     def track_solvers(self) -> tuple[str, ...]:
         """Solvers on the track."""
         return (*ALGORITHMS, *([IPOPT] if self.effort.track_ipopt else []))
+
+    def collect(self, title: str, key: str) -> Series:
+        """Return a number of a computation in all cases."""
+        return Series(self.others[f"{title}-{case}"][key] for case in self.cases)
 
     def best_track(self, case: int) -> RunRecord:
         """Return the best run of the paper's search on the track of a case."""

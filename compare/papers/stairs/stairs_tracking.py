@@ -77,13 +77,9 @@ def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation
             yield make_computation(f"powerless-{name}-{case}", spec, function, evaluations=effort.track_evaluations)
         for name, decides in effort.instant_searches:
             spec, plan = make_choice_spec(findings, case, name), findings.plan(case, CHOICES[name].plan)
-            arguments = {
-                "torso_rad": plan["torso_pitch_rad"],
-                "decides": decides,
-                "evaluations": effort.instant_evaluations,
-            }
-            title = f"instants-{name}-{decides}-{case}"
-            yield make_computation(title, spec, partial(run_algorithm_4, spec), **arguments)
+            title, function = f"instants-{name}-{decides}-{case}", partial(run_algorithm_4, spec)
+            settings = {"torso_rad": plan["torso_pitch_rad"], "evaluations": effort.instant_evaluations}
+            yield make_computation(title, spec, function, decides=decides, **settings)
 
 
 def run_algorithm_4(spec: ProblemSpec, torso_rad: float, decides: Decides, evaluations: int) -> dict[str, Any]:
@@ -144,10 +140,10 @@ def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
         "instants": {decides: _describe_instants(findings, decides) for decides in get_args(Decides)},
         "reading": {index: _describe(_collect(findings, index, names)) for index, names in READ.items()},
         "best": {name: Series(one[name] for one in tracks) for name in tracks[0]},
-        "gains": {name: _collect_printed(findings, name) for name in findings.others[f"printed-{findings.cases[0]}"]},
+        "gains": {name: findings.collect("printed", name) for name in findings.others[f"printed-{findings.cases[0]}"]},
         "over": {index: _describe_range(findings, index) for index in LEAST_ROWS.values()},
         "instant_ms": _describe_instant_times(findings),
-        "powerless": _describe({name: _collect_powerless(findings, name) for name in POWERLESS}),
+        "powerless": _describe({name: findings.collect(f"powerless-{name}", "energy_J") for name in POWERLESS}),
         "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()})),
     }
 
@@ -217,7 +213,7 @@ def _check_balance(findings: StairsFindings) -> Check:
     ours = _collect(findings, "zmp_margin_min_m", READ["zmp_margin_min_m"])
     held = [min(row) >= 0 for row in ours.values()]
     held += [not any(part["outside_quanta"] for part in parts) for parts in _get_instants(findings, "gains").values()]
-    held += [min(_collect_printed(findings, f"{name}_zmp_margin_min_m")) >= 0 for name in PRINTED_GAINS]
+    held += [min(findings.collect("printed", f"{name}_zmp_margin_min_m")) >= 0 for name in PRINTED_GAINS]
     return _require_steps(findings, decide(held), ours)
 
 
@@ -226,13 +222,8 @@ def _check_following(findings: StairsFindings) -> Check:
     return decide([max(row) <= FOLLOWED_RAD for row in errors.values()], limit=FOLLOWED_RAD)
 
 
-def _collect_printed(findings: StairsFindings, name: str) -> Series:
-    """Return a result of the printed gains in all cases."""
-    return Series(findings.others[f"printed-{case}"][name] for case in findings.cases)
-
-
 def _check_printed_gains(findings: StairsFindings) -> Check:
-    errors = [_collect_printed(findings, f"{name}_error_rad") for name in PRINTED_GAINS]
+    errors = [findings.collect("printed", f"{name}_error_rad") for name in PRINTED_GAINS]
     return decide([max(row) <= FOLLOWED_RAD for row in errors], limit=FOLLOWED_RAD)
 
 
@@ -270,7 +261,7 @@ def _describe_instant_times(findings: StairsFindings) -> str:
 
 
 def _check_dynamics(findings: StairsFindings) -> Check:
-    quanta = [_collect_printed(findings, f"explicit_{name}") for name in SCHEMES]
+    quanta = [findings.collect("printed", f"explicit_{name}") for name in SCHEMES]
     return decide([min(row) * QUANTUM >= TABLE_3["t3_s"] for row in quanta])
 
 
@@ -283,14 +274,9 @@ def _check_cost_against_energy(_: StairsFindings) -> Check:
     return decide(held, power=Series(power), least=Series(least), rates=Series(rates))
 
 
-def _collect_powerless(findings: StairsFindings, name: str) -> Series:
-    """Return the energies [J] of gains and torso of least error, without the power, under a reading."""
-    return Series(findings.others[f"powerless-{name}-{case}"]["energy_J"] for case in findings.cases)
-
-
 def _check_power(findings: StairsFindings) -> Check:
     with_power = [sum(row) for row in _collect(findings, "energy_J", POWERLESS).values()]
-    without = [sum(_collect_powerless(findings, name)) for name in POWERLESS]
+    without = [sum(findings.collect(f"powerless-{name}", "energy_J")) for name in POWERLESS]
     return require_change(100 * (np.divide(without, with_power) - 1)[:, None])
 
 
@@ -300,7 +286,7 @@ def _check_torso(findings: StairsFindings, index: str) -> Check:
     Under each reading with the same plan and gains; and for our plan of least energy against one that was made for an upright
     torso. A step whose ZMP leaves the polygon upright is no comparison of energies.
     """
-    tuned, own = _collect(findings, index), _collect_printed(findings, f"upright_{index}")
+    tuned, own = _collect(findings, index), findings.collect("printed", f"upright_{index}")
     upright = {name: _measure_upright(findings, name) for name in tuned}
     values = {name: Series(row[index] for row in rows) for name, rows in upright.items()}
     stays = [name for name, rows in upright.items() if min(row["zmp_margin_min_m"] for row in rows) >= 0]
