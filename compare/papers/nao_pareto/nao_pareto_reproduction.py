@@ -13,14 +13,7 @@ from compare.drawing.figures import COLOURS, add_legend_below, new_figure, use_l
 from compare.papers.claims import Verdict, bind_checks
 from compare.papers.nao_pareto import nao_pareto_claims
 from compare.papers.nao_pareto import nao_pareto_runs as runs
-from compare.papers.nao_pareto.nao_pareto_claims import (
-    EVEN_POINTS,
-    NAMES,
-    NEAR,
-    ParetoFindings,
-    PhaseFindings,
-    collect_points,
-)
+from compare.papers.nao_pareto.nao_pareto_claims import NAMES, NEAR, ParetoFindings, PhaseFindings
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, CRITERION, ParetoEffort
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
@@ -52,7 +45,7 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFinding
     code = (runs, constrained_moead, dynamic_nsga3, pymoo)
     results = runner.compute([search for of_case in searches.values() for search in of_case], code)
     done = {case: [runs.make_run(results[search.name]) for search in of_case] for case, of_case in searches.items()}
-    points = collect_points(front, (run for of_case in done.values() for run in of_case))
+    points = nao_pareto_claims.collect_points(front, (run for of_case in done.values() for run in of_case))
     solve = partial(challenge_front, problem, criterion, front, points, work.solver(), work.progress)
     given = {"front": [asdict(point) for point in front], "points": [asdict(point) for point in points]}
     inputs = {**fingerprint(problem), "criterion": CRITERION, **given}
@@ -72,7 +65,7 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
         "largest": f"{effort.budgets[-1]:,}",
         "samples": effort.intervals + 1,
         "reference": REFERENCE,
-        "even": EVEN_POINTS,
+        "even": nao_pareto_claims.EVEN_POINTS,
         "near": 100 * NEAR,
         "criterion": ssp.criterion.name,
         "claims": len(verdicts),

@@ -10,17 +10,8 @@ from typing import Any
 from scipy.stats import fisher_exact
 
 from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide, require_change
-from compare.papers.nao_walk.nao_walk_runs import (
-    ACTIVE_MIN,
-    BATTERY_WH,
-    FEED_FORWARD,
-    KINDS,
-    SPECS,
-    SPEED_M_S,
-    TORSO_M,
-    NaoWalkEffort,
-    sum_energy,
-)
+from compare.papers.nao_walk import nao_walk_runs
+from compare.papers.nao_walk.nao_walk_runs import KINDS, SPECS, SPEED_M_S, NaoWalkEffort, sum_energy
 
 Point = Mapping[str, Any]
 KNEE = "KneePitch"
@@ -70,7 +61,7 @@ class NaoWalkFindings:
 
     def over_stiffness(self, key: str) -> list[list[Any]]:
         """Return a result of the robot's own walk from full stiffness downwards, without and with torques fed forward."""
-        return [[point[key] for point in self.drives[name]] for name in FEED_FORWARD]
+        return [[point[key] for point in self.drives[name]] for name in nao_walk_runs.FEED_FORWARD]
 
 
 def _check_knees(findings: NaoWalkFindings) -> Check:
@@ -89,7 +80,7 @@ def _check_knees(findings: NaoWalkFindings) -> Check:
 
 def _check_straight(findings: NaoWalkFindings) -> Check:
     heights = findings.torsos
-    own, tallest = next(point for point in heights if point["torso_m"] == TORSO_M), heights[-1]
+    own, tallest = next(point for point in heights if point["torso_m"] == nao_walk_runs.TORSO_M), heights[-1]
     best = {heat: min(heights, key=lambda point: float(point[f"{heat}_J_per_m"])) for heat in HEATS}
     tallest_mm, found = 1000 * tallest["torso_m"], []
     for heat, name in HEATS.items():
@@ -105,7 +96,7 @@ def _check_straight(findings: NaoWalkFindings) -> Check:
         verdict = Verdict.FAILS
     return decide(
         verdict,
-        torso_mm=1000 * TORSO_M,
+        torso_mm=1000 * nao_walk_runs.TORSO_M,
         tallest_mm=tallest_mm,
         tallest=tallest,
         own=own,
@@ -195,13 +186,13 @@ def _check_speed(findings: NaoWalkFindings) -> Check:
 
 
 def _check_battery(findings: NaoWalkFindings) -> Check:
-    drained = 60.0 * BATTERY_WH / ACTIVE_MIN
+    drained = 60.0 * nao_walk_runs.BATTERY_WH / nao_walk_runs.ACTIVE_MIN
     powers = [findings.engine_W(name, "sheet") for name in ("own-plain", "own")]
     share = max((power for power in powers if power is not None), default=0.0) / drained
     return decide(
         Verdict.UNTESTABLE if 0.0 < share < 1.0 else Verdict.FAILS,
-        battery_Wh=BATTERY_WH,
-        active_min=ACTIVE_MIN,
+        battery_Wh=nao_walk_runs.BATTERY_WH,
+        active_min=nao_walk_runs.ACTIVE_MIN,
         drained=drained,
         found=" and ".join("a fall" if power is None else f"{power:.1f} W" for power in powers),
         share=share,

@@ -9,15 +9,9 @@ import casadi as ca
 import numpy as np
 
 from compare.papers.claims import Series
+from compare.papers.stairs import stairs_planning
 from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, OURS, PLAN_CHOICES, PRINTED, TABLE_4
-from compare.papers.stairs.stairs_planning import (
-    PLANS,
-    describe_plan,
-    get_choice,
-    list_choice_plans,
-    measure_hip_speeds,
-    move,
-)
+from compare.papers.stairs.stairs_planning import PLANS, describe_plan, get_choice, measure_hip_speeds, move
 from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings
 from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec, measure_spread
 from nlp_gait.formulation import Array
@@ -67,7 +61,7 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
 def _describe_plans(findings: StairsFindings, name: str) -> str:
     if name and name not in findings.effort.plan_choices:
         return NOT_COMPUTED
-    found = {what: describe_plan(findings, what, name) for what in list_choice_plans(name)}
+    found = {what: describe_plan(findings, what, name) for what in stairs_planning.list_choice_plans(name)}
     return ", ".join(
         f"no {NAMES[what]} {text.removeprefix('none ')}" if "(" in text else f"{text} {PLANS[what]}"
         for what, text in found.items()

@@ -20,26 +20,12 @@ from compare.papers.claims import (
     require_feasible,
 )
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible
+from compare.papers.stairs import stairs_planning, stairs_runs
 from compare.papers.stairs.stairs_effects import measure_depth, measure_zmp_gap
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_planning import (
-    PLANS,
-    describe_climb,
-    get_choice,
-    measure_hip_speeds,
-    move,
-)
+from compare.papers.stairs.stairs_planning import PLANS, get_choice, measure_hip_speeds, move
 from compare.papers.stairs.stairs_printed import measure_printed_equations, measure_slide
-from compare.papers.stairs.stairs_runs import (
-    CLOSED_FORM,
-    DRAWN_CASE,
-    IMPOSSIBLE_RISE_M,
-    KINDS,
-    RULES,
-    StairsFindings,
-    make_other_spec,
-    make_plan_spec,
-)
+from compare.papers.stairs.stairs_runs import DRAWN_CASE, KINDS, RULES, StairsFindings, make_plan_spec
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
@@ -74,7 +60,9 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
         "energy_factor": Series(
             TABLE_4[case].energy / findings.best_track(case).verdict.indexes["energy_J"] for case in findings.cases
         ),
-        "ideal_climbs": "; ".join(describe_climb(findings.others[f"climb-ideal-{case}"]) for case in findings.cases),
+        "ideal_climbs": "; ".join(
+            stairs_planning.describe_climb(findings.others[f"climb-ideal-{case}"]) for case in findings.cases
+        ),
     }
 
 
@@ -232,7 +220,7 @@ def _check_adaptation(findings: StairsFindings) -> Check:
     """By the printed (8), (9) on all stairs, by plans for each stair, and by one plan for all, as Table III."""
     effort = findings.effort
     sizes = [*(TABLE_4[case].step_m for case in findings.cases), *effort.other_stairs]
-    specs = [make_other_spec(effort, *size) for size in effort.other_stairs]
+    specs = [stairs_runs.make_other_spec(effort, *size) for size in effort.other_stairs]
     runs = [findings.best("plan", case) for case in findings.cases]
     runs += [choose_best(findings.runs[spec.title, IPOPT]) for spec in specs]
     tuned = [run.verdict.feasible for run in runs]
@@ -240,10 +228,12 @@ def _check_adaptation(findings: StairsFindings) -> Check:
     x = get_point(findings.best("plan", DRAWN_CASE))
     kept = [evaluate(spec.load(), x).feasible for spec in problems]
     slides = [measure_slide(*size) for size in sizes]
-    common = [size[1] < IMPOSSIBLE_RISE_M for size in sizes]
+    common = [size[1] < stairs_runs.IMPOSSIBLE_RISE_M for size in sizes]
     found = {"tuned": sum(tuned), "kept": sum(kept), "of": len(sizes), "slides": Series(filter(None, slides))}
     held = [not any(slides), bool(np.all(np.array(tuned)[common])), all(kept)]
-    return decide(held, failed="; ".join(list_infeasible(runs)) or "none", impossible=IMPOSSIBLE_RISE_M, **found)
+    return decide(
+        held, failed="; ".join(list_infeasible(runs)) or "none", impossible=stairs_runs.IMPOSSIBLE_RISE_M, **found
+    )
 
 
 def _check_climb(findings: StairsFindings) -> Check:
@@ -261,11 +251,13 @@ def _check_network(findings: StairsFindings) -> Check:
 def _check_other_methods(findings: StairsFindings) -> Check:
     network = findings.others["network"]
     medians = {rule: 1e3 * float(np.median(found["time_s"][1:])) for rule, found in network.items()}
-    closed = medians.pop(CLOSED_FORM)
+    closed = medians.pop(stairs_runs.CLOSED_FORM)
     texts = "; ".join(f"{rule} {value:.3g}" for rule, value in medians.items())
     held = [value < closed for value in medians.values()]
     counts = {"bent": network["adam"]["bent_otherwise"], "poses": network["adam"]["poses"]}
-    return decide(held, closed=closed, medians=texts, error=network[CLOSED_FORM]["largest_angle_error_rad"], **counts)
+    return decide(
+        held, closed=closed, medians=texts, error=network[stairs_runs.CLOSED_FORM]["largest_angle_error_rad"], **counts
+    )
 
 
 def _check_poses(findings: StairsFindings, share_of_first: float = math.inf, limit_ms: float = math.inf) -> Check:

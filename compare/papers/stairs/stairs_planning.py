@@ -11,15 +11,9 @@ from typing import Any
 import numpy as np
 
 from compare.papers.paper_runs import choose_best, get_point, make_computation, make_start_tasks
+from compare.papers.stairs import stairs_runs
 from compare.papers.stairs.stairs_paper import PLAN_CHOICES, TABLE_4
-from compare.papers.stairs.stairs_runs import (
-    DRAWN_CASE,
-    StairsFindings,
-    fix,
-    make_ideal_spec,
-    make_plan_spec,
-    make_track_spec,
-)
+from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings, fix, make_plan_spec, make_track_spec
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.store import Computation
@@ -80,7 +74,9 @@ def make_first_spec(findings: StairsFindings, case: int) -> ProblemSpec:
 
 
 def load_spec(findings: StairsFindings, what: str, case: int) -> ProblemSpec:
-    """Return the problem of a plan: ``plan``, ``jerk``, ``landing`` or ``first``."""
+    """Return the problem of a plan, ``plan``, ``jerk``, ``landing`` or ``first``, or of the ``ideal``."""
+    if what == "ideal":
+        return stairs_runs.make_ideal_spec(findings.effort, case)
     return make_first_spec(findings, case) if what == "first" else make_plan_spec(findings.effort, case, what)
 
 
@@ -112,8 +108,7 @@ def make_planning_computations(findings: StairsFindings) -> Iterator[Computation
     """Yield simulations of the ideal and of both plans."""
     for case in findings.cases:
         for what in CLIMBS:
-            spec = make_ideal_spec(findings.effort, case) if what == "ideal" else load_spec(findings, what, case)
-            x = get_point(findings.best(what, case))
+            spec, x = load_spec(findings, what, case), get_point(findings.best(what, case))
             yield make_computation(f"climb-{what}-{case}", spec, partial(simulate_climb, spec), x=x)
 
 

@@ -11,29 +11,12 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import evaluate
+from compare.papers import paper_runs
 from compare.papers.claims import Series
-from compare.papers.paper_runs import (
-    Effort,
-    Runs,
-    choose_best,
-    get_point,
-    make_computation,
-    make_search_tasks,
-    make_start_tasks,
-)
+from compare.papers.paper_runs import choose_best, get_point, make_computation, make_search_tasks, make_start_tasks
+from compare.papers.stairs import stairs_paper
 from compare.papers.stairs.stairs_instants import Decides
-from compare.papers.stairs.stairs_paper import (
-    ANTS,
-    CHOICES,
-    EVAPORATION,
-    INSTANTS,
-    ITERATIONS,
-    OURS,
-    PLAN_CHOICES,
-    PRINTED,
-    TABLE_3,
-    TABLE_4,
-)
+from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, PLAN_CHOICES, PRINTED, TABLE_3, TABLE_4
 from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
@@ -49,9 +32,9 @@ from nlp_gait.gaits.stairs.track import PLAN
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 ALGORITHMS: Mapping[str, Algorithm] = {
-    "aco": AntColony(population=ANTS, spread=EVAPORATION),
+    "aco": AntColony(population=ANTS, spread=stairs_paper.EVAPORATION),
     "aco-usual": AntColony(population=ANTS),  # with the spread of its authors
-    "aco-grid": AntColonyGrid(population=ANTS, evaporation=EVAPORATION),
+    "aco-grid": AntColonyGrid(population=ANTS, evaporation=stairs_paper.EVAPORATION),
     "pso": ParticleSwarm(),
     "ga": GeneticAlgorithm(),
 }
@@ -70,11 +53,11 @@ UNITS = {"m": 1.0, "cm": 100.0}  # in a metre
 CLOSED_FORM, KINDS = "closed form", ("closed-form", "network")  # in the table of the network; of inverse kinematics
 TORSO_INDEXES = ("energy_J", "zmp_margin_min_m")
 PER_CASE = 4  # see ``make_computations``
-POWERLESS = (OURS, "jerk", PRINTED)  # readings of the tracked step that are tuned without the power, too
+POWERLESS = (stairs_paper.OURS, "jerk", PRINTED)  # readings of the tracked step that are tuned without the power, too
 
 
 @dataclass(frozen=True, kw_only=True)
-class StairsEffort(Effort):
+class StairsEffort(paper_runs.Effort):
     """Effort of the stairs reproduction."""
 
     cases: tuple[int, ...] = tuple(TABLE_4)
@@ -89,7 +72,7 @@ class StairsEffort(Effort):
     instant_evaluations: int = ANTS * ITERATIONS  # of each search of Algorithm 4
     plan_choices: tuple[str, ...] = tuple(PLAN_CHOICES)  # of the planner
     choices: tuple[str, ...] = tuple(CHOICES)  # readings of the tracked step
-    instants: tuple[str, ...] = INSTANTS  # readings of Algorithm 4
+    instants: tuple[str, ...] = stairs_paper.INSTANTS  # readings of Algorithm 4
     plan_settings: Mapping[str, Any] = field(default_factory=dict)  # of IPOPT on plans
     track_ipopt: bool = True  # whether IPOPT runs on the track
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
@@ -192,7 +175,7 @@ class StairsFindings:
     """All results of the reproduction: runs by title of the problem and solver, other results by name."""
 
     effort: StairsEffort
-    runs: Runs
+    runs: paper_runs.Runs
     others: Mapping[str, Any] = field(default_factory=dict)
     motions: dict[tuple[str, int], Any] = field(default_factory=dict)  # of plans, kept by ``move``
 

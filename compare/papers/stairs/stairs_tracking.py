@@ -12,16 +12,10 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.claims import Check, Series, Verdict, compare_readings, decide, require_change, require_feasible
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible, make_computation, make_search_tasks
+from compare.papers.stairs import stairs_runs
 from compare.papers.stairs.stairs_instants import Decides, Instants, track_by_instants
 from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, OURS, PAPER, PRINTED, TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_runs import (
-    ACO,
-    ALGORITHMS,
-    POWERLESS,
-    StairsFindings,
-    make_track_spec,
-    track_without_power,
-)
+from compare.papers.stairs.stairs_runs import ACO, ALGORITHMS, StairsFindings, make_track_spec
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.store import Computation
@@ -71,9 +65,9 @@ def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation
     """Yield in each case gains without the power, and Algorithm 4, which decides gains or torques."""
     effort = findings.effort
     for case in effort.cases:
-        for name in POWERLESS:
+        for name in stairs_runs.POWERLESS:
             spec = make_choice_spec(findings, case, name)
-            function = partial(track_without_power, spec)
+            function = partial(stairs_runs.track_without_power, spec)
             yield make_computation(f"powerless-{name}-{case}", spec, function, evaluations=effort.track_evaluations)
         for name, decides in effort.instant_searches:
             spec, plan = make_choice_spec(findings, case, name), findings.plan(case, CHOICES[name].plan)
@@ -143,7 +137,9 @@ def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
         "gains": {name: findings.collect("printed", name) for name in findings.others[f"printed-{findings.cases[0]}"]},
         "over": {index: _describe_range(findings, index) for index in LEAST_ROWS.values()},
         "instant_ms": _describe_instant_times(findings),
-        "powerless": _describe({name: findings.collect(f"powerless-{name}", "energy_J") for name in POWERLESS}),
+        "powerless": _describe(
+            {name: findings.collect(f"powerless-{name}", "energy_J") for name in stairs_runs.POWERLESS}
+        ),
         "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()})),
     }
 
@@ -275,8 +271,8 @@ def _check_cost_against_energy(_: StairsFindings) -> Check:
 
 
 def _check_power(findings: StairsFindings) -> Check:
-    with_power = [sum(row) for row in _collect(findings, "energy_J", POWERLESS).values()]
-    without = [sum(findings.collect(f"powerless-{name}", "energy_J")) for name in POWERLESS]
+    with_power = [sum(row) for row in _collect(findings, "energy_J", stairs_runs.POWERLESS).values()]
+    without = [sum(findings.collect(f"powerless-{name}", "energy_J")) for name in stairs_runs.POWERLESS]
     return require_change(100 * (np.divide(without, with_power) - 1)[:, None])
 
 

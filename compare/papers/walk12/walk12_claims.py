@@ -18,14 +18,8 @@ from compare.papers.claims import (
     require_change,
 )
 from compare.papers.paper_runs import choose_best, compute_range, get_point, list_objectives
-from compare.papers.walk12.walk12_findings import (
-    Walk12Findings,
-    choose_median,
-    compute_hip_miss,
-    compute_leg_lengths,
-    compute_stable_share,
-    compute_zmp_error,
-)
+from compare.papers.walk12 import walk12_findings
+from compare.papers.walk12.walk12_findings import Walk12Findings, choose_median, compute_hip_miss, compute_stable_share
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, find_row
 from compare.papers.walk12.walk12_runs import GA, GA_VARIANTS, PAPER
 from compare.papers.walk12.walk12_walks import DRIVES, HELD, STEP_TIMES_S, WalkedGait
@@ -266,7 +260,7 @@ def _check_below(findings: Walk12Findings) -> Check:
 
 def _check_accuracy(findings: Walk12Findings, zmp: Zmp) -> Check:
     """Check the largest error of the ZMP over a step [mm], and give that of f1."""
-    errors = [1e3 * compute_zmp_error(row.x, zmp) for row in TABLE_3]
+    errors = [1e3 * walk12_findings.compute_zmp_error(row.x, zmp) for row in TABLE_3]
     values = {"low": min(errors), "high": max(errors), "change": findings.describe_f1_change(zmp, "moment-free")}
     return compare_levels(np.zeros(len(errors)), errors, **values, **CHANGES)
 
@@ -274,7 +268,7 @@ def _check_accuracy(findings: Walk12Findings, zmp: Zmp) -> Check:
 def _check_inverse_kinematics(findings: Walk12Findings) -> Check:
     """Check how far the angles of (2) miss the hip in the printed gaits and the optima [mm]."""
     gaits = [*(row.x for row in TABLE_3), *(tuple(x / 1e3) for x in list_x(findings, IPOPT))]
-    lengths = np.concatenate([compute_leg_lengths(x) for x in gaits])
+    lengths = np.concatenate([walk12_findings.compute_leg_lengths(x) for x in gaits])
     miss = 1e3 * max(compute_hip_miss(float(length)) for length in (lengths.min(), lengths.max()))
     return compare_levels(0.0, miss, miss=miss, shortest=1e3 * lengths.min())
 

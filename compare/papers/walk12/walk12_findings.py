@@ -12,17 +12,9 @@ from typing import get_args
 import numpy as np
 
 from compare.papers.paper_runs import Runs, choose_best, list_objectives
+from compare.papers.walk12 import walk12_runs
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4_DIGITS, PaperRow
-from compare.papers.walk12.walk12_runs import (
-    CORNER_M,
-    PAPER,
-    READINGS,
-    PathPoint,
-    Walk12Effort,
-    compute_f1,
-    find_f1max,
-    title_table_3,
-)
+from compare.papers.walk12.walk12_runs import CORNER_M, PAPER, PathPoint, compute_f1, title_table_3
 from compare.papers.walk12.walk12_walks import WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
@@ -38,7 +30,7 @@ KNEES = ("theta_3", "theta_10")
 class Walk12Findings:
     """All results of the reproduction."""
 
-    effort: Walk12Effort  # what was computed
+    effort: walk12_runs.Walk12Effort  # what was computed
     runs: Runs  # by title of the problem and solver
     weighted: Sequence[PathPoint]  # optima of the weighted sum over lambda
     front: Sequence[PathPoint]  # largest f1 for each step length
@@ -57,7 +49,7 @@ class Walk12Findings:
     @cached_property
     def own_f1max(self) -> float:
         """The model's largest f1 [1/(m^2 s)]."""
-        return find_f1max(self.runs, title_table_3(PAPER, 1.0))
+        return walk12_runs.find_f1max(self.runs, title_table_3(PAPER, 1.0))
 
     @property
     def f1_of_table_3(self) -> Sequence[float]:
@@ -90,7 +82,9 @@ class Walk12Findings:
         """Return the optimal f by a reading of the ZMP at each lambda where it is solved, under the paper's f1max."""
         if zmp == "exact":
             return list_objectives(self.optimum(PAPER, row.weight) for row in TABLE_3)
-        return list_objectives(choose_best(self.runs[f"{zmp}-{weight:g}", IPOPT]) for weight in READINGS[zmp])
+        return list_objectives(
+            choose_best(self.runs[f"{zmp}-{weight:g}", IPOPT]) for weight in walk12_runs.READINGS[zmp]
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

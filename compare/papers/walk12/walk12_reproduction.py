@@ -15,17 +15,11 @@ from compare.judge import DENSE_INTERVALS
 from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.walk12 import walk12_claims, walk12_step_time_claims, walk12_walks
+from compare.papers.walk12 import walk12_claims, walk12_findings, walk12_step_time_claims, walk12_walks
 from compare.papers.walk12 import walk12_runs as runs
 from compare.papers.walk12.walk12_claims import count_upright
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
-from compare.papers.walk12.walk12_findings import (
-    Walk12Findings,
-    choose_median,
-    compute_hip_miss,
-    compute_straightest_knee,
-    list_rounded,
-)
+from compare.papers.walk12.walk12_findings import Walk12Findings, choose_median, compute_hip_miss, list_rounded
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
 from compare.papers.walk12.walk12_step_time_claims import list_f1max
@@ -231,7 +225,9 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "bent_weights": join_words(f"{weight:g}" for weight in weights),
         "unbent": join_words(f"{f:.6f}" for f in list_objectives(unbent)),
         "bent": join_words(f"{findings.optimum(PAPER, weight).verdict.objective:.6f}" for weight in weights),
-        "straightest": min(compute_straightest_knee(get_point(best)) for best in _list_optima(findings, PAPER)),
+        "straightest": min(
+            walk12_findings.compute_straightest_knee(get_point(best)) for best in _list_optima(findings, PAPER)
+        ),
         "printed_step": f"the optima at λ = {', '.join(findings.printed_step)} change by at most {max(shifts):.0e} in f",
         "simpson_claim": max(r.verdict.objective - get_dense(r)["f"] for r in simpson),
         "simpson_f1max": simpson[-1].verdict.objective * F1MAX,
@@ -332,7 +328,7 @@ def _list_second_optima(findings: Walk12Findings, weight: float) -> Rows:
     for run in (best, *([choose_best(other)] if other else [])):
         agreeing = sum(abs(end.verdict.objective - run.verdict.objective) < SAME_OPTIMUM for end in ends)
         x = get_point(run)
-        rows.append([weight, agreeing, run.verdict.objective, *x, compute_straightest_knee(x)])
+        rows.append([weight, agreeing, run.verdict.objective, *x, walk12_findings.compute_straightest_knee(x)])
     return rows
 
 
