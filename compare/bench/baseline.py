@@ -10,19 +10,21 @@ import json
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from compare.study.record import History, RunRecord, Times, Verdict
+from compare.study.definition import select_shared
+from compare.study.record import History, RunRecord, Times, Verdict, decode_record
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
-from nlp_gait.files import replace_file, replace_nan
+from nlp_gait.files import replace_file
 from nlp_gait.gaitbench.definitions import Subset
 from nlp_gait.gaitbench.generated import list_test_seeds, make_id
 
@@ -80,18 +82,15 @@ def make_bench_study(
 
 def pack_records(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> Path:
     """Write the records of one instance, and return the file. Equal records give an equal file."""
-    solvers: dict[str, dict[str, Any]] = {}
-    for record in records:
+    packed = [_shorten(record) for record in records]
+    shared: dict[str, Any] = {}
+    for record in packed:
         if record.problem != instance:
             raise InputError(f"a record of {record.problem!r} does not belong to {instance!r}")
-        shared = {key: value for key, value in record.definition.items() if key != "seed"}
-        # An instance is identified by its probe values: the hash of its mathematics depends on the version of CasADi.
-        shared["problem"] = {key: value for key, value in shared["problem"].items() if key != HASH}
-        entry = solvers.setdefault(record.solver, {"definition": shared, "settings": record.settings, "runs": []})
-        if entry["definition"] != shared:
+        definition = select_shared(record.definition)
+        if shared.setdefault(record.solver, definition) != definition:
             raise InputError(f"runs of {record.solver!r} on {instance!r} differ in their settings")
-        entry["runs"].append(_pack(record))
-    text = json.dumps(replace_nan({"instance": instance, "solvers": solvers}), separators=(",", ":"))
+    text = json.dumps([record.to_json() for record in packed], separators=(",", ":"))
     path = folder / f"{instance}.json.gz"
     make_folder(folder)
     with replace_file(path) as temporary:
@@ -112,58 +111,29 @@ def load_baseline(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, ...]
         raise InputError(
             f"no baseline records of {instance!r} are shipped; available: {', '.join(list_instances(folder))}"
         )
-    solvers = json.loads(gzip.decompress(path.read_bytes()))["solvers"]
-    return tuple(_unpack(instance, solver, entry, run) for solver, entry in solvers.items() for run in entry["runs"])
+    return tuple(map(decode_record, json.loads(gzip.decompress(path.read_bytes()))))
 
 
-def _pack(record: RunRecord) -> dict[str, Any]:
-    """Return a run with the entries of its history at which the best changed, and the last one."""
-    evaluations, objective = [], []
-    last = len(record.history.objective) - 1
-    before: float | None = None
-    for k, (count, value) in enumerate(zip(record.history.evaluations, record.history.objective, strict=True)):
-        if value != before or k == last:
-            evaluations.append(count)
-            objective.append(None if value is None else float(f"{value:.{DIGITS}g}"))
-        before = value
-    return {
-        "run": record.run,
-        "seed": record.seed,
-        "status": record.status,
-        "claimed": record.claimed,
-        "x": [float(f"{value:.{DIGITS}g}") for value in record.x.values()],
-        "claim": [record.claimed_objective, record.claimed_violation],
-        "judged": [record.verdict.objective, record.verdict.violation, record.verdict.feasible],
-        "calls": record.evaluations,
-        "failed": record.failed_evaluations,
-        "iterations": record.iterations,
-        "solve_s": float(f"{record.time_s.solve:.4g}"),
-        "history": [evaluations, objective],
-    }
-
-
-def _unpack(instance: str, solver: str, entry: dict[str, Any], run: dict[str, Any]) -> RunRecord:
-    objective, violation, feasible = run["judged"]
-    evaluations, values = run["history"]
-    return RunRecord(
-        problem=instance,
-        solver=solver,
-        run=run["run"],
-        seed=run["seed"],
-        definition={**entry["definition"], "seed": run["seed"]},
-        settings=entry["settings"],
-        status=run["status"],
-        claimed=run["claimed"],
-        x={str(k): value for k, value in enumerate(run["x"])},
-        claimed_objective=run["claim"][0],
-        claimed_violation=run["claim"][1],
-        verdict=Verdict.make_plain(
-            math.nan if objective is None else objective, math.inf if violation is None else violation, feasible
-        ),
-        evaluations=run["calls"],
-        failed_evaluations=run["failed"],
-        iterations=run["iterations"],
+def _shorten(record: RunRecord) -> RunRecord:
+    """Return a record without what the leaderboard does not read; of its history, the changes of the best and the last entry."""
+    counts, best, verdict = record.history.evaluations, record.history.objective, record.verdict
+    kept = [k for k, value in enumerate(best) if value != (best[k - 1] if k else None) or k == len(best) - 1]
+    # An instance is identified by its probe values: the hash of its mathematics depends on the version of CasADi.
+    problem = {key: value for key, value in record.definition["problem"].items() if key != HASH}
+    return replace(
+        record,
+        definition={**record.definition, "problem": problem},
+        x={name: _round(value) for name, value in record.x.items()},
+        verdict=Verdict.make_plain(verdict.objective, verdict.violation, verdict.feasible),
         active_constraints=(),
-        history=History(evaluations=tuple(evaluations), objective=tuple(values)),
-        time_s=Times.make_unknown(run["solve_s"], (math.nan,) * len(evaluations)),
+        history=History(
+            evaluations=tuple(counts[k] for k in kept),
+            objective=tuple(None if (value := best[k]) is None else _round(value) for k in kept),
+        ),
+        time_s=Times.make_unknown(_round(record.time_s.solve, 4), (math.nan,) * len(kept)),
+        origin=None,
     )
+
+
+def _round(value: float, digits: int = DIGITS) -> float:
+    return float(f"{value:.{digits}g}")

@@ -279,9 +279,16 @@ def read_record(path: Path) -> RunRecord:
         return parse_record(raw)
 
 
+def decode_record(raw: Any) -> RunRecord:
+    """Return a record from ``RunRecord.to_json`` whose definition is not checked; raises ValueError for missing or wrong fields."""
+    record = decode(RunRecord, raw, unread=("schema",))
+    violation = math.inf if math.isnan(record.verdict.violation) else record.verdict.violation
+    return replace(record, verdict=replace(record.verdict, violation=violation))
+
+
 def parse_record(raw: Any) -> RunRecord:
     """Return a record from ``RunRecord.to_json``; raises ValueError for missing, wrong or contradictory fields."""
-    record = decode(RunRecord, raw, unread=("schema",))
+    record = decode_record(raw)
     objective = decode(_Definition, record.definition, "definition").objective
     for text in (objective.name, objective.unit):
         if not text.isprintable() or "$" in text:  # labels of axes, where a dollar begins a formula
@@ -302,8 +309,7 @@ def parse_record(raw: Any) -> RunRecord:
         raise ValueError(f"seed is {record.seed}, but {record.definition['seed']} in the definition")
     if verdict.feasible and not math.isfinite(verdict.objective):
         raise ValueError("a feasible verdict without an objective")
-    violation = math.inf if math.isnan(verdict.violation) else verdict.violation
-    return replace(record, verdict=replace(verdict, violation=violation))
+    return record
 
 
 def check_readable(record: RunRecord) -> None:
