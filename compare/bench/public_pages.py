@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from compare.bench.leaderboard import Leaderboard, rank_solvers
+from compare.bench.leaderboard import rank_solvers
 from compare.bench.page import make_leaderboard_page
 from compare.bench.submission import SUFFIX, verify_submission
 from compare.report.document import Document, Prose, Section
@@ -41,12 +41,11 @@ def write_public_pages(
         progress(path.name)
         try:
             findings, records = verify_submission(path, share=0.0)
+            wrong = "; ".join(finding.sentence for finding in findings if not finding.holds)
         except InputError as error:
-            rejected.append(f"{path.name}: {error}")
-            continue
-        wrong = [finding.sentence for finding in findings if not finding.holds]
+            wrong = str(error)
         if wrong:
-            rejected.append(f"{path.name}: {'; '.join(wrong)}")
+            rejected.append(f"{path.name}: {wrong}")
             continue
         key = (records[0].definition["stop"]["evaluations"], tuple(sorted({r.problem for r in records})))
         for record in records:
@@ -67,24 +66,21 @@ def write_public_pages(
 
 def filter_instances(instances: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
     """Return all instances, and those of each family and of few or many variables where that is a part of them."""
-    sizes = {id: len(gaitbench.load(id).names) for id in instances}
-    family = {
-        id: parse_id(id)[0].name if is_generated(id) else gaitbench.load(id).definition.problem for id in instances
-    }
     parts = {"all instances": tuple(instances)}
-    parts |= {f"family {name}": tuple(id for id in instances if family[id] == name) for name in family.values()}
-    parts[f"up to {FEW_VARIABLES} variables"] = tuple(id for id in instances if sizes[id] <= FEW_VARIABLES)
-    parts[f"more than {FEW_VARIABLES} variables"] = tuple(id for id in instances if sizes[id] > FEW_VARIABLES)
-    return {
-        name: part for name, part in parts.items() if part and (name == "all instances" or len(part) < len(instances))
-    }
+    for id in instances:
+        instance = gaitbench.load(id)
+        family = parse_id(id)[0].name if is_generated(id) else instance.definition.problem
+        size = "up to" if len(instance.names) <= FEW_VARIABLES else "more than"
+        for name in (f"family {family}", f"{size} {FEW_VARIABLES} variables"):
+            parts[name] = (*parts.get(name, ()), id)
+    return {name: part for name, part in parts.items() if name == "all instances" or len(part) < len(instances)}
 
 
 def _write_board(
     out: Path, name: str, instances: Sequence[str], evaluations: int, records: Sequence[RunRecord]
 ) -> tuple[list[Path], str]:
     """Write a ranking and the page of each of its algorithms; also return its line of the index."""
-    board: Leaderboard = rank_solvers(instances, records, shipped=False)
+    board = rank_solvers(instances, records, shipped=False)
     runs = max(record.run for record in records) + 1
     place = out / _make_folder_name(f"{evaluations}-{name}-{hash_json(list(instances))[:8]}")
     make_folder(place)

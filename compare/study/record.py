@@ -280,7 +280,7 @@ def read_record(path: Path) -> RunRecord:
 
 
 def decode_record(raw: Any) -> RunRecord:
-    """Return a record from ``RunRecord.to_json`` whose definition is not checked; raises ValueError for missing or wrong fields."""
+    """Return a record from ``RunRecord.to_json`` without checking its definition; raises ValueError for wrong fields."""
     record = decode(RunRecord, raw, unread=("schema",))
     violation = math.inf if math.isnan(record.verdict.violation) else record.verdict.violation
     return replace(record, verdict=replace(record.verdict, violation=violation))
