@@ -14,15 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from compare.analysis.record_statistics import a12, rank_sum_normal
-from compare.papers.claims import (
-    Check,
-    Verdict,
-    compare_changes,
-    compare_levels,
-    decide,
-    require_change,
-    require_significance,
-)
+from compare.papers import claims
+from compare.papers.claims import Check, Verdict, compare_changes, decide, require_change, require_significance
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
@@ -81,7 +74,7 @@ def _check_statistic(phase: PhaseFindings) -> Check:
     z = (printed.rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(variance)
     p = math.erfc(abs(z) / math.sqrt(2))
     both = [printed.z, printed.p_two_sided, printed.p_less]
-    return compare_levels(both, [z, p, p / 2], test=printed, z=z, p_both=p, p_less=p / 2)
+    return claims.compare_levels(both, [z, p, p / 2], test=printed, z=z, p_both=p, p_less=p / 2)
 
 
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:

@@ -9,16 +9,8 @@ from typing import Any
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.claims import (
-    Check,
-    Series,
-    Verdict,
-    compare_levels,
-    compare_readings,
-    decide,
-    require_change,
-    require_feasible,
-)
+from compare.papers import claims
+from compare.papers.claims import Check, Series, Verdict, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible
 from compare.papers.stairs import stairs_planning, stairs_runs
 from compare.papers.stairs.stairs_effects import measure_depth, measure_zmp_gap
@@ -97,7 +89,7 @@ LEAST_POSES = 100  # of the network, for a verdict on its times
 
 def _require_plans(findings: StairsFindings, check: Check, *plans: str, dense: bool = False) -> Check:
     runs = (findings.best(what, case) for what in plans for case in findings.cases)
-    return require_feasible(check, list_infeasible(runs, dense=dense))
+    return claims.require_feasible(check, list_infeasible(runs, dense=dense))
 
 
 def _describe_times(findings: StairsFindings, time: str) -> str:
@@ -143,7 +135,7 @@ def _check_hip_height(findings: StairsFindings) -> Check:
 def _check_peaks(findings: StairsFindings, quantity: str) -> Check:
     printed = [float(getattr(TABLE_4[case], quantity)) for case in findings.cases]
     ours = [*_measure_peaks(findings, quantity, "jerk").values()]
-    return _require_plans(findings, compare_readings(printed, ours), "jerk")
+    return _require_plans(findings, claims.compare_readings(printed, ours), "jerk")
 
 
 def _check_least_peak(findings: StairsFindings, quantity: str) -> Check:
@@ -161,7 +153,7 @@ def _check_jerk_changes(findings: StairsFindings) -> Check:
     printed = np.array([row.jerk for row in TABLE_4.values()])
     theirs, changes = (100 * (row[..., 1:] / row[..., :-1] - 1) for row in (printed, peaks))
     texts = ", ".join(f"{Series(row):+.0f}" for row in changes)
-    return _require_plans(findings, compare_readings(theirs, changes, changes=texts), "jerk")
+    return _require_plans(findings, claims.compare_readings(theirs, changes, changes=texts), "jerk")
 
 
 def _describe_hips(findings: StairsFindings) -> dict[str, str | Series]:

@@ -8,15 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from compare.papers.claims import (
-    Check,
-    Verdict,
-    compare_changes,
-    compare_levels,
-    compare_readings,
-    decide,
-    require_change,
-)
+from compare.papers import claims
+from compare.papers.claims import Check, Verdict, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, compute_range, get_point, list_objectives
 from compare.papers.walk12 import walk12_findings
 from compare.papers.walk12.walk12_findings import Walk12Findings, choose_median, compute_hip_miss, compute_stable_share
@@ -193,12 +186,12 @@ def _check_speed(_: Walk12Findings, weight: float, printed_m_s: float, share: fl
     ours = [share * s / time for time in times_s]
     texts = {"ours": " or ".join(f"{v:.4f}" for v in ours), "times": " or ".join(f"{t:g}" for t in times_s)}
     off = 100 * (ours[0] / printed_m_s - 1)
-    return compare_readings([printed_m_s], [[v] for v in ours], s=s, implied=s / printed_m_s, off=off, **texts)
+    return claims.compare_readings([printed_m_s], [[v] for v in ours], s=s, implied=s / printed_m_s, off=off, **texts)
 
 
 def _check_faster(findings: Walk12Findings) -> Check:
     table, optima = 1e3 * (find_row(0.1).x[0] - find_row(0.15).x[0]), list_x(findings, IPOPT)[:, 0]
-    return compare_changes(128.0 - 125.0, table, optima=optima[0] - optima[1], table=table)
+    return claims.compare_changes(128.0 - 125.0, table, optima=optima[0] - optima[1], table=table)
 
 
 def _check_epochs(findings: Walk12Findings) -> Check:

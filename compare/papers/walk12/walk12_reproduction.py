@@ -157,11 +157,6 @@ def _compute_tradeoff(findings: Walk12Findings) -> dict[str, Any]:
 
 def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
     (corner,) = findings.runs["corner", IPOPT]
-    gaps: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {}
-    for horizon in HORIZONS:
-        gap = [_compute_gap(row, horizon) for row in TABLE_4]
-        least = [min(_compute_gap(rounded, horizon) for rounded in list_rounded(row)) for row in TABLE_4]
-        gaps[horizon] = compute_range(gap), compute_range(least)
     return {
         "f1_change": {zmp: findings.describe_f1_change(zmp) for zmp in get_args(Zmp)},
         "read": {zmp: _describe_reading(findings, zmp) for zmp in runs.READINGS},
@@ -177,8 +172,11 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
             f"{findings.stable[k].first_s:.2f} to {findings.stable[k].last_s:.2f} s at λ = {TABLE_3[k].weight:g}"
             for k in (0, 1, -1)
         ),
-        "gap": {horizon: gap for horizon, (gap, _) in gaps.items()},
-        "least_gap": {horizon: least for horizon, (_, least) in gaps.items()},
+        "gap": {h: compute_range(_compute_gap(row, h) for row in TABLE_4) for h in HORIZONS},
+        "least_gap": {
+            h: compute_range(min(_compute_gap(near, h) for near in list_rounded(row)) for row in TABLE_4)
+            for h in HORIZONS
+        },
         "f1max_by_T": join_words(f"{value:.0f}" for value in list_f1max(findings, "step")),
     }
 
