@@ -10,7 +10,7 @@ from compare.archive.verify import Finding, Verification, verify_archive
 from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
 from nlp_gait.errors import InputError
-from nlp_gait.gaitbench.generated import TEST_SEEDS, is_generated, is_test_seed, parse_id
+from nlp_gait.gaitbench.generated import find_test_day, is_generated, parse_id
 from nlp_gait.progress import Progress, ignore_progress
 
 SUFFIX = ".zip"
@@ -63,8 +63,8 @@ def check_rules(records: Sequence[RunRecord]) -> list[Finding]:
         and len({len(s) for s in seeds.values()}) == 1
     )
     enough = min(len(own) for own in seeds.values()) >= LEAST_RUNS
-    drawn = [parse_id(r.problem)[1].seed for r in records if is_generated(r.problem)]
-    days = {seed // TEST_SEEDS if is_test_seed(seed) else None for seed in drawn}
+    drawn = {parse_id(r.problem)[1].seed for r in records if is_generated(r.problem)}
+    days = set(map(find_test_day, drawn))
     return [
         Finding("seeds of runs", equal and enough, f"at least {LEAST_RUNS} runs, 0, 1, ..., as many on each instance"),
         Finding("budget", len(budgets) == 1, f"evaluations of a run: {', '.join(map(str, budgets))}"),

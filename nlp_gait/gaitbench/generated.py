@@ -125,9 +125,9 @@ def list_test_seeds(day: date, count: int) -> tuple[int, ...]:
     return tuple(int(f"{day:%Y%m%d}") * TEST_SEEDS + k for k in range(count))
 
 
-def is_test_seed(seed: int) -> bool:
-    """Return whether a seed belongs to a date; smaller ones are for training and tuning."""
-    return seed >= LEAST_TEST_SEED
+def find_test_day(seed: int) -> int | None:
+    """Return the day of a test seed as YYYYMMDD; None for smaller ones, which are for training and tuning."""
+    return seed // TEST_SEEDS if seed >= LEAST_TEST_SEED else None
 
 
 def is_generated(id: str) -> bool:

@@ -22,7 +22,7 @@ from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.settings import Session, SolverSpec, write_manifest
 from nlp_gait.errors import InputError
-from nlp_gait.gaitbench.generated import is_test_seed
+from nlp_gait.gaitbench.generated import find_test_day
 
 ID = "walk12-w015"
 EDITS = 12
@@ -104,7 +104,7 @@ def test_rules(tmp_path: Path) -> None:
         pack_submission(tmp_path, tmp_path / "x.zip")
     assert [f.what for f in check_rules(records[1:]) if not f.holds] == ["seeds of runs", "instances"]
     assert not check_rules([])[0].holds
-    assert all(map(is_test_seed, parse_seeds("test:3")))
+    assert all(map(find_test_day, parse_seeds("test:3")))
 
 
 def test_pages_rank_what_holds_and_name_what_does_not(submission: Path, tmp_path: Path) -> None:
