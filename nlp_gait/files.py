@@ -108,7 +108,9 @@ def check_plain(data: Any) -> None:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a text file atomically and return its path; raises OutputError (no space, no permission, no folder)."""
-    return write_bytes(path, text.encode("utf-8"))
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
 
 
 def write_bytes(path: Path, content: bytes) -> Path:
