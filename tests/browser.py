@@ -1,8 +1,9 @@
-"""A real browser for tests: Chromium, driven by Playwright; tests that need it are skipped where there is none."""
+"""A real browser for tests: Chromium, driven by Playwright; tests that need it are skipped where no browser is installed."""
 
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -58,6 +59,15 @@ def visit(browser: Any, file: Path, screen: str = "1280 light") -> Iterator[Visi
     opened.requests = [url for url in opened.requests if url != file.as_uri() and not url.startswith("data:")]
     yield opened
     context.close()
+
+
+def wait_for_motion(page: Any) -> None:
+    """Wait until the first drawing of a gait has moved by 20 ms; polled from here, as pages forbid `eval`."""
+    deadline = time.monotonic() + 30
+    while not page.evaluate("() => Number(document.querySelector('canvas')?.dataset.time) > 20"):
+        if time.monotonic() > deadline:
+            pytest.fail("no gait moved within 30 s")
+        time.sleep(0.02)
 
 
 def list_wide_parts(page: Any) -> list[str]:

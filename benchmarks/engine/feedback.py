@@ -10,7 +10,8 @@ from benchmarks.engine.agreement import STEPS
 from benchmarks.engine.gaits import optimal_cycles
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import SPEED
-from nlp_gait.simulation.drive import Drive, Feedback
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.measurements import Walk, measure_walk
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan

@@ -153,7 +153,7 @@ def cite(name: str | None = None, as_json: bool = False) -> None:
 
     Examples: `nlp-gait cite`, `nlp-gait cite nao-ssp`, `nlp-gait cite ssp-v5`
     """
-    from compare.study.description import find_citations
+    from compare.study.citations import find_citations
 
     found = find_citations(name)
     if as_json:

@@ -41,7 +41,8 @@ class DriveOptions:
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import DRIVES, FEEDBACKS
+        from nlp_gait.simulation.drive import DRIVES
+        from nlp_gait.simulation.feedback import FEEDBACKS
 
         for kind, name, known in (("drive", self.drive, DRIVES), ("feedback", self.feedback, FEEDBACKS)):
             if name not in known:

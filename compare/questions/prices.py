@@ -71,7 +71,7 @@ class Price:
         return abs(self.resolved - self.slope) / max(abs(self.slope), abs(self.resolved))
 
     def find_largest_move(self, ranges: Mapping[str, float]) -> tuple[str, float] | None:
-        """Return the variable that moves most in units of its range, and its move over a natural step; None if there is none."""
+        """Return the variable that moves most in units of its range, and its move over a natural step; None if none moves."""
         moves = self.x or {}
         name = max(moves, key=lambda variable: abs(moves[variable]) / ranges[variable], default="")
         constant = not name or abs(moves[name] * self.step) < CONSTANT * ranges[name]

@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg, save
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, text_table
-from compare.study.description import cite_problems
+from compare.study.citations import cite_problems
 from compare.study.settings import Session
 from nlp_gait.files import format_csv, write_text
 

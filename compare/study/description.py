@@ -1,26 +1,17 @@
-"""Settings of a solver from its docstring; and what to cite: the software, the suite, papers (entries in ``citations.toml``)."""
+"""Settings of a solver with defaults, meaning and source, from its docstring."""
 
 from __future__ import annotations
 
 import inspect
 import re
-import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
-from importlib.resources import files
 from typing import Any
 
 from compare.study.task import list_solvers
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, FRONT_ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
-from nlp_gait.decoding import decode
-from nlp_gait.errors import unknown
-from nlp_gait.formulation.registry import find_maker
-from nlp_gait.gaitbench.definitions import BY_ID
-from nlp_gait.providers import PROBLEMS
-from nlp_gait.user_code import is_user_code
 
 SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
 ENTRY = re.compile(r"^(\w+): (.*)$")
@@ -91,52 +82,3 @@ def _entries(text: str) -> Iterator[tuple[str, str]]:
         found = ENTRY.match(" ".join(block.split()))
         if found:
             yield found[1], found[2].rstrip(".").replace("``", "`")
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Entry:
-    bibtex: str
-    cited_as: str = ""  # text by which a ``Source:`` names it
-    also: tuple[str, ...] = ()  # further names
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Entries:
-    software: _Entry
-    papers: Mapping[str, _Entry]
-    suite: _Entry
-
-
-def find_citations(name: str | None = None) -> list[str]:
-    """Return BibTeX of the software and of what a problem, paper or instance of the suite comes from; all without a name.
-
-    Raises:
-        UnknownNameError: there is no problem, paper or instance of that name.
-        UserCodeError: a user-defined problem cannot be loaded.
-    """
-    text = (files("compare.study") / "citations.toml").read_text(encoding="utf-8")
-    known = decode(_Entries, tomllib.loads(text.replace("VERSION", version("nlp-gait"))))
-    papers = {n: paper for own, paper in known.papers.items() for n in (own, *paper.also)}
-    sources = [*known.papers.values(), known.suite]
-    if name in papers:
-        sources = [papers[name]]
-    elif name is not None:
-        source = _find_source(name, {*PROBLEMS, *papers, *BY_ID})
-        sources = [entry for entry in sources if entry.cited_as in source]
-    return [entry.bibtex.strip() for entry in (known.software, *sources)]
-
-
-def _find_source(name: str, known: set[str]) -> str:
-    if name in BY_ID:
-        return f"GaitBench: {BY_ID[name].source}"
-    if name not in PROBLEMS and not is_user_code(name, "problem"):
-        raise unknown("problem, paper or instance", name, known)
-    return dict(split_sections(find_maker(name).__doc__ or "")).get("Source", "")
-
-
-def cite_problems(problems: Iterable[Mapping[str, Any]]) -> str:
-    """Return BibTeX of the software and the sources of problems as records describe them; user code is not loaded."""
-    named = [(problem["name"], problem["options"].get("instance")) for problem in problems]
-    names = dict.fromkeys(instance if instance in BY_ID else name for name, instance in named)
-    found = [find_citations(name) for name in names if name in BY_ID or name in PROBLEMS]
-    return "\n\n".join(dict.fromkeys(entry for entries in found or [find_citations()[:1]] for entry in entries))

@@ -239,7 +239,7 @@ def write_manifest(folder: Path, settings: StudySettings, session: Session) -> N
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return the manifest of a folder, empty if there is none; raises InputError if it is damaged or of another schema."""
+    """Return the manifest of a folder, empty where none is stored; raises InputError if it is damaged or of another schema."""
     path = folder / FILE
     if not os.path.lexists(path):
         return Manifest(settings=None, sessions=())

@@ -15,7 +15,7 @@ from compare.papers.claims import Claim, Difference, make_claims_table, make_dif
 from compare.papers.reproduction import count_verdicts
 from compare.report.document import Table
 from compare.report.provenance import format_settings
-from compare.study.description import find_citations
+from compare.study.citations import find_citations
 from docs.pages.markdown import literal, page, table, write_all
 
 RECORDS = Path(__file__).parents[1] / "papers"

@@ -15,9 +15,10 @@ from typing import Any, Literal, NamedTuple, TypeVar
 from nlp_gait.decoding import decode, decode_value, read_dataclass
 from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
-from nlp_gait.robots.inference import EXTENTS, SIDES, FindFault, Side, find_legs, infer_feet, repair_links, weld_faults
+from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
 from nlp_gait.robots.mjcf import list_dependencies, mjcf_points, mjcf_record
 from nlp_gait.robots.perturbation import perturb, split_name
+from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_name
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
 from nlp_gait.robots.urdf import collision_points, find_moving_link, list_meshes, urdf_record

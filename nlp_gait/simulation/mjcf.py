@@ -14,7 +14,8 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.plan import Plan, Prism, Shape
+from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.shapes import Prism, Shape
 
 # Compared with 0.1 ms, power is 1 % higher in single support; in double support it is 12 % higher with set-points held for 40 ms
 # and equal with smooth ones. At 1 ms the light feet chatter.

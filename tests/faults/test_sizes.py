@@ -15,7 +15,8 @@ from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.registry import LARGEST_COUNT
 from nlp_gait.formulation.result import LONGEST_S, SHORTEST_S, load_result, sample_signals
-from nlp_gait.simulation.drive import Drive, Feedback
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
 from nlp_gait.simulation.load_sharing import Sharing
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from metaheuristics.errors import SearchError
+from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Result
 from metaheuristics.minimize import minimize
-from metaheuristics.user_algorithm import ExternalProgram
 from nlp_gait.backends.kernel.compiler import find_compiler
 
 CALLERS = Path(__file__).parents[2] / "examples" / "callers"

@@ -22,17 +22,13 @@ from nlp_gait.symbolic.kinematics import forward_kinematics
 
 pytest.importorskip("mujoco")
 
-from nlp_gait.simulation.drive import (  # noqa: E402
-    Balance,
-    Drive,  # noqa: E402
-    Feedback,
-    compute_load_shares,
-)
+from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import load_mujoco  # noqa: E402
+from nlp_gait.simulation.feedback import Balance, Feedback, compute_load_shares  # noqa: E402
 from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
 from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import (  # noqa: E402
-    Conditions,  # noqa: E402
+    Conditions,
     Simulation,
     prepare,
     simulate_plan,

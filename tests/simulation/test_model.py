@@ -14,7 +14,7 @@ from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.mjcf import make_model
-from nlp_gait.simulation.plan import Prism, make_shapes
+from nlp_gait.simulation.shapes import Prism, make_shapes
 from nlp_gait.simulation.simulate import Conditions
 
 HEAD_JOINTS = ("HeadYaw", "HeadPitch")

@@ -16,7 +16,8 @@ from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
-from nlp_gait.simulation.plan import Prism, make_plan
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.shapes import Prism
 
 pytest.importorskip("mujoco")
 

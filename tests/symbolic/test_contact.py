@@ -9,20 +9,17 @@ from casadi import SX
 
 from nlp_gait.gaits.stairs.planar_biped import LINKS, centres, points
 from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.symbolic.dynamics import equations_of_motion
-from nlp_gait.symbolic.quantised import (
+from nlp_gait.symbolic.contact import (
     CREEP_SPEED,
     YIELD_DEPTH,
     Contact,
-    Controller,
     Equations,
     Ground,
-    QuantisedState,
-    advance,
     implicit_equations,
-    implicit_quantum,
     solve_definite,
 )
+from nlp_gait.symbolic.dynamics import equations_of_motion
+from nlp_gait.symbolic.quantised import Controller, QuantisedState, advance, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81
 STIFFNESS, DAMPING, FRICTION = 5e4, 500.0, 0.6

@@ -12,8 +12,9 @@ from casadi import MX, SX, fmax
 from nlp_gait.formulation import InstantPoint, Parameter, Signals, Variable
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
-from nlp_gait.gaits.biped.goals import HEAT_LOSS, Motors
+from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Limit, Margins
+from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import make_skeleton
 from nlp_gait.robots import Robot

@@ -14,8 +14,9 @@ from casadi import DM, MX, SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName
-from nlp_gait.gaits.biped.goals import HEAT_LOSS, Motors
+from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
+from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.single_support import make_nearest_edge_margins
 from nlp_gait.robots import load_robot

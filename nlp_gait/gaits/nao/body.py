@@ -14,8 +14,8 @@ from nlp_gait.formulation import InstantPoint, Point, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped import skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
-from nlp_gait.gaits.biped.goals import Motors
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao.joints import (
     ARM_JOINTS,

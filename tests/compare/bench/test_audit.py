@@ -47,7 +47,7 @@ class Planted:
         inner, ask = self.base.start(start), [0]
         proposed = inner.ask
 
-        def biased() -> np.ndarray:
+        def propose_biased() -> np.ndarray:
             ask[0] += 1
             X = proposed()
             chosen = start.rng.random(X.shape) < (self.share if ask[0] > 1 else 0.0)
@@ -57,7 +57,7 @@ class Planted:
             )
             return np.where(chosen, place, X)
 
-        inner.ask = biased  # type: ignore[method-assign]
+        inner.ask = propose_biased  # type: ignore[method-assign]
         return inner
 
 

@@ -15,7 +15,15 @@ from compare.report import write_report
 from compare.report.gait_page import animate_gait
 from compare.study.record import RunRecord
 from compare.study.settings import Manifest
-from tests.browser import SCREENS, Visit, list_accessibility_faults, list_wide_parts, start_browser, visit
+from tests.browser import (
+    SCREENS,
+    Visit,
+    list_accessibility_faults,
+    list_wide_parts,
+    start_browser,
+    visit,
+    wait_for_motion,
+)
 from tests.compare.records import DSP_X, record, study
 
 pytestmark = pytest.mark.slow
@@ -48,7 +56,7 @@ def report(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Path:
 
 
 @pytest.fixture
-def opened(browser: Any, report: Path) -> Iterator[Visit]:
+def open_report(browser: Any, report: Path) -> Iterator[Visit]:
     with visit(browser, report) as found:
         yield found
 
@@ -64,15 +72,15 @@ def test_the_page_fits_is_silent_and_accessible(browser: Any, report: Path, scre
         assert (opened.messages, opened.requests) == ([], [])
 
 
-def test_the_pointer_reads_values(opened: Visit) -> None:
+def test_the_pointer_reads_values(open_report: Visit) -> None:
     """The final value of swarm's first run: 10.05 W, 0.5 % above the best known."""
-    circle = opened.page.locator(f"{FINAL} .chart circle[data-series=swarm]").first
+    circle = open_report.page.locator(f"{FINAL} .chart circle[data-series=swarm]").first
     circle.hover(force=True)
-    assert opened.page.locator(f"{FINAL} .note").inner_text() == "swarm, run 0: 0.5 %, power [W] 10.05"
+    assert open_report.page.locator(f"{FINAL} .note").inner_text() == "swarm, run 0: 0.5 %, power [W] 10.05"
 
 
-def test_one_choice_of_solvers_for_all_charts(opened: Visit) -> None:
-    page = opened.page
+def test_one_choice_of_solvers_for_all_charts(open_report: Visit) -> None:
+    page = open_report.page
     charts = (CONVERGENCE, FINAL, RUNTIME)
     assert all(page.locator(f"{chart} .chart [data-series=swarm]").count() for chart in charts)
     page.click("[data-solver=swarm]")
@@ -82,9 +90,9 @@ def test_one_choice_of_solvers_for_all_charts(opened: Visit) -> None:
     assert page.locator(f"{RUNTIME} .chart [data-series=swarm]").count()
 
 
-def test_target_and_budget_are_chosen(opened: Visit) -> None:
+def test_target_and_budget_are_chosen(open_report: Visit) -> None:
     """A hand-made study: of swarm's four runs, two are at 1 % or better (10.1 W) after 400 of 500 evaluations."""
-    page = opened.page
+    page = open_report.page
 
     def last_share() -> str:
         """Read the last point of swarm by keyboard."""
@@ -104,8 +112,8 @@ def test_target_and_budget_are_chosen(opened: Visit) -> None:
     assert page.locator(f"{FINAL} .chart circle[data-series=swarm]").count() == 3  # run 0 had nothing after 100
 
 
-def test_zoom_by_dragging_and_by_keyboard(opened: Visit) -> None:
-    page = opened.page
+def test_zoom_by_dragging_and_by_keyboard(open_report: Visit) -> None:
+    page = open_report.page
     chart = page.locator(f"{CONVERGENCE} .chart svg").first
     chart.scroll_into_view_if_needed()
     before = chart.inner_html()
@@ -121,11 +129,11 @@ def test_zoom_by_dragging_and_by_keyboard(opened: Visit) -> None:
     assert re.sub("clip-[0-9]+", "", chart.inner_html()) == re.sub("clip-[0-9]+", "", before)
 
 
-def test_gaits_move_pause_and_turn(opened: Visit) -> None:
-    page = opened.page
+def test_gaits_move_pause_and_turn(open_report: Visit) -> None:
+    page = open_report.page
     canvas = page.locator(f"{GAITS} canvas")
     canvas.scroll_into_view_if_needed()
-    page.wait_for_function("Number(document.querySelector('canvas').dataset.time) > 20")
+    wait_for_motion(page)
     page.click(f"{GAITS} .play")
     picture = "document.querySelector('canvas').toDataURL()"
     still = page.evaluate(picture)
@@ -138,8 +146,8 @@ def test_gaits_move_pause_and_turn(opened: Visit) -> None:
     assert page.locator(f"{GAITS} .controls output").inner_text() == "0.20 s"  # of 0.4 s
 
 
-def test_a_figure_is_enlarged_and_closed(opened: Visit) -> None:
-    page = opened.page
+def test_a_figure_is_enlarged_and_closed(open_report: Visit) -> None:
+    page = open_report.page
     page.click(f"{CONVERGENCE} .enlarge")
     assert page.locator(CONVERGENCE).bounding_box()["width"] >= 1200
     page.keyboard.press("Escape")
@@ -191,9 +199,8 @@ def test_a_solution_is_a_page_of_its_own_and_a_frame_in_notebooks(browser: Any, 
     shown = animate_gait(nlp_gait.load("nao-dsp"), DSP_X, "paper")
     (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><main>{shown._repr_html_()}</main>", encoding="utf-8")
     shown.write(tmp_path / "gait.html")
-    moved = "Number(document.querySelector('canvas').dataset.time) > 20"
     with visit(browser, tmp_path / "gait.html") as opened:
-        opened.page.wait_for_function(moved)
+        wait_for_motion(opened.page)
         assert (opened.messages, opened.requests) == ([], [])
     with visit(browser, tmp_path / "notebook.html") as opened:
-        opened.page.frames[1].wait_for_function(moved)
+        wait_for_motion(opened.page.frames[1])

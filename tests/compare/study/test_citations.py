@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from compare.study.description import cite_problems, find_citations
+from compare.study.citations import cite_problems, find_citations
 from nlp_gait.gaitbench.definitions import DEFINITIONS
 from nlp_gait.providers import PROBLEMS
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence

@@ -13,8 +13,8 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, Constraint
-from nlp_gait.gaits.biped.goals import SUPPLY, Motors
 from nlp_gait.gaits.biped.limits import Limit
+from nlp_gait.gaits.biped.motors import SUPPLY, Motors
 from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.gaits.nao.body import ANKLE_ROLL, parse_nao_motors
 from nlp_gait.gaits.nao.joints import JOINTS, YAW_PITCHES

@@ -1,0 +1,197 @@
+"""A program in any language as an algorithm: it proposes points and receives their values as lines of JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import subprocess
+import tempfile
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from time import monotonic
+from typing import IO, Any
+
+import numpy as np
+
+from metaheuristics.array import Array, real_array
+from metaheuristics.errors import SearchError, abbreviate
+from metaheuristics.interface import CallingSearch, Ended, Evaluate, Start
+from metaheuristics.preparation import check_points
+from metaheuristics.settings import check_number
+from metaheuristics.user_algorithm import combine
+
+LONGEST_LINE = 2**26  # bytes
+LONGEST_REASON = 300  # characters of a program's last message
+END_WITHIN_S = 2.0  # after the line that ends the run
+CHECKED_EVERY_S = 0.1
+MOST_WAITING = 2  # lines that a program may be ahead
+ROUNDING = 1e-9  # share of a range by which printed digits may miss a bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExternalProgram:
+    """A program that exchanges lines of JSON on its standard input and output.
+
+    It first receives `{"names", "lower", "upper", "evaluations", "seed", "settings"}`. Then it sends `{"x": [[...], ...]}`, one
+    point or many, and receives `{"f": [...], "violation": [...], "cost": [...]}`, again and again, until it receives
+    `{"stop": true}`, sends `{"stop": "its reason"}` or ends with status 0. `cost` combines f and violation, see `PlainFunction`.
+    A value of a failed evaluation is null.
+
+    Attributes:
+        command: program and arguments.
+        name: in reports.
+        settings: sent to the program.
+        population: 1, as a program has no first generation.
+        answer_s: longest time between two of its lines [s]; then it is killed.
+    """
+
+    command: tuple[str, ...]
+    name: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    population: int = 1
+    answer_s: float = 600.0
+
+    def __post_init__(self) -> None:
+        check_number(self, "answer_s", above=0.0)
+
+    def start(self, start: Start) -> ProgramSearch:
+        """Begin a run; see `Algorithm.start`."""
+        return ProgramSearch(self, start)
+
+
+class ProgramSearch(CallingSearch):
+    """A run of `ExternalProgram`."""
+
+    def __init__(self, settings: ExternalProgram, start: Start) -> None:
+        self._settings, self._start = settings, start
+        self._lines: queue.Queue[bytes | None] = queue.Queue(maxsize=MOST_WAITING)
+
+    def run(self, evaluate: Evaluate) -> str:
+        """Answer the program until it ends or `evaluate` raises `Ended`; return the reason for ending.
+
+        Raises:
+            SearchError: it cannot be started, ends with another status than 0, is silent for too long, or sends a line that is
+                no proposal.
+        """
+        start, settings = self._start, self._settings
+        with tempfile.TemporaryFile() as messages:
+            try:
+                program = subprocess.Popen(
+                    settings.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=messages
+                )
+            except OSError as error:
+                raise SearchError(f"{settings.command[0]!r} cannot be started: {error.strerror or error}") from error
+            reader = threading.Thread(target=self._forward, args=(program.stdout,), daemon=True)
+            reader.start()
+            try:
+                self._send(
+                    program,
+                    names=list(start.names),
+                    lower=start.lower.tolist(),
+                    upper=start.upper.tolist(),
+                    evaluations=start.evaluations,
+                    seed=int(start.rng.integers(2**31)),
+                    settings=dict(settings.settings),
+                )
+                while (line := self._read(program)) is not None:
+                    proposal = self._parse(line)
+                    if "stop" in proposal:
+                        return f"the program stopped: {abbreviate(proposal['stop'])}"
+                    f, violation, rule = evaluate(self._read_points(proposal))
+                    values = {"f": f, "violation": violation, "cost": combine(f, violation, rule)}
+                    self._send(program, **{name: _to_list(array) for name, array in values.items()})
+                self._check_ending(program, messages)
+                return "the program ended"
+            except Ended:
+                self._send(program, stop=True)
+                raise
+            finally:
+                self._end(program, reader)
+
+    def _forward(self, output: IO[bytes]) -> None:
+        """Put the program's lines into the queue, and None after the last one."""
+        with output:
+            while line := output.readline(LONGEST_LINE):
+                self._lines.put(line)
+        self._lines.put(None)
+
+    def _send(self, program: subprocess.Popen[bytes], **values: Any) -> None:
+        assert program.stdin is not None
+        with suppress(OSError):  # it does not listen any more; reading says how it ended
+            program.stdin.write(json.dumps(values).encode() + b"\n")
+            program.stdin.flush()
+
+    def _read(self, program: subprocess.Popen[bytes]) -> bytes | None:
+        """Return the program's next line, or None after the last one."""
+        latest = monotonic() + self._settings.answer_s
+        while True:
+            ended = program.poll() is not None
+            if ended:  # what it has started may hold its output for ever
+                latest = min(latest, monotonic() + END_WITHIN_S)
+            try:
+                line = self._lines.get(timeout=CHECKED_EVERY_S)
+            except queue.Empty:
+                if monotonic() <= latest:
+                    continue
+                if ended:
+                    return None
+                raise SearchError(f"the program sent nothing for {self._settings.answer_s:g} s") from None
+            if line is not None and len(line) == LONGEST_LINE:
+                raise SearchError(f"the program sent a line of {LONGEST_LINE} bytes or more")
+            return line
+
+    def _parse(self, line: bytes) -> dict[str, Any]:
+        try:
+            proposal = json.loads(line)
+        except (ValueError, RecursionError):
+            proposal = None
+        if not isinstance(proposal, dict) or not proposal.keys() & {"x", "stop"}:
+            shown = line[:LONGEST_REASON].decode("utf-8", "replace").strip()
+            raise SearchError(
+                f'the program sent {abbreviate(shown)}, which is neither {{"x": [[...], ...]}} nor {{"stop": "reason"}}'
+            )
+        return proposal
+
+    def _read_points(self, proposal: dict[str, Any]) -> Array:
+        """Return the points (P, n) of a proposal; digits may be rounded beyond a bound."""
+        lower, upper = self._start.lower, self._start.upper
+        try:
+            points = np.array(real_array(proposal["x"]), ndmin=2)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise SearchError(f'"x" must be points of {len(lower)} numbers: {error}') from error
+        if points.ndim == 2 and points.shape[1] == len(lower):
+            inside, rounding = np.clip(points, lower, upper), ROUNDING * (upper - lower)
+            points = np.where(np.abs(points - inside) <= rounding, inside, points)
+        return check_points(points, lower, upper, "the program")
+
+    def _check_ending(self, program: subprocess.Popen[bytes], messages: IO[bytes]) -> None:
+        try:
+            status = program.wait(END_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            raise SearchError("the program closed its output, but does not end") from None
+        if status:
+            messages.seek(0)
+            lines = messages.read(LONGEST_LINE).decode("utf-8", "replace").split("\n")
+            last = next((line.strip() for line in reversed(lines) if line.strip()), "no message")
+            raise SearchError(f"the program ended with status {status}: {last[:LONGEST_REASON]}")
+
+    def _end(self, program: subprocess.Popen[bytes], reader: threading.Thread) -> None:
+        assert program.stdin is not None
+        with suppress(OSError):
+            program.stdin.close()
+        with suppress(subprocess.TimeoutExpired):
+            program.wait(END_WITHIN_S)
+        program.kill()
+        program.wait()
+        latest = monotonic() + END_WITHIN_S
+        while reader.is_alive() and monotonic() < latest:  # what the program has started may still hold its output
+            with suppress(queue.Empty):
+                self._lines.get(timeout=CHECKED_EVERY_S)
+
+
+def _to_list(values: Array) -> list[float | None]:
+    """Return numbers as JSON has them: null where not finite."""
+    return [value if math.isfinite(value) else None for value in values.tolist()]
