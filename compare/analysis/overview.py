@@ -101,9 +101,8 @@ def list_user_solvers(comparisons: Sequence[Comparison]) -> list[str]:
     return list(dict.fromkeys(own))
 
 
-def write_overall_verdict(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
+def write_overall_verdict(comparisons: Sequence[Comparison], ranking: Ranking) -> tuple[str, ...]:
     """Return at most five sentences over many problems."""
-    ranking = rank_over_problems(comparisons)
     found, names = index_solvers(comparisons)
     sentences = []
     if ranking.mean_ranks:

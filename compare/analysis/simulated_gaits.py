@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from compare.analysis.comparison import compare_problems
+from compare.analysis.comparison import Comparison
 from compare.analysis.units import with_unit
 from compare.study.record import RunRecord
 from compare.study.simulations import SimulatedGait
@@ -81,11 +81,9 @@ def _spearman(a: Sequence[float], b: Sequence[float]) -> float:
     return float(spearmanr(a, b).statistic)
 
 
-def select_best_gaits(records: Sequence[RunRecord]) -> list[RunRecord]:
+def select_best_gaits(comparisons: Sequence[Comparison]) -> list[RunRecord]:
     """Return every solver's best feasible run on every problem."""
-    return [
-        solver.best for problem in compare_problems(records) for solver in problem.solvers if solver.best is not None
-    ]
+    return [solver.best for problem in comparisons for solver in problem.solvers if solver.best is not None]
 
 
 def group_by_problem(gaits: Sequence[SimulatedGait]) -> dict[str, list[SimulatedGait]]:

@@ -9,7 +9,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
-from compare.analysis.comparison import label_editions
+from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.archive.rerun import compare_runs, make_task
 from compare.archive.unpack import unpack_archive
@@ -161,10 +161,10 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
 
 def _check_report(folder: Path, records: Sequence[RunRecord]) -> Finding:
     """Write the report again, and compare its text."""
-    labelled = label_editions(records)
     try:
-        simulated = load_simulations(folder, select_best_gaits(labelled))
-        again = markdown_page(make_study_document(labelled, read_manifest(folder), simulated=simulated)).split("\n")
+        comparisons = compare_problems(label_editions(records))
+        simulated = load_simulations(folder, select_best_gaits(comparisons))
+        again = markdown_page(make_study_document(comparisons, read_manifest(folder), simulated)).split("\n")
         known = (folder / REPORT).read_text(encoding="utf-8").split("\n")
     except (GaitError, OSError, UnicodeError) as error:
         return Finding(REPORT, False, str(error))

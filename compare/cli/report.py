@@ -126,10 +126,11 @@ def reproduce(
 
 def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
     """Simulate every solver's best gait, unless stored; raises InputError if none of the problems can be simulated."""
+    from compare.analysis.comparison import compare_problems
     from compare.analysis.simulated_gaits import select_best_gaits
     from compare.study.simulations import simulate_records
 
-    gaits = select_best_gaits(records)
+    gaits = select_best_gaits(compare_problems(records))
     try:
         with progress_bar("gaits", len(gaits)) as advance:
             simulated = simulate_records(folder, gaits, drive, advance)

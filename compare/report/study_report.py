@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
 from compare.analysis.overview import (
+    Ranking,
     count_wins,
     describe_tests,
     list_user_solvers,
@@ -30,13 +31,13 @@ from compare.study.settings import Manifest, read_manifest
 from compare.study.simulations import SimulatedGait, load_simulations
 
 
-def make_overview(comparisons: Sequence[Comparison]) -> Section:
+def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Section:
     """Return the section on all problems of a study together."""
     parts: list[Part] = [
         "Median gap to the best known value over all runs. A star marks the best median and those that do not differ from it "
         "significantly (rank-sum test at 5 %, Holm-corrected over all pairs on the problem). Ranks are those of the medians, of "
-        f"solvers that ran on all problems; equals share a rank. {describe_tests(rank_over_problems(comparisons))}".strip(),
-        _make_matrix(comparisons),
+        f"solvers that ran on all problems; equals share a rank. {describe_tests(ranking)}".strip(),
+        _make_matrix(comparisons, ranking.mean_ranks),
         *(_make_wins(comparisons, solver) for solver in list_user_solvers(comparisons)),
     ]
     if list_expected_costs(comparisons):
@@ -51,8 +52,7 @@ def make_overview(comparisons: Sequence[Comparison]) -> Section:
     return Section(title="All problems", parts=parts)
 
 
-def _make_matrix(comparisons: Sequence[Comparison]) -> Table:
-    ranks = rank_over_problems(comparisons).mean_ranks
+def _make_matrix(comparisons: Sequence[Comparison], ranks: Mapping[str, float]) -> Table:
     names = list(dict.fromkeys([*ranks, *(solver.name for c in comparisons for solver in c.solvers)]))
     rows = []
     for comparison in comparisons:
@@ -97,33 +97,31 @@ def write_report(
     further: FurtherFiles = REPORT_ALONE,
 ) -> list[Path]:
     """Write the report with stored simulations, the figures as PNG and SVG, and further files; return all paths."""
-    simulated = load_simulations(folder, select_best_gaits(records))
-    written = write_document(folder, make_study_document(records, manifest, weighting, simulated, excluded))
     comparisons = compare_problems(records, weighting)
+    simulated = load_simulations(folder, select_best_gaits(comparisons))
+    written = write_document(folder, make_study_document(comparisons, manifest, simulated, excluded))
     return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons)]
 
 
 def make_study_document(
-    records: Sequence[RunRecord],
+    comparisons: Sequence[Comparison],
     manifest: Manifest,
-    weighting: Weighting = DEFAULT_WEIGHTING,
     simulated: Sequence[SimulatedGait] = (),
     excluded: Sequence[Exclusion] = (),
 ) -> Document:
-    """Return the document of a study's records, of their best gaits simulated in the engine, and of excluded records."""
-    comparisons = compare_problems(records, weighting)
+    """Return the document of a study, of its best gaits simulated in the engine, and of excluded records."""
     sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
-    many = len(comparisons) > 1
+    ranking = rank_over_problems(comparisons) if len(comparisons) > 1 else None
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
-        verdict=write_overall_verdict(comparisons) if many else write_verdict(comparisons),
+        verdict=write_overall_verdict(comparisons, ranking) if ranking else write_verdict(comparisons),
         parts=(
             *_list_excluded(excluded),
             TERMS,
-            *((make_overview(comparisons),) if many else ()),
+            *((make_overview(comparisons, ranking),) if ranking else ()),
             *sections,
             *(() if simulated else (HOW,)),
-            _make_method_section(comparisons, manifest, weighting),
+            _make_method_section(comparisons, manifest),
             make_citation_section(c.records[0].definition["problem"] for c in comparisons),
         ),
     )
@@ -144,21 +142,24 @@ def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
     )
 
 
-def _make_method_section(comparisons: Sequence[Comparison], manifest: Manifest, weighting: Weighting) -> Section:
+def _make_method_section(comparisons: Sequence[Comparison], manifest: Manifest) -> Section:
     """Return everything needed to reproduce or question the study."""
     return Section(
         title="Methods",
         parts=(
-            _counting(comparisons, weighting),
+            _describe_counting(comparisons),
             _list_settings(comparisons),
             *(make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)),
         ),
     )
 
 
-def _counting(comparisons: Sequence[Comparison], weighting: Weighting) -> Section:
-    sizes = {c.problem: max((len(r.x) for r in c.records), default=0) for c in comparisons}
-    rows = [(problem, *(f"{w:g}" for w in weighting.of_kind(n).values())) for problem, n in sizes.items()]
+def _describe_counting(comparisons: Sequence[Comparison]) -> Section:
+    sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
+    rows = [
+        (c.problem, *(f"{w:g}" for w in c.weighting.of_kind(n).values()))
+        for c, n in zip(comparisons, sizes, strict=True)
+    ]
     return Section(
         title="Counting",
         parts=(

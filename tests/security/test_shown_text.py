@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import pytest
 from rich.console import Console
 
+from compare.analysis.comparison import compare_problems
 from compare.cli import common
 from compare.cli.common import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, new_figure, render_svg, style
@@ -72,7 +73,7 @@ def hostile_report() -> tuple[Page, str]:
         jobs=MARKED,
     )
     settings = StudySettings(problems=(ProblemSpec(name="walk", label=MARKED),), solvers=(SolverSpec(name=MARKED),))
-    document = make_study_document(records, Manifest(settings=settings, sessions=(session,)))
+    document = make_study_document(compare_problems(records), Manifest(settings=settings, sessions=(session,)))
     page = Page()
     page.feed(
         html(document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in iterate_leaves(document.parts)))
