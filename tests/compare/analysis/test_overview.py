@@ -56,7 +56,9 @@ def test_the_verdict_has_at_most_five_lines_and_the_matrix_marks_the_best(compar
     verdict = write_overall_verdict(comparisons, rank_over_problems(comparisons))
     assert len(verdict) <= 5 and verdict[0].startswith("Mean rank of the medians over 3 problems: ipopt 1.00")
     assert any("1-1-1 against pso" in sentence for sentence in verdict)
-    matrix = next(part for part in make_overview(comparisons, rank_over_problems(comparisons)).parts if isinstance(part, Table))
+    matrix = next(
+        part for part in make_overview(comparisons, rank_over_problems(comparisons)).parts if isinstance(part, Table)
+    )
     assert list(matrix.columns) == ["problem", "ipopt", "mine", "pso"]
     rows = {str(row[0]): row[1:] for row in matrix.rows}
     assert str(rows["walk"][0]).endswith("*") and "*" not in f"{rows['walk'][1]}{rows['walk'][2]}"
