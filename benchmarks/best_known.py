@@ -1,7 +1,8 @@
 """Collect the best known value of every problem and instance: ``python -m benchmarks.best_known``.
 
-Sources are the facts of GaitBench, ``docs/difficulty.json`` and the files ``better-*.json`` given as arguments.
-Every point is evaluated again; of equal problems the best point is kept. The result is ``compare/study/best_known.json``.
+Sources are the facts of GaitBench, ``docs/difficulty.json``, the shipped certificates and the files ``better-*.json`` given as
+arguments. Every point is evaluated again; of equal problems the best point is kept. The result is
+``compare/study/best_known.json``, with the proven bounds of the certificates: run it again after a certificate has changed.
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ from benchmarks.difficulty import difficulties
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem, load
-from nlp_gait.formulation.result import load_result
+from nlp_gait.formulation.result import StoredProblem, load_result
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.certificate import load_certificates
+from nlp_gait.proofs.certificate import find_certificate, load_certificates
 
 FILE = Path(str(compare.study.__file__)).with_name("best_known.json")
 # A point with a violation below the tolerance may be better than the optimum by about this, relatively.
@@ -36,7 +38,7 @@ class Found(NamedTuple):
     problem: GaitProblem
     x: Sequence[float]
     found_by: str
-    proven_as: str = ""
+    proven_as: str = ""  # hash of the problem of a certificate in another form; "" for the problem's own
 
 
 def from_gaitbench() -> Iterator[Found]:
@@ -50,7 +52,7 @@ def from_gaitbench() -> Iterator[Found]:
             instance.gait_problem,
             instance.best_x.tolist(),
             found_by + f" and {runs} long runs of CMA-ES" * (runs > 0),
-            "" if proof is None or proof.problem[HASH] == own else proof.problem[HASH],
+            own if proof is None else proof.problem[HASH],
         )
 
 
@@ -68,11 +70,19 @@ def from_files() -> Iterator[Found]:
         yield Found(result.problem, result.x.tolist(), f"{found_by['solver']}, seed {found_by['seed']}")
 
 
+def from_certificates() -> Iterator[Found]:
+    """Yield the points of the proven problems."""
+    for file in load_certificates().values():
+        stored = decode(StoredProblem, file.problem)
+        problem = load(stored.name, **stored.options).with_values(**stored.parameters)
+        yield Found(problem, file.certificate.x, "the starts of its certificate")
+
+
 def main() -> None:
     """Write the file."""
     best: dict[str, tuple[float, dict[str, Any]]] = {}
     described: dict[str, dict[str, Any]] = {}
-    for problem, x, found_by, proven_as in (*from_gaitbench(), *from_difficulty(), *from_files()):
+    for problem, x, found_by, proven_as in (*from_gaitbench(), *from_difficulty(), *from_files(), *from_certificates()):
         if len(x) != len(problem.names):
             print(f"{problem.address}: the point has {len(x)} values instead of {len(problem.names)}")
             continue
@@ -85,10 +95,9 @@ def main() -> None:
         key, before = description[HASH], best.get(description[HASH])
         described[json.dumps(description, sort_keys=True)] = description
         if before is None or values.cost < before[0] - ALIKE * abs(before[0]):
-            best[key] = (
-                values.cost,
-                {"objective": objective, "x": list(x), "found_by": found_by, "proven_as": proven_as},
-            )
+            proof = find_certificate({HASH: proven_as or key})
+            proven = {"bound": proof and proof.certificate.bound, "proven_as": proof.problem[HASH] if proof else ""}
+            best[key] = (values.cost, {"objective": objective, "x": list(x), "found_by": found_by, **proven})
             print(f"{problem.address} {dict(problem.values)}: {objective:.9g}, was {before}")
     write_json(FILE, [{"problem": known, **best[known[HASH]][1]} for known in described.values()])
 

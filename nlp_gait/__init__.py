@@ -66,6 +66,7 @@ PROBLEMS.update(
 )
 FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
 FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
+FUNCTIONS["load_generated"] = "nlp_gait.gaitbench.instance:load_generated"
 FUNCTIONS["tabulate_sensitivities"] = "nlp_gait.backends.optima.sensitivities:tabulate_sensitivities"
 FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 FUNCTIONS["animate_gait"] = "compare.report.gait_page:animate_gait"

@@ -11,17 +11,14 @@ from importlib.resources import files
 from typing import Any
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH
+from nlp_gait.backends.identity import HASH, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError
 from nlp_gait.formulation import Objective, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
-from nlp_gait.gaitbench.generated import is_generated
-from nlp_gait.gaitbench.instance import load as load_instance
-from nlp_gait.proofs.certificate import load_certificates, proven_bound
-from nlp_gait.providers import PROBLEMS
+from nlp_gait.providers import FUNCTIONS, PROBLEMS, import_object
 
 # Relative difference of an objective that is computed on another machine or by other compiled code.
 SAME_VALUE = 1e-9
@@ -59,27 +56,16 @@ class Shipped:
     objective: float  # in the problem's sense
     x: tuple[float, ...]  # (n,) its point; its total violation is at most the judge's tolerance
     found_by: str  # solvers and their number of runs, in words
-    # Hash of the certificate's problem where it is another form of this one, such as with fixed variables for constants
+    bound: float | None = None  # of its shipped certificate: no feasible point has a better objective
+    # Hash of the certificate's problem, which may be another form of this one, such as with fixed variables for constants
     proven_as: str = ""
 
 
 @cache
 def load_shipped() -> tuple[Shipped, ...]:
-    """Return the shipped values and those of all other certificates; equal problems of different names have equal values."""
+    """Return the shipped values; equal problems of different names have equal values."""
     raw = json.loads(files("compare.study").joinpath("best_known.json").read_text(encoding="utf-8"))
-    shipped = [decode(Shipped, item) for item in raw]
-    known = {entry.problem.sha256 for entry in shipped}
-    proven = [
-        Shipped(
-            problem=decode(StoredProblem, file.problem),
-            objective=file.certificate.objective,
-            x=file.certificate.x,
-            found_by="the starts of its certificate",
-        )
-        for file in load_certificates().values()
-        if file.problem[HASH] not in known
-    ]
-    return (*shipped, *proven)
+    return tuple(decode(Shipped, item) for item in raw)
 
 
 @cache
@@ -95,28 +81,27 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
     """
     shipped = _index_by_hash().get(str(problem.get(HASH, ""))) or _find_by_settings(json.dumps(problem, sort_keys=True))
     if shipped is None:
-        instance = str(problem.get("options", {}).get("instance", ""))
-        if is_generated(instance) and not problem.get("parameters"):
-            return _find_generated(instance)
         known = any(entry.problem.name == problem.get("name") for entry in load_shipped())
-        return Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
-    proven_as = shipped.proven_as or shipped.problem.sha256
-    bound = proven_bound({HASH: proven_as})
+        none = Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
+        return _find_generated(str(problem.get("options", {}).get("instance", "")), str(problem.get(HASH, ""))) or none
     return Reference(
-        proven_as=proven_as if bound is not None else "",
+        proven_as=shipped.proven_as,
         objective=shipped.objective,
         x=shipped.x,
-        bound=bound,
+        bound=shipped.bound,
         source=f"shipped, best of {shipped.found_by}"
-        if bound is None
-        else f"shipped, proven to {describe_gap(bound, shipped.objective)}",
+        if shipped.bound is None
+        else f"shipped, proven to {describe_gap(shipped.bound, shipped.objective)}",
     )
 
 
 @cache
-def _find_generated(id: str) -> Reference:
+def _find_generated(id: str, sha256: str) -> Reference | None:
     """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
-    instance = load_instance(id)
+    load_generated: Any = import_object(FUNCTIONS["load_generated"])
+    instance = load_generated(id)
+    if instance is None or identify_problem(instance.gait_problem)[HASH] != sha256:
+        return None
     sign = instance.gait_problem.objective.sign
     source = f"generated with {instance.evidence}"
     return Reference(objective=sign * instance.best_known, x=tuple(instance.best_x.tolist()), source=source)

@@ -17,7 +17,7 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
 from nlp_gait.gaitbench.best_known import find_facts
 from nlp_gait.gaitbench.facts import Evidence, Facts, Features
-from nlp_gait.gaitbench.generated import define, make_id
+from nlp_gait.gaitbench.generated import define, is_generated, make_id
 from nlp_gait.gaitbench.suite_problem import gaitbench
 
 FEATURE_POINTS = 20_000
@@ -216,6 +216,11 @@ def load(id: str, *, unit_cube: bool = False) -> Instance:
     """Load an instance by its id, in the unit cube or in physical units; raises UnknownNameError."""
     check_name("instance", id)
     return _load(id, bool(unit_cube))
+
+
+def load_generated(id: str) -> Instance | None:
+    """Load a generated instance, whose best known point is computed and not shipped; None for another id."""
+    return load(id) if is_generated(id) else None
 
 
 def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:

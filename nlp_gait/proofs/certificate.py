@@ -59,9 +59,3 @@ def find_certificate(problem: Mapping[str, Any]) -> CertificateFile | None:
     """Return the shipped certificate of a problem with the smallest gap, see ``identify_problem``; None if there is none."""
     found = [file for file in load_certificates().values() if file.problem[HASH] == problem.get(HASH)]
     return min(found, key=lambda file: file.certificate.gap, default=None)
-
-
-def proven_bound(problem: Mapping[str, Any]) -> float | None:
-    """Return the objective that no feasible point of a problem betters; None without a shipped certificate."""
-    found = find_certificate(problem)
-    return None if found is None else found.certificate.bound

@@ -23,10 +23,27 @@ def of_instance(id: str) -> Reference:
     return find_reference(identify_problem(gaitbench.load(id).gait_problem))
 
 
-def test_every_certificate_belongs_to_a_shipped_value() -> None:
-    known = {entry.proven_as or entry.problem.sha256 for entry in load_shipped()}
+def test_every_shipped_value_has_the_bound_of_its_tightest_certificate() -> None:
+    """Else run ``python -m benchmarks.best_known``."""
+    bounds: dict[str, list[tuple[float, float]]] = {}  # objective and bound
     for path in CERTIFICATES.glob("*.json"):
-        assert json.loads(path.read_text())["problem"][HASH] in known, path.name
+        raw = json.loads(path.read_text())
+        bounds.setdefault(raw["problem"][HASH], []).append((raw["certificate"]["objective"], raw["certificate"]["bound"]))
+    tightest = {proof: min(found, key=lambda pair: abs(pair[0] - pair[1]))[1] for proof, found in bounds.items()}
+    shipped = load_shipped()
+    assert {entry.proven_as: entry.bound for entry in shipped if entry.bound is not None} == tightest
+    assert all(entry.proven_as in tightest for entry in shipped if entry.problem.sha256 in tightest)
+    assert all((entry.bound is None) == (not entry.proven_as) for entry in shipped)
+
+
+def test_a_generated_instance_has_its_own_point_unless_a_parameter_is_changed() -> None:
+    instance = gaitbench.load("gb2:walk12-long:0")
+    described = identify_problem(instance.gait_problem)
+    known = find_reference(described)
+    assert known.objective == instance.gait_problem.objective.sign * instance.best_known and known.bound is None
+    assert known.x == tuple(instance.best_x) and known.source == f"generated with {instance.evidence}"
+    changed = instance.gait_problem.with_values(**{"lambda": 0.5})
+    assert find_reference(identify_problem(changed)).objective is None
 
 
 @pytest.mark.parametrize(
