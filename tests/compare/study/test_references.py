@@ -28,7 +28,9 @@ def test_every_shipped_value_has_the_bound_of_its_tightest_certificate() -> None
     bounds: dict[str, list[tuple[float, float]]] = {}  # objective and bound
     for path in CERTIFICATES.glob("*.json"):
         raw = json.loads(path.read_text())
-        bounds.setdefault(raw["problem"][HASH], []).append((raw["certificate"]["objective"], raw["certificate"]["bound"]))
+        bounds.setdefault(raw["problem"][HASH], []).append(
+            (raw["certificate"]["objective"], raw["certificate"]["bound"])
+        )
     tightest = {proof: min(found, key=lambda pair: abs(pair[0] - pair[1]))[1] for proof, found in bounds.items()}
     shipped = load_shipped()
     assert {entry.proven_as: entry.bound for entry in shipped if entry.bound is not None} == tightest
