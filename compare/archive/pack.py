@@ -24,7 +24,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.loading import list_robot_files
+from nlp_gait.robots.loading import find_robot_file, list_robot_files
 from nlp_gait.user_code import Kind, hash_source, list_source_files, resolve_code
 
 README, LOCK, CRATE = "README.md", "requirements.txt", "ro-crate-metadata.json"
@@ -86,7 +86,8 @@ def _to_bytes(data: Any) -> bytes:
 
 def _collect_robot(text: str, content: dict[str, bytes]) -> str:
     """Add all files of a robot, at the same places relative to each other, and return its archived name."""
-    source, mark, changes = text.partition("@")  # changes of masses and lengths
+    name, mark, changes = text.partition("@")  # changes of masses and lengths
+    source = find_robot_file(name)
     files = list_robot_files(source)
     # The name of the folder that contains them all is kept: ``package://`` finds meshes by it.
     top = Path(os.path.commonpath([os.path.dirname(file) for file in files])).parent

@@ -11,13 +11,14 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.leg import LEG_JOINT_COUNT
+from nlp_gait.robots.meshes import FootShapes
 from nlp_gait.robots.repair import Records, turn_records
 from nlp_gait.robots.tree import Array, are_mirror_images
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
-# Collision points (N, 3) of a link [m] and the meshes that were not found.
-PointCloud = Callable[[str], tuple[Array, tuple[str, ...]]]
+# Shapes that move with a link.
+ReadShapes = Callable[[str], FootShapes]
 
 # Keys of a foot in a robot file, except its link.
 EXTENTS = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
@@ -51,6 +52,7 @@ class Sole(NamedTuple):
     low: Array  # (2,) least x and y
     high: Array  # (2,) greatest x and y
     points: int  # number of points on the ground
+    kind: str  # of the shapes
 
 
 class Legs(NamedTuple):
@@ -65,37 +67,43 @@ class Legs(NamedTuple):
         return {joint.child for chain in self.chains for joint in chain}
 
 
-def find_legs(robot: str, joints: Records, feet: Mapping[str, Mapping[str, Any]]) -> Legs:
+def find_legs(robot: str, links: Records, joints: Records, feet: Mapping[str, Mapping[str, Any]]) -> Legs:
     """Find the legs by the feet of the robot file, by side, or else by geometry.
 
-    The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet. Raises RobotDataError if
-    there is no such pair, or if it is not clearly lower than others.
+    The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet, below the centre of mass
+    of the other links: limbs that begin above it are arms. Raises RobotDataError if there is no such pair, or if it is not
+    clearly lower than others.
     """
     chains = _find_chains(joints)
     if feet:
         left, right = (str(feet.get(side, {}).get("link")) for side in SIDES)
         return Legs((left, right), _split_chains(chains.get(left, []), chains.get(right, [])))
     found: list[tuple[float, Legs]] = []
-    others_m: list[tuple[float, int, tuple[str, str]]] = []
+    others_m: list[tuple[float, str, tuple[str, str]]] = []
     for pair in combinations(sorted(chains), 2):
         own = _split_chains(chains[pair[0]], chains[pair[1]])
         count = len(own[0])
         if count != len(own[1]) or not count or not _are_mirror_chains(*own):
             continue
-        if count == LEG_JOINT_COUNT:
-            found.append((own[0][0].place[2], Legs(pair, own)))
+        legs = Legs(pair, own)
+        if _are_arms(legs, links, chains):
+            others_m.append(
+                (own[0][0].place[2], "belongs to arms: they begin above the other links' centre of mass", pair)
+            )
+        elif count != LEG_JOINT_COUNT:
+            others_m.append((own[0][0].place[2], f"has legs of {count} joints", pair))
         else:
-            others_m.append((own[0][0].place[2], count, pair))
+            found.append((own[0][0].place[2], legs))
     remedy = (
         'name them in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
         "(docs/custom-robots.md describes the supported legs)"
     )
     if not found:
-        height, count, pair = min(others_m, default=(0.0, 0, ("", "")))
-        lowest_pair = f"; the lowest pair, {pair[0]!r} and {pair[1]!r}, has legs of {count} joints" if count else ""
+        _, fault, pair = min(others_m, default=(0.0, "", ("", "")))
+        lowest_pair = f"; the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}" if fault else ""
         raise RobotDataError(
-            f"robot {robot!r}: no feet found: two links, mirror images of each other, with {LEG_JOINT_COUNT} turning joints each "
-            f"below the link where both legs meet{lowest_pair}; {remedy}"
+            f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "
+            f"joints each below the link where both legs meet{lowest_pair}; {remedy}"
         )
     found.sort(key=lambda item: (item[0], item[1].feet))
     lowest, *others = [legs for height, legs in found if height < found[0][0] + CLEARLY_LOWER_M]
@@ -111,7 +119,7 @@ def infer_feet(
     links: Records,
     joints: Records,
     feet: Mapping[str, Mapping[str, Any]],
-    cloud: PointCloud,
+    read_shapes: ReadShapes,
     forward: str | None,
     notes: list[str],
 ) -> Records:
@@ -126,7 +134,7 @@ def infer_feet(
                 f"robot {robot!r}: a leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to the foot, "
                 f"{link!r} has {len(chain)}: {', '.join(joint.child for joint in chain) or 'none'}"
             )
-    soles = [_find_sole(robot, link, cloud) for link in legs.feet]
+    soles = [_find_sole(robot, link, read_shapes) for link in legs.feet]
     angle = FORWARD_ANGLES[forward] if forward else _find_forward(robot, legs.chains, soles)
     c, s = round(math.cos(angle)), round(math.sin(angle))  # exact: quarter turns
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -150,7 +158,7 @@ def infer_feet(
         foot = {"link": link, **dict(zip(EXTENTS, extents, strict=True)), **feet.get(side, {})}
         notes.append(
             f"{side} foot: {link!r}, its sole {foot['back_m'] + foot['front_m']:.3f} m by "
-            f"{foot['left_m'] + foot['right_m']:.3f} m, from {sole.points} lowest points of its collision shapes"
+            f"{foot['left_m'] + foot['right_m']:.3f} m, from {sole.points} lowest points of its {sole.kind} shapes"
         )
         found[side] = foot
     return found
@@ -185,8 +193,17 @@ def _are_mirror_chains(one: Chain, other: Chain) -> bool:
     )
 
 
-def _find_sole(robot: str, link: str, cloud: PointCloud) -> Sole:
-    points, missing = cloud(link)
+def _are_arms(legs: Legs, links: Records, chains: Mapping[str, Chain]) -> bool:
+    """Return whether the limbs begin above the centre of mass of all other links, at zero angles."""
+    others = [(float(links[name]["mass_kg"]), name) for name in links if name not in legs.links]
+    mass = sum(own for own, _ in others)
+    heights = {name: chain[0].place[2] for name, chain in chains.items()}
+    moment = sum(own * (heights.get(name, 0.0) + links[name]["com_m"][2]) for own, name in others)
+    return bool(mass > 0.0 and legs.chains[0][-1].place[2] > moment / mass)
+
+
+def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> Sole:
+    points, kind, missing = read_shapes(link)
     write = (
         'write its sole into the JSON file next to the model: "ankle_height_m", "front_m", "back_m", "left_m", "right_m" '
         "(see docs/custom-robots.md)"
@@ -197,7 +214,7 @@ def _find_sole(robot: str, link: str, cloud: PointCloud) -> Sole:
             f"its package's folder in ROS_PACKAGE_PATH, or {write}"
         )
     if not len(points):
-        raise RobotDataError(f"robot {robot!r}: {link!r} has no collision shape for its sole; {write}")
+        raise RobotDataError(f"robot {robot!r}: {link!r} has no shape for its sole; {write}")
     on_ground = points[points[:, 2] < points[:, 2].min() + SOLE_THICKNESS_M]
     low, high = on_ground.min(axis=0), on_ground.max(axis=0)
     if min(high[:2] - low[:2]) < LEAST_WIDTH_M:
@@ -205,7 +222,7 @@ def _find_sole(robot: str, link: str, cloud: PointCloud) -> Sole:
             f"robot {robot!r}: the lowest part of {link!r} at zero angles is {1e3 * (high[0] - low[0]):.1f} mm by "
             f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole; {write}"
         )
-    return Sole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground))
+    return Sole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground), kind)
 
 
 def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) -> float:

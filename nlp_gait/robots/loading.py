@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from importlib import resources
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -16,15 +18,16 @@ from nlp_gait.decoding import decode, decode_value, read_dataclass
 from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
-from nlp_gait.robots.mjcf import list_dependencies, mjcf_points, mjcf_record
+from nlp_gait.robots.mjcf import list_dependencies, mjcf_record, read_foot_geoms
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_name
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
-from nlp_gait.robots.urdf import collision_points, find_moving_link, list_meshes, urdf_record
+from nlp_gait.robots.urdf import find_moving_link, list_meshes, read_foot_shapes, urdf_record
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
+PACKAGE_MARK = ":"  # between an installed package and one of its robots
 LONGEST_CHAIN = 8  # of robots that extend each other
 MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
@@ -84,6 +87,8 @@ def robot_names() -> tuple[str, ...]:
 def load_robot(name_or_path: str) -> Robot:
     """Load a robot by its name, or from a file: a path that ends in ``.json``, ``.urdf`` or, for MJCF, ``.xml``.
 
+    A URDF in an installed package is named ``PACKAGE:NAME``, see ``find_robot_file``.
+
     What such a file does not state is inferred, see ``robots/inference.py``; a ``.json`` of the same name next to it overrides
     both. Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read
     again each time, because it may have changed.
@@ -100,8 +105,30 @@ def load_robot(name_or_path: str) -> Robot:
 
 
 def is_robot_file(name_or_path: str) -> bool:
-    """Return whether a robot comes from a file instead of the package."""
-    return split_name(name_or_path)[0].endswith(FILE_ENDINGS)
+    """Return whether a robot comes from a file, its user's or an installed package's, instead of this package."""
+    source = split_name(name_or_path)[0]
+    return source.endswith(FILE_ENDINGS) or PACKAGE_MARK in source
+
+
+def find_robot_file(name: str) -> str:
+    """Return the URDF of a robot in an installed package, ``example-robot-data:talos_reduced``; other names as they are.
+
+    After the package's name follows the file's name without its ending, or, for files of one name, their folder's.
+    """
+    if name.endswith(FILE_ENDINGS) or PACKAGE_MARK not in name:
+        return name
+    package, _, robot = name.partition(PACKAGE_MARK)
+    try:
+        files = [file.locate() for file in distribution(package).files or () if file.suffix == ".urdf"]
+    except PackageNotFoundError:
+        raise RobotDataError(
+            f"robot {name!r}: the package {package!r} is not installed; install it with pip, or give a file"
+        ) from None
+    stems = Counter(Path(str(file)).stem for file in files)
+    found = {path.stem if stems[path.stem] == 1 else path.parent.name: str(path) for path in map(Path, map(str, files))}
+    if robot not in found:
+        raise unknown(f"robot of {package!r}", robot, found)
+    return found[robot]
 
 
 def hash_robot(name_or_path: object) -> str:
@@ -112,7 +139,7 @@ def hash_robot(name_or_path: object) -> str:
 
 
 def list_robot_files(name_or_path: str) -> set[str]:
-    """Return the files that describe a robot: its own, those that it extends or includes, and meshes of collision shapes.
+    """Return the files that describe a robot: its own, those that it extends or includes, and meshes.
 
     Raises:
         RobotDataError: a file cannot be read.
@@ -139,8 +166,9 @@ def _load(name_or_path: str) -> Robot:
     return perturb(_make_robot(_read_merged(path), path), changes)
 
 
-def _find_description(path: str) -> str:
+def _find_description(source: str) -> str:
     """Return the file to read first: for a URDF or MJCF the robot file of the same name, if there is one."""
+    path = find_robot_file(source)
     if not path.endswith(MODEL_ENDINGS):
         return path
     partner = Path(path).with_suffix(".json")
@@ -280,15 +308,13 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
         for record in feet.values():  # a sole's link is often behind a fixed joint
             if model.endswith(".urdf") and record.get("link") not in links:
                 record["link"] = find_moving_link(model, str(record.get("link")))
-        legs = find_legs(name, joints, feet)
+        legs = find_legs(name, links, joints, feet)
         if file.unphysical == "repair":
             repair_links(links, legs.links, faults[0], notes)
         weld_faults(links, joints, legs.links, *faults, notes)
         if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
-            read_points = mjcf_points if model.endswith(".xml") else collision_points
-            feet = infer_feet(
-                name, legs, links, joints, feet, lambda link: read_points(model, link), file.forward, notes
-            )
+            read_shapes = partial(read_foot_geoms if model.endswith(".xml") else read_foot_shapes, model)
+            feet = infer_feet(name, legs, links, joints, feet, read_shapes, file.forward, notes)
     count = sum("foot:" not in note for note in notes)
     if count:
         parts = f"{count} note{'s' * (count > 1)} on welded or repaired parts"

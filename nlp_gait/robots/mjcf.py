@@ -20,7 +20,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import read_in_child
-from nlp_gait.robots.meshes import box_points, cylinder_points
+from nlp_gait.robots.meshes import FootShapes, box_points, cylinder_points
 from nlp_gait.robots.mjcf_counts import check_counts
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 from nlp_gait.robots.tree import Array, Mass, combine_masses
@@ -77,20 +77,21 @@ def mjcf_record(path: str) -> dict[str, Any]:
     }
 
 
-def mjcf_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
-    """Return points of all collision shapes that move with a link, as ``urdf.collision_points``; MuJoCo reads the meshes."""
+def read_foot_geoms(path: str, link: str) -> FootShapes:
+    """Return the points of all shapes that move with a link, as ``urdf.read_foot_shapes``; MuJoCo reads the meshes."""
     model = _compile(path)
     _, frames, carriers = _tree(model)
-    found = [np.zeros((0, 3))]
+    found = {kind: [np.zeros((0, 3))] for kind in ("collision", "visual")}
     for i, frame in frames.items():
         if (model.body(carriers[i]).name or f"body {carriers[i]}") != link:
             continue
         origin = _joint_place(model, frames, carriers[i])
         for geom in range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i]):
-            if model.geom_contype[geom] or model.geom_conaffinity[geom]:
-                pose = frame @ _pose(model.geom_pos[geom], model.geom_quat[geom])
-                found.append(_shape_points(model, geom, pose) - origin)
-    return np.concatenate(found), ()
+            kind = "collision" if model.geom_contype[geom] or model.geom_conaffinity[geom] else "visual"
+            pose = frame @ _pose(model.geom_pos[geom], model.geom_quat[geom])
+            found[kind].append(_shape_points(model, geom, pose) - origin)
+    kind = "collision" if len(found["collision"]) > 1 else "visual"
+    return FootShapes(np.concatenate(found[kind]), kind)
 
 
 def list_dependencies(path: str) -> list[str]:

@@ -17,13 +17,14 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
-from nlp_gait.robots.meshes import box_points, cylinder_points, find_mesh, make_pose, mesh_points, parse_xml
+from nlp_gait.robots.meshes import FootShapes, box_points, cylinder_points, find_mesh, make_pose, mesh_points, parse_xml
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 from nlp_gait.robots.tree import Array, Mass, combine_masses, point_inertia
 
 # Elements that are read; shapes, transmissions and plugins are removed before parsing.
 READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}
 TURNING = ("revolute", "continuous")
+SHAPES = ("collision", "visual")
 MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
 # The parser's message for an unknown attribute of an element without numbers.
 OWNER = re.compile(r"^Unknown attribute .* in (/robot[^/]*)?/?(robot|link|joint)(\[[^\]]*\])?$")
@@ -64,42 +65,41 @@ def find_moving_link(path: str, link: str) -> str:
     return _find_carrier(link, joints)
 
 
-def collision_points(path: str, link: str) -> tuple[Array, tuple[str, ...]]:
-    """Return points of all collision shapes that move with a link, from its joint, along the root's axes at zero angles.
+def read_foot_shapes(path: str, link: str) -> FootShapes:
+    """Return the points of all shapes that move with a link, from its joint, along the root's axes at zero angles.
 
-    Returns:
-        (N, 3) corners of boxes and meshes, edges of cylinders and lowest points of spheres [m], and meshes that do not exist.
+    Visual shapes count only if none of these links has a collision shape.
 
     Raises:
         RobotDataError: as ``urdf_record``, or a mesh cannot be read.
         ValueError: as ``urdf_record``.
     """
     tree = _read_xml(path)
-    shapes = {element.get("name"): element.findall("collision") for element in tree.iter("link")}
+    shapes = {kind: {part.get("name"): part.findall(kind) for part in tree.iter("link")} for kind in SHAPES}
     model = _parse(tree, path)
     joints = {joint.child: joint for joint in model.joints}
-    frames = _zero_pose(model, joints)
+    frames = {name: frame for name, frame in _zero_pose(model, joints).items() if _find_carrier(name, joints) == link}
+    kind = next((kind for kind in SHAPES if any(shapes[kind][name] for name in frames)), SHAPES[0])
     found, missing = [np.zeros((0, 3))], []
     for name, frame in frames.items():
-        if _find_carrier(name, joints) != link:
-            continue
-        for shape in shapes.get(name, ()):
-            kinds = [kind for geometry in shape.findall("geometry") for kind in geometry]
+        for shape in shapes[kind][name]:
+            geometries = [part for geometry in shape.findall("geometry") for part in geometry]
             origin = {} if shape.find("origin") is None else shape.find("origin").attrib
             place, angles = (_numbers(origin.get(key, "0 0 0"), 3, name) for key in ("xyz", "rpy"))
             pose = make_pose(-frames[link][:3, 3]) @ frame @ make_pose(place, angles)
-            for kind in kinds:
-                points = _shape_points(kind, pose, Path(path), name)
+            for geometry in geometries:
+                points = _shape_points(geometry, pose, Path(path), name)
                 if points is None:
-                    missing.append(str(kind.get("filename")))
+                    missing.append(str(geometry.get("filename")))
                 else:
                     found.append(points)
-    return np.concatenate(found), tuple(missing)
+    return FootShapes(np.concatenate(found), kind, tuple(missing))
 
 
 def list_meshes(path: str) -> list[str]:
-    """Return the files of all meshes of collision shapes that exist; raises as ``urdf_record``."""
-    addresses = {mesh.get("filename", "") for shape in _read_xml(path).iter("collision") for mesh in shape.iter("mesh")}
+    """Return the files of the meshes of collision shapes, or of visual shapes of links without; raises as ``urdf_record``."""
+    shapes = (link.findall(SHAPES[0]) or link.findall(SHAPES[1]) for link in _read_xml(path).iter("link"))
+    addresses = {mesh.get("filename", "") for listed in shapes for shape in listed for mesh in shape.iter("mesh")}
     return [str(file) for address in addresses if (file := find_mesh(address, Path(path))) is not None]
 
 
@@ -126,7 +126,7 @@ def _shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None
 def _numbers(text: str, count: int, link: str) -> list[float]:
     values = [float(word) for word in text.split()]
     if len(values) != count or not are_plausible(values):
-        raise ValueError(f"link {link!r}: a collision shape needs {count} finite numbers, got {text[:60]!r}")
+        raise ValueError(f"link {link!r}: a shape needs {count} finite numbers, got {text[:60]!r}")
     return values
 
 

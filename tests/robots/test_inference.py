@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlp_gait.errors import GaitError, InputError, RobotDataError, warn_once
+from nlp_gait.errors import GaitError, InputError, RobotDataError, UnknownNameError, warn_once
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
+from nlp_gait.robots.loading import hash_robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import partner, partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
@@ -152,7 +153,7 @@ INCOMPLETE = [
     (change("<collision>", "<visual>"), r"not a URDF|is not valid XML"),
     (
         lambda text: crooked_urdf(sole=False),
-        r"'A_ankle_roll_link' has no collision shape .* write its sole into the JSON",
+        r"'A_ankle_roll_link' has no shape .* write its sole into the JSON",
     ),
     (change('size="0.17 0.09 0.02"', 'size="0.17 0.001 0.02"'), r"no flat sole; write its sole"),
     (
@@ -160,6 +161,10 @@ INCOMPLETE = [
         r"knees .* contradict each other; write the forward direction",
     ),
     (change('<joint name="A_knee" type="revolute">', '<joint name="A_knee" type="fixed">'), r"no feet found"),
+    (
+        change('<origin xyz="0.0 0.0 0.15"/>', '<origin xyz="0.0 0.0 -0.9"/>'),
+        r"no feet found: .*'A_ankle_roll_link' and 'B_ankle_roll_link', belongs to arms: they begin above",
+    ),
     (
         change('<mass value="1.1"/>', '<mass value="0"/>'),
         r"mass_kg must be > 0, got 0\.0\. It moves in every gait.*\"unphysical\": \"repair\"",
@@ -178,6 +183,35 @@ def test_what_matters_is_repaired_on_request(tmp_path: Path) -> None:
     robot = load_robot(override(crooked(tmp_path, text), unphysical="repair"))
     assert 0.0 < robot.links["A_knee_link"].mass_kg < 1e-4
     assert sum("repaired as requested" in note for note in robot.notes) == 2
+
+
+def test_a_sole_without_collision_shape_is_that_of_the_visual_shape(tmp_path: Path) -> None:
+    shown = load_robot(crooked(tmp_path, crooked_urdf().replace("collision>", "visual>")))
+    (tmp_path / "whole").mkdir()
+    assert shown.feet == load_robot(crooked(tmp_path / "whole")).feet
+    assert sum("lowest points of its visual shapes" in note for note in shown.notes) == 2
+
+
+def test_a_robot_of_an_installed_package_is_named_by_its_file_or_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        crooked(tmp_path / folder)
+    (tmp_path / "one" / "lonely.urdf").write_text(crooked_urdf(), encoding="utf-8")
+    info = tmp_path / "some_robots-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: some-robots\nVersion: 1.0\n", encoding="utf-8")
+    files = ("one/crooked.urdf", "two/crooked.urdf", "one/lonely.urdf", "some_robots-1.0.dist-info/METADATA")
+    (info / "RECORD").write_text("".join(f"{file},,\n" for file in files), encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    whole = load_robot(str(tmp_path / "one" / "lonely.urdf"))
+    for name in ("some-robots:lonely", "some-robots:two", "some-robots:one"):
+        assert load_robot(name).feet == whole.feet and hash_robot(name)
+    with pytest.raises(UnknownNameError, match=r"unknown robot of 'some-robots' 'three'; known: lonely, one, two"):
+        load_robot("some-robots:three")
+    with pytest.raises(RobotDataError, match=r"'no-robots' is not installed; install it with pip"):
+        load_robot("no-robots:one")
 
 
 def test_a_foot_behind_a_fixed_joint_is_found(tmp_path: Path) -> None:

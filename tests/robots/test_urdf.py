@@ -255,7 +255,7 @@ def test_entities_are_refused_unread(tmp_path: Path, definition: str, use: str) 
 def test_a_urdf_alone_without_shapes_is_answered_with_what_to_write(tmp_path: Path) -> None:
     path = stored(tmp_path, as_urdf(nao()))
     (tmp_path / "robot.json").unlink()
-    with pytest.raises(RobotDataError, match=r"no collision shape for its sole; write its sole into the JSON"):
+    with pytest.raises(RobotDataError, match=r"no shape for its sole; write its sole into the JSON"):
         load_robot(path)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -163,3 +164,28 @@ def test_what_is_not_a_leg_is_refused(robots: dict[str, Robot]) -> None:
     for axes, message in ((parallel, "last two must not be parallel"), (flat, "must not lie in one plane")):
         with pytest.raises(InputError, match=message):
             Leg(joints=leg.joints, axes=axes, points=leg.points, foot_m=leg.foot_m, limits_rad=leg.limits_rad)
+
+
+@pytest.mark.slow
+def test_poses_beyond_the_joints_limits_do_not_count() -> None:
+    """Right leg of Alexander (example-robot-data 6.0.0), whose hip axes pass each other by 0.16 m."""
+    leg = Leg(
+        joints=tuple(f"joint_{k}" for k in range(6)),
+        axes=np.array([[1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]], dtype=float),
+        points=np.array(
+            [
+                (-0.162, -0.0595, -0.015),
+                (-0.102, -0.1595, -0.095),
+                (0.0025, -0.1022, -0.1475),
+                *((0.0025, -0.1202, z) for z in (-0.4675, -0.8775, -0.8895)),
+            ]
+        ),
+        foot_m=np.array([0.0025, -0.1202, -0.8895]),
+        limits_rad=np.array([(-0.87, 0.35), (-1.05, 0.35), (-2.62, 0.79), (0.0, 2.45), (-1.05, 0.52), (-0.44, 0.44)]),
+    )
+    assert count_newton_steps(leg) == 7
+    free = replace(
+        leg, limits_rad=np.full((6, 2), math.pi) * [-1.0, 1.0]
+    )  # without limits some angles reach those poses
+    with pytest.raises(InputError, match=r"is not solved in 8 Newton steps: its hip axes pass each other too far"):
+        count_newton_steps(free)

@@ -47,6 +47,8 @@ STEP_M = 0.06  # NAO's, from foot to foot
 # Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
 NEARLY_CLOSED, CLOSED, SHARE = 1e-9, 1e-12, 0.995
 MOST_STEPS = 8
+# Share of poses that may stay open and are examined, random starts of each, and what counts as closed there [1, rad].
+MOST_EXAMINED, REACH_STARTS, REACHED = 0.05, 8, 1e-5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -198,21 +200,54 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
 def count_newton_steps(leg: Leg) -> int:
     """Return the steps that a leg needs after the guess: none if that is exact, else one more than closes nearly all poses.
 
+    If some poses stay open, those that no angles within the joints' limits close do not count.
+
     Raises:
         InputError: it needs too many.
     """
     inputs = sample_flat_foot_poses(leg)
+    steps = _find_steps(leg, inputs)
+    if steps is not None:
+        return steps
+    left = compute_residuals(leg, MOST_STEPS - 1, inputs)
+    if np.mean(left > NEARLY_CLOSED) < MOST_EXAMINED:
+        reachable = [
+            value <= NEARLY_CLOSED or _can_reach(leg, pose) for value, pose in zip(left, inputs.T, strict=True)
+        ]
+        steps = _find_steps(leg, inputs[:, reachable])
+        if steps is not None:
+            return steps
+    raise InputError(
+        f"the leg of joints {', '.join(leg.joints)} is not solved in {MOST_STEPS} Newton steps: its hip axes pass each other too "
+        f"far, or its ankle's; after {MOST_STEPS - 1} steps {100 * float(np.mean(left <= NEARLY_CLOSED)):.0f} % of "
+        f"{POSES} poses are closed"
+    )
+
+
+def _find_steps(leg: Leg, inputs: Array) -> int | None:
     for steps in range(MOST_STEPS):
         left = compute_residuals(leg, steps, inputs)
         if steps == 0 and np.quantile(left, SHARE) <= CLOSED:
             return 0
         if np.quantile(left, SHARE) <= NEARLY_CLOSED:
             return steps + 1
-    raise InputError(
-        f"the leg of joints {', '.join(leg.joints)} is not solved in {MOST_STEPS} Newton steps: its hip axes pass each other too "
-        f"far, or its ankle's; after {MOST_STEPS - 1} steps {100 * float(np.mean(left <= NEARLY_CLOSED)):.0f} % of "
-        f"{POSES} poses are closed"
+    return None
+
+
+def _can_reach(leg: Leg, pose: Array) -> bool:
+    """Return whether angles within the limits close a pose (12,), by least squares from random angles."""
+    from scipy.optimize import least_squares
+
+    q = SX.sym("q", LEG_JOINT_COUNT)
+    residual = make_leg_root(leg, 0, Exact(), SX(0.0)).residual(q, SX(DM(pose)))
+    misfit, jacobian = ca.Function("misfit", [q], [residual]), ca.Function("jacobian", [q], [ca.jacobian(residual, q)])
+    low, high = leg.limits_rad.T
+    starts = np.random.default_rng(0).uniform(low, high, (REACH_STARTS, LEG_JOINT_COUNT))
+    ends = (
+        least_squares(lambda at: misfit(at).full()[:, 0], start, lambda at: jacobian(at).full(), bounds=(low, high))
+        for start in starts
     )
+    return any(np.abs(end.fun).max() <= REACHED for end in ends)
 
 
 def compute_residuals(leg: Leg, steps: int, inputs: Array) -> Array:
