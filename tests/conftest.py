@@ -14,6 +14,7 @@ from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
+from tests.compilers import hide_compilers
 from tests.extras import skip_without_extra
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
@@ -84,9 +85,8 @@ def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def without_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no compiler be found, where a kernel would take longer to compile than its few calls when they are interpreted."""
-    for name in ("CXX", "CC", "PATH"):
-        monkeypatch.setenv(name, "")
+    """Let no compiler be found."""
+    hide_compilers(monkeypatch)
 
 
 @pytest.fixture(scope="session", autouse=True)
