@@ -224,7 +224,7 @@ def plan(
     `nlp-gait export walk.json --format csv --period-ms 1`
     """
     import nlp_gait
-    from nlp_gait.files import replace_nan, write_json
+    from nlp_gait.files import replace_nan
 
     target = None if out is None else output_file(out)
     found = nlp_gait.plan_walk(
@@ -237,11 +237,10 @@ def plan(
         starts=starts,
         progress=say,
     )
-    data = replace_nan(found.to_json())
     if target is not None:
-        write_json(target, data)
+        found.save(target)
     if as_json:
-        print_json(data)
+        print_json(replace_nan(found.to_json()))
     else:
         stdout.print(
             f"{found.steps} steps, {found.distance_m:.3f} m in {found.duration_s:.2f} s: {found.energy_J:.2f} J, "

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -23,25 +26,8 @@ from nlp_gait.progress import Progress, ignore_progress
 
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
 FEW_STEPS = 2  # of these, one is a half step at the start, one at the stop
-# Begin of a row's name, the words for it, and what helps.
-REMEDIES = (
-    ("joint_angle", "exceeds its limit", "plan shorter steps or a lower speed"),
-    ("reach", "is too straight or too bent", "plan shorter steps, which let the hip be lower"),
-    ("closure", "does not reach its foot", "plan shorter steps, which let the hip be lower"),
-    (
-        "dbm",
-        "balance margin is too small",
-        "plan a lower speed or shorter steps, or lower the margin's limit with --set",
-    ),
-    ("torque_change", "torque changes too fast", "plan a lower speed, or raise torque_change_limit_Nm with --set"),
-    (
-        "effort",
-        "torque exceeds its limit",
-        "plan a lower speed or shorter steps; the limit is that of the robot's file",
-    ),
-    ("joint_speed", "turns too fast", "plan a lower speed or shorter steps; the limit is that of the robot's file"),
-    ("speed", "of the inner steps is not reached", "plan another speed, or other bounds of times and steps with --set"),
-    ("torque_", "torque exceeds its motor", "plan a lower speed or shorter steps"),
+SENTENCES: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    files(__package__).joinpath("walk_remedies.toml").read_text(encoding="utf-8")
 )
 
 
@@ -174,23 +160,11 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progres
 
 def describe_violation(row: ConstraintValue, steps: int) -> str:
     """Return a sentence about a violated row of a walk: step, constraint, amount and remedy."""
-    places = {
-        "start_ssp_": "step 1 (half step), single support",
-        "start_dsp_": "step 1 (half step), double support",
-        "stop_ssp_": f"step {steps} (half step), single support",
-        "stop_dsp_": f"after step {steps}, weight shift",
-        "shift_": "before step 1, weight shift",
-        "stand_": "standing",
-        "ssp_": f"steps 2 to {steps - 1}, single support",
-        "dsp_": f"steps 2 to {steps - 1}, double support",
-    }
-    prefix = next((prefix for prefix in places if row.name.startswith(prefix)), "")
+    begins = SENTENCES["places"]
+    prefix = next(begin for begin in begins if row.name.startswith(begin))
+    where = begins[prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")
     stem, _, label = row.name.removeprefix(prefix).partition("[")
-    words, remedy = next(
-        ((words, remedy) for begin, words, remedy in REMEDIES if stem.startswith(begin)),
-        ("is violated", "relax it with --set"),
-    )
+    words, remedy = next(found for begin, found in SENTENCES["constraints"].items() if stem.startswith(begin))
     owner = label.rstrip("]").split(",")[0].strip()
     what = f"{stem} {words}" if not owner or owner.isdigit() else f"{owner} {words}"
-    where = places.get(prefix, f"steps 2 to {steps - 1}")
     return f"{where}: {what} by {row.violation:.3g} {row.unit} ({row.name}); {remedy}"

@@ -5,11 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, TypeAlias
 
+import numpy as np
 from casadi import MX, SX, fmax
 
-from nlp_gait.formulation import InstantPoint, Parameter, Signals, Variable
+from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
@@ -18,7 +20,7 @@ from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import make_skeleton
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import mirror_sign, tree_from
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
@@ -89,6 +91,12 @@ class Body(ABC):
     def robot(self) -> Robot:
         """The robot as the dynamics take it: links welded that never move, perhaps with the inertia of its rotors."""
         return self.motors.model
+
+    @cached_property
+    def mirror(self) -> tuple[list[int], Array]:
+        """Columns and signs (J,) that exchange left and right in the angles or torques of all joints."""
+        signs = [mirror_sign(self.robot, *pair) for pair in zip(self.joints, self.images, strict=True)]
+        return [self.joints.index(name) for name in self.images], np.array(signs)
 
     @property
     def weight(self) -> float:

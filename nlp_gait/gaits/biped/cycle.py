@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -40,24 +40,28 @@ from nlp_gait.gaits.biped.double_support import (
     make_support_box,
 )
 from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.joined_phases import (
+    BALANCE,
+    ENERGY_PER_METRE,
+    assemble_part,
+    collect_parameters,
+    join_phases,
+    list_rows_over_time,
+)
 from nlp_gait.gaits.biped.limits import Limit, Margins, make_rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
 from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
-from nlp_gait.robots.tree import mirror_sign
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"
 SPEED_M_S = 0.03  # default, of NAO
 # Energy per metre leaves the speed free; the others are means over the time of a cycle at a given speed.
 CycleObjective = Literal["energy-per-metre", "power", "torque"]
-ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
-# Limits that differ between the phases; their names begin with the phase's.
-BALANCE = tuple(f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axis in "xy")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,7 +70,7 @@ class WalkingCycle:
 
     body: Body
     variables: tuple[Variable, ...]  # of the motion, the step length last
-    phases: Mapping[PhaseName, Phase]  # ``"ssp"`` and ``"dsp"``
+    phases: Mapping[str, Phase]  # ``"ssp"`` and ``"dsp"``
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
     @property
@@ -82,15 +86,8 @@ class WalkingCycle:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of both phases; those of balance begin with the phase's name."""
-        own = {name: phase.parameters for name, phase in self.phases.items()}
-        balance = [
-            replace(parameter, name=f"{name}_{parameter.name}", description=f"{parameter.description}, {name.upper()}")
-            for name, parameters in own.items()
-            for parameter in parameters
-            if parameter.name in BALANCE
-        ]
-        both = dict.fromkeys((*own["ssp"], *own["dsp"]))
-        shared = [parameter for parameter in both if parameter.name not in BALANCE]
+        both = collect_parameters(self.phases)
+        balance, shared = ([p for p in both if p.name.endswith(BALANCE) == own] for own in (True, False))
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
         limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
         return (*self._speed_parameters(), *balance, *limit, *shared)
@@ -120,7 +117,7 @@ class WalkingCycle:
         """
         at = self.add_step(point)
         samples = {name: phase.sample(at, ops) for name, phase in self.phases.items()}
-        found = {name: self._assemble_phase(name, at, samples[name], ops) for name in self.phases}
+        found = {name: assemble_part(name, name, phase, at, samples[name], ops) for name, phase in self.phases.items()}
         times = {name: ca.fmax(at[time], LEAST_DURATION) for name, time in TIMES.items()}
         period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
         energy = sum(found[name].indexes[f"{name}_power_W"] * times[name] for name in times)
@@ -140,17 +137,6 @@ class WalkingCycle:
             },
         )
 
-    def _assemble_phase(self, name: PhaseName, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
-        """Assemble one phase, with its name before those of its rows and indexes."""
-        # A phase reads the limits of balance under their plain names.
-        own = {limit: at.positions[f"{name}_{limit}"] for limit in BALANCE}
-        part = self.phases[name].assemble(replace(at, positions={**at.positions, **own}), samples, ops)
-        return Assembly(
-            objective=part.objective,
-            constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
-            indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
-        )
-
     def _join(self, jumps: Mapping[str, MX], at: Point) -> list[Constraint]:
         """Return the rows of both switches, and of the step length where it follows from the speed."""
         limit, joints = at["torque_jump_limit_Nm"], self.body.joints
@@ -165,32 +151,18 @@ class WalkingCycle:
     @property
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
         """Both phases as functions of time."""
-        found: list[RowsOverTime] = []
-        begins: tuple[str, ...] = ()
-        for name, phase in self.phases.items():
-            for over_time in phase.rows_over_time(name, begins):
-                means = tuple(f"{name}_{index}" for index in over_time.means)
-                found.append(replace(over_time, assemble=partial(self._assemble_at, name), means=means))
-            begins = (*begins, phase.duration)
-        return tuple(found)
-
-    def _assemble_at(self, name: PhaseName, point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-        at = self.add_step(point)
-        return self._assemble_phase(name, at, self.phases[name].sample(at, ops, phases), ops)
+        parts = ((name, name, phase.duration, 1) for name, phase in self.phases.items())
+        return list_rows_over_time(parts, self.phases, lambda name, at: self.add_step(at))
 
     def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
         """Compute changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start."""
-        joints = self.body.joints
-        images = [joints.index(name) for name in self.body.images]
-        signs = DM([mirror_sign(self.body.robot, *pair) for pair in zip(joints, self.body.images, strict=True)])
-        touch_down, lift_off = double[:, 0] - single[:, -1], signs * single[images, 0] - double[:, -1]
+        images, signs = self.body.mirror
+        touch_down, lift_off = double[:, 0] - single[:, -1], DM(signs) * single[images, 0] - double[:, -1]
         return {"lift_off": lift_off, "touch_down": touch_down}
 
-    def signals(self, at: Point) -> dict[str, Signals]:
-        """Return time histories of both phases at a point of numbers; the second one's time continues the first one's."""
-        single, double = (phase.signals(self.add_step(at)) for phase in self.phases.values())
-        later = {**double.arrays, "t": single.arrays["t"][-1] + double.arrays["t"]}
-        return {"ssp": single, "dsp": replace(double, arrays=later)}
+    def signals(self, at: Point) -> Signals:
+        """Return time histories of the cycle at a point of numbers."""
+        return join_phases(phase.signals(self.add_step(at)) for phase in self.phases.values())
 
 
 def make_walking_cycle(
@@ -208,7 +180,7 @@ def make_walking_cycle(
         "ssp": (plans["ssp"], make_single_support_loads(body), ()),
         "dsp": (sharing.add_to(plans["dsp"]), sharing.loads, sharing.limits),
     }
-    phases: dict[PhaseName, Phase] = {
+    phases: dict[str, Phase] = {
         name: Phase(
             body=body,
             variables=variables,
@@ -276,7 +248,7 @@ def make_cycle_problem(
         assemble=cycle.assemble,
         grid=cycle.phases["ssp"].grid,
         rows_over_time=cycle.rows_over_time if rows_over_time else (),
-        display=Display(motion=lambda at: join_phases(cycle.signals(at)), durations=tuple(TIMES.values())),
+        display=Display(motion=cycle.signals, durations=tuple(TIMES.values())),
         hints=SolverHints(start=start),
     )
     return add_robot(problem, cycle.body, repeats=repeats)
@@ -289,15 +261,3 @@ def draw_start(names: Sequence[str], values: Mapping[str, float], rng: np.random
     step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
     x[times] *= step / (values[SPEED] * x[times].sum())
     return np.asarray(x)
-
-
-def join_phases(phases: Mapping[str, Signals]) -> Signals:
-    """Join phases; of the two samples at a switch the earlier one is kept: positions and velocities are equal."""
-    first, *others = phases.values()
-    return replace(
-        first,
-        arrays={
-            name: np.concatenate([array, *(other.arrays[name][1:] for other in others)])
-            for name, array in first.arrays.items()
-        },
-    )

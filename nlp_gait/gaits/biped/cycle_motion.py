@@ -13,7 +13,7 @@ from typing import NamedTuple
 from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Coordinate, PhaseName, read_duration
+from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, PhaseName, read_duration
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.single_support import swing_foot
@@ -38,27 +38,6 @@ class State(NamedTuple):
     hip_velocity: SX
     others: SX
     others_rate: SX
-
-
-class Cycle(NamedTuple):
-    """What the decision variables say."""
-
-    lift_off: State  # state where the right foot leaves the ground
-    touch_down: State  # state where it lands
-    lift: SX  # height of its swing [m]
-    single: SX  # time of single support [s]
-    double: SX  # time of double support [s]
-    step: SX  # length from foot to foot [m]
-    images: DM  # (k,) signs of the coordinates in a mirrored motion
-
-    @property
-    def end(self) -> State:
-        """Mirror image of lift-off, a step further: there the left foot leaves the ground."""
-        hip, velocity, others, rates = self.lift_off
-        mirror = SX([1, -1, 1])
-        return State(
-            mirror * hip + vertcat(self.step, 0, 0), mirror * velocity, self.images * others, self.images * rates
-        )
 
 
 class PhaseMotion(NamedTuple):
@@ -113,14 +92,20 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
 
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     """Return the plans of both phases."""
+    images = DM([c.image for c in body.coordinates])
+
+    def read(at: InstantPoint) -> tuple[State, State, SX]:
+        """States at lift-off and touch-down, and the step length [m]."""
+        lift_off, touch_down = (read_state(at, switch, body.coordinates) for switch in SWITCHES)
+        return lift_off, touch_down, fmax(at[STEP], LEAST_STEP)
 
     def single(at: InstantPoint) -> PhaseMotion:
-        cycle = read_cycle(at, body.coordinates)
-        return PhaseMotion(cycle.lift_off, cycle.touch_down, cycle.single, -cycle.step, cycle.step, cycle.lift)
+        lift_off, touch_down, step = read(at)
+        return PhaseMotion(lift_off, touch_down, read_duration(at, "ssp"), -step, step, at[LIFT])
 
     def double(at: InstantPoint) -> PhaseMotion:
-        cycle = read_cycle(at, body.coordinates)
-        return PhaseMotion(cycle.touch_down, cycle.end, cycle.double, cycle.step, cycle.step)
+        lift_off, touch_down, step = read(at)
+        return PhaseMotion(touch_down, mirror_state(lift_off, images, step), read_duration(at, "dsp"), step, step)
 
     return {"ssp": make_planner(body, single), "dsp": make_planner(body, double)}
 
@@ -142,12 +127,11 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion]) -> Pla
     return plan
 
 
-def read_cycle(at: InstantPoint, coordinates: Sequence[Coordinate]) -> Cycle:
-    """Cycle of the variables."""
-    lift_off, touch_down = (read_state(at, switch, coordinates) for switch in SWITCHES)
-    single, double = (read_duration(at, phase) for phase in TIMES)
-    images = DM([c.image for c in coordinates])
-    return Cycle(lift_off, touch_down, at[LIFT], single, double, fmax(at[STEP], LEAST_STEP), images)
+def mirror_state(state: State, images: DM, step: SX) -> State:
+    """Return the mirror image of a state, a step further; ``images`` are the signs (k,) of the coordinates."""
+    hip, velocity, others, rates = state
+    mirror = SX([1, -1, 1])
+    return State(mirror * hip + vertcat(step, 0, 0), mirror * velocity, images * others, images * rates)
 
 
 def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> State:

@@ -39,7 +39,7 @@ from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
-from nlp_gait.gaits.biped.recorded_motion import FINE, Motion, make_instant_function
+from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, Motion, make_instant_function
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader, Planner, Samples
 from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -135,7 +135,6 @@ class RecordedPhase(Phase):
         return make_instant_function(self.body, self.loads)
 
 
-CORNERS = ("back right", "back left", "front right", "front left")
 # Largest distance of a recorded sole from its place: rounding, and the spline between samples.
 GROUND_TOLERANCE = Parameter(
     name="ground_tolerance_m",
@@ -325,7 +324,7 @@ class RecordedCycles:
             ),
             "dsp": (StandingLimits(),),
         }
-        phases = {
+        phases: dict[str, Phase] = {
             name: RecordedPhase(
                 body=body,
                 variables=variables,

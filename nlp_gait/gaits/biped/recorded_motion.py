@@ -16,7 +16,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import mirror_sign, tree_from
+from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.simplification import simplify
 from nlp_gait.symbolic.trajectories import Motion as Trajectory
@@ -30,6 +30,7 @@ LIFTED = 2e-3  # [m]; a foot that rises by less stands
 STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed
 LEAST_SHARE = 0.02  # of the time; a shorter phase does not count
 CLOSED = 1e-3  # [rad]; a motion repeats if its end is nearer than this to the mirror image of its beginning
+CORNERS = ("back right", "back left", "front right", "front left")  # of a sole
 FINE = 400  # instants at which a whole motion is evaluated
 
 
@@ -81,9 +82,7 @@ class Motion:
 
     def mirror_image(self) -> Motion:
         """Exchange left and right."""
-        joints, images = self.body.joints, self.body.images
-        columns = [joints.index(name) for name in images]
-        signs = np.array([mirror_sign(self.body.robot, *pair) for pair in zip(joints, images, strict=True)])
+        columns, signs = self.body.mirror
         return replace(self, q=signs * self.q[:, columns], mirrored=not self.mirrored)
 
     @property

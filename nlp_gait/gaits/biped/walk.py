@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.resources import files
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -27,7 +28,6 @@ from nlp_gait.formulation import (
     Grid,
     InstantPoint,
     NumericPoint,
-    Objective,
     Parameter,
     Point,
     RowsOverTime,
@@ -37,7 +37,7 @@ from nlp_gait.formulation import (
 )
 from nlp_gait.formulation.assembly import parameters
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
-from nlp_gait.gaits.biped.cycle import BALANCE, join_phases, make_cycle_margins
+from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import (
     STEP,
     PhaseMotion,
@@ -52,6 +52,14 @@ from nlp_gait.gaits.biped.double_support import (
     make_support_box,
 )
 from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.joined_phases import (
+    ENERGY_PER_METRE,
+    STAND,
+    assemble_part,
+    collect_parameters,
+    join_phases,
+    list_rows_over_time,
+)
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
@@ -60,19 +68,17 @@ from nlp_gait.gaits.biped.single_support import make_single_support_loads
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-STAND, CYCLE_END = "stand", "cycle_end"
+CYCLE_END = "cycle_end"
 MOST_STEPS = 1000
 LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
 NO_LIMIT = 100.0  # [m/s]
 START_NOISE = 0.002  # of start points, as a share of the bounds' ranges
 STEPS = "step_count"  # parameter, so that compiled functions suit walks of any length
-ENERGY_PER_METRE = Objective(name="energy_per_metre", unit="J/m")
 # Variables of a phase besides those of its first and last state.
 DURATION, RIGHT_FROM = "duration_s", "right_from_m"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Part:
+class Part(NamedTuple):
     """A phase of the walk over the left foot, which stands at x = 0."""
 
     kind: str  # ``ssp``, ``dsp`` with a foot ahead, or ``stand`` with both feet side by side
@@ -80,35 +86,23 @@ class Part:
     end: str
     feet: tuple[int, int]  # places of the right foot at begin and end, in step lengths
     duration: str  # variable
-    lift: str = LIFT  # variable, of single support
+
+    @property
+    def lift(self) -> str:
+        """Variable of single support: height of the swing."""
+        return self.duration.replace(TIMES["ssp"], LIFT)
 
 
 # In the order of time; of the pose in which the robot stands only the limits count.
 PARTS = {
-    STAND: Part(kind=STAND, begin=STAND, end=STAND, feet=(0, 0), duration="shift_time_s"),
-    "shift": Part(kind=STAND, begin=STAND, end="start_lift_off", feet=(0, 0), duration="shift_time_s"),
-    "start_ssp": Part(
-        kind="ssp",
-        begin="start_lift_off",
-        end="start_touch_down",
-        feet=(0, 1),
-        duration=f"start_{TIMES['ssp']}",
-        lift=f"start_{LIFT}",
-    ),
-    "start_dsp": Part(
-        kind="dsp", begin="start_touch_down", end=CYCLE_END, feet=(1, 1), duration=f"start_{TIMES['dsp']}"
-    ),
-    "ssp": Part(kind="ssp", begin="lift_off", end="touch_down", feet=(-1, 1), duration=TIMES["ssp"]),
-    "dsp": Part(kind="dsp", begin="touch_down", end=CYCLE_END, feet=(1, 1), duration=TIMES["dsp"]),
-    "stop_ssp": Part(
-        kind="ssp",
-        begin="lift_off",
-        end="stop_touch_down",
-        feet=(-1, 0),
-        duration=f"stop_{TIMES['ssp']}",
-        lift=f"stop_{LIFT}",
-    ),
-    "stop_dsp": Part(kind=STAND, begin="stop_touch_down", end=STAND, feet=(0, 0), duration=f"stop_{TIMES['dsp']}"),
+    STAND: Part(STAND, STAND, STAND, (0, 0), "shift_time_s"),
+    "shift": Part(STAND, STAND, "start_lift_off", (0, 0), "shift_time_s"),
+    "start_ssp": Part("ssp", "start_lift_off", "start_touch_down", (0, 1), f"start_{TIMES['ssp']}"),
+    "start_dsp": Part("dsp", "start_touch_down", CYCLE_END, (1, 1), f"start_{TIMES['dsp']}"),
+    "ssp": Part("ssp", "lift_off", "touch_down", (-1, 1), TIMES["ssp"]),
+    "dsp": Part("dsp", "touch_down", CYCLE_END, (1, 1), TIMES["dsp"]),
+    "stop_ssp": Part("ssp", "lift_off", "stop_touch_down", (-1, 0), f"stop_{TIMES['ssp']}"),
+    "stop_dsp": Part(STAND, "stop_touch_down", STAND, (0, 0), f"stop_{TIMES['dsp']}"),
 }
 # States that are variables in addition to the cycle's, with the switch of the cycle whose bounds they have.
 STATES = {"start_lift_off": "lift_off", "start_touch_down": "touch_down", "stop_touch_down": "touch_down"}
@@ -131,28 +125,15 @@ class WholeWalk:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of all phases; those of balance begin with the kind of the phase."""
-        found: dict[str, Parameter] = {}
-        for kind, phase in self.phases.items():
-            for parameter in phase.parameters:
-                if parameter.name in BALANCE:
-                    text = f"{parameter.description}, {'feet side by side' if kind == STAND else kind.upper()}"
-                    parameter = replace(parameter, name=f"{kind}_{parameter.name}", description=text)
-                found.setdefault(parameter.name, parameter)
         speeds = parameters(
             (LEAST_SPEED, "m/s", 0.0, "least speed of the inner steps", 0.0, NO_LIMIT),
-            (
-                GREATEST_SPEED,
-                "m/s",
-                NO_LIMIT,
-                "greatest speed of the inner steps; the default is no limit",
-                0.0,
-                NO_LIMIT,
-            ),
+            (GREATEST_SPEED, "m/s", NO_LIMIT, "greatest speed of the inner steps (no limit by default)", 0.0, NO_LIMIT),
         )
         count = parameters(
             (STEPS, "1", float(self.steps), "number of steps; set by the option steps", self.steps, self.steps)
         )
-        return (*count, *speeds, *sorted(found.values(), key=lambda p: p.name.endswith((".lower", ".upper"))))
+        found = collect_parameters(self.phases)
+        return (*count, *speeds, *sorted(found, key=lambda p: p.name.endswith((".lower", ".upper"))))
 
     def assemble(self, at: Point, ops: Nonsmooth) -> Assembly:
         """Return energy per metre, rows and indexes."""
@@ -162,7 +143,10 @@ class WholeWalk:
             names = [name for name, part in PARTS.items() if part.kind in kinds]
             several = self.phases[kinds[0]].sample_several([points[name] for name in names], ops)
             samples |= dict(zip(names, several, strict=True))
-        found = {name: self._assemble_part(name, points[name], samples[name], ops) for name in PARTS}
+        found = {
+            name: assemble_part(name, part.kind, self.phases[part.kind], points[name], samples[name], ops)
+            for name, part in PARTS.items()
+        }
         times = {name: point[DURATION] for name, point in points.items()}
         energies = {name: found[name].indexes[f"{name}_power_W"] * times[name] for name in PARTS}
         inner = at[STEPS] - 2
@@ -217,46 +201,18 @@ class WholeWalk:
         images = [c.image for c in coordinates for _ in range(2)]
         return [x + at[STEP], -y, z, vx, -vy, vz, *(i * a for i, a in zip(images, angles, strict=True))]
 
-    def _assemble_part(self, name: str, point: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
-        """Assemble one phase, with its name before those of its rows and indexes."""
-        kind = PARTS[name].kind
-        limits = {limit: point.positions[f"{kind}_{limit}"] for limit in BALANCE}  # read under their plain names
-        at = replace(point, positions={**point.positions, **limits})
-        part = self.phases[kind].assemble(at, samples, ops)
-        return Assembly(
-            objective=part.objective,
-            constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),
-            indexes={f"{name}_{key}": value for key, value in part.indexes.items()},
-        )
-
     @property
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
         """All phases as functions of time; of the inner steps the first one."""
-        found: list[RowsOverTime] = []
-        begins: tuple[str, ...] = ()
-        for name, count in self.counts.items():
-            part, phase = PARTS[name], replace(self.phases[PARTS[name].kind], duration=PARTS[name].duration)
-            for rows in phase.rows_over_time(name, begins) if count else ():
-                means = tuple(f"{name}_{index}" for index in rows.means)
-                found.append(replace(rows, assemble=partial(self._assemble_at, name), means=means))
-            begins = (*begins, *[part.duration] * count)
-        return tuple(found)
-
-    def _assemble_at(self, name: str, at: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-        point = self.read_part(name, at)
-        samples = self.phases[PARTS[name].kind].sample(point, ops, phases)
-        return self._assemble_part(name, point, samples, ops)
+        counts = self.counts
+        parts = ((name, part.kind, part.duration, counts[name]) for name, part in PARTS.items())
+        return list_rows_over_time(parts, self.phases, self.read_part)
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories of the whole walk at a point of numbers."""
 
         def join(*names: str) -> Signals:
-            parts, begin = {}, 0.0
-            for name in names:
-                signals = self.phases[PARTS[name].kind].signals(self.read_part(name, at))
-                parts[name] = replace(signals, arrays={**signals.arrays, "t": begin + signals.arrays["t"]})
-                begin = float(parts[name].arrays["t"][-1])
-            return join_phases(parts)
+            return join_phases(self.phases[PARTS[name].kind].signals(self.read_part(name, at)) for name in names)
 
         inner = [join("ssp", "dsp")] * (self.steps - 2)
         steps = [join("shift", "start_ssp", "start_dsp"), *inner, join("stop_ssp", "stop_dsp")]
@@ -379,9 +335,6 @@ def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float]
     for name in found:
         same = name.replace("start_", "").replace("stop_", "").replace(STAND, "lift_off")
         found[name] = cycle.get(TIMES["dsp"] if name == "shift_time_s" else same, found[name])
-    for name in (
-        f"hip_x_{STAND}_m",
-        "hip_x_start_lift_off_m",
-    ):  # a lift-off between both feet is ahead of one side by side
-        found[name] = 0.2 * found[STEP]
+    # A lift-off between both feet is ahead of one side by side.
+    found |= dict.fromkeys((f"hip_x_{STAND}_m", "hip_x_start_lift_off_m"), 0.2 * found[STEP])
     return np.asarray(np.clip(list(found.values()), walk.lower, walk.upper))

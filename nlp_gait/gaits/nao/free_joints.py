@@ -29,7 +29,7 @@ from nlp_gait.gaits.biped.limits import (
     make_rows_at_samples,
 )
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.recorded_motion import FreeParts, locate_free_parts
+from nlp_gait.gaits.biped.recorded_motion import CORNERS, FreeParts, locate_free_parts
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.biped.single_support import make_single_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
@@ -43,7 +43,6 @@ YAW_PITCH = "HipYawPitch"  # curve of both hips
 CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING["ssp"])
 MOVING = (*YAW_PITCHES, *CURVES[1:])
 OTHERS = (YAW_PITCHES[0], *ARM_SWING["ssp"])
-CORNERS = ("back right", "back left", "front right", "front left")
 FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which free joints are fitted
 
 

@@ -59,8 +59,7 @@ def nao_ssp(
     check_step_length(step_length_m)
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
     power_form = None
-    paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and arms == "carried"
-    if paper and samples_per_interval < 2:
+    if (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS and samples_per_interval < 2:
         stance = place_stance(body, step_length_m)
         power_form = power_form_maker(
             body.robot, partial(single_support_instants, body.robot, *stance, ARM_SWING["ssp"])
@@ -101,7 +100,7 @@ def nao_dsp(
         )
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
     power_form = None
-    paper = (derivatives, trajectory, objective, motors) == FORM_OPTIONS and arms == "carried"
+    paper = (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS
     if paper and samples_per_interval < 2 and torso_share != "free":
         soles = place_soles(body, step_length_m)
         places = (soles, hip_ends(body, soles), ARM_SWING["dsp"])
