@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from docs.pages import algorithms, api, commands, gallery, model, papers, problems  # noqa: E402
+from docs.pages import algorithms, api, commands, gallery, model, papers, playground, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
 project = "nlp-gait"
@@ -53,6 +53,8 @@ html_theme = "furo"
 html_title = f"nlp-gait {release}"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_extra_path = [f"generated/{playground.FOLDER}"]
+(ROOT / "docs" / html_extra_path[0]).mkdir(parents=True, exist_ok=True)
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
@@ -70,7 +72,7 @@ def setup(app):
 
 
 def write_pages(app):
-    """Pages of problems, papers, algorithms, commands and names."""
+    """Pages of problems, papers, algorithms, commands and names, and the playground."""
     folder = Path(app.srcdir) / "generated"
-    for part in (problems, papers, algorithms, commands, api, model):
+    for part in (problems, papers, algorithms, commands, api, model, playground):
         part.write(folder)

@@ -65,19 +65,28 @@ def _at_zero(robot: Robot, link: str) -> Array:
     return np.sum([(0.0, 0.0, 0.0), *(joint.origin_m for joint in robot.path_to_root(link))], axis=0)
 
 
-def locate_links(robot: Robot, signals: Signals) -> dict[str, Array]:
-    """Return world positions (T, 3) of every link's joint, and of its tip, the centre of mass, seen from the flat left foot."""
-    q, base = SX.sym("q", len(signals.joints)), SX.sym("base", 3)
-    angles = {name: SX(0) for name in robot.joints} | {name: q[i] for i, name in enumerate(signals.joints)}
+def place_links(robot: Robot, angles: Mapping[str, SX], left_ankle: SX) -> dict[str, SX]:
+    """Return world positions (3,) of every link's joint, and of its tip, the centre of mass, seen from the flat left foot.
+
+    Joints without an angle [rad] are at zero; the left ankle is (3,) [m].
+    """
     tree = tree_from(robot, robot.feet[LEFT].link)
     places: dict[str, SX] = {}
-    for body, pose in zip(tree, forward_kinematics(tree, angles, base), strict=True):
+    poses = forward_kinematics(tree, dict.fromkeys(robot.joints, SX(0)) | dict(angles), left_ankle)
+    for body, pose in zip(tree, poses, strict=True):
         # A body's reference point is the joint by which it is reached; its own joint is elsewhere where that leads up.
         own = robot.joint_to.get(body.link.name)
         upwards = body.joint is not None and body.direction < 0
         offset = np.array(body.com_offset_m) - np.array(body.link.com_m) if upwards or own is None else np.zeros(3)
         places[body.link.name] = pose.position + pose.rotation @ ca.DM(offset)
         places[f"{body.link.name} tip"] = pose.com
+    return places
+
+
+def locate_links(robot: Robot, signals: Signals) -> dict[str, Array]:
+    """Return the positions (T, 3) of ``place_links`` over time."""
+    q, base = SX.sym("q", len(signals.joints)), SX.sym("base", 3)
+    places = place_links(robot, dict(zip(signals.joints, ca.vertsplit(q), strict=True)), base)
     function = ca.Function("places", [q, base], list(places.values()))
     standing = signals.arrays["left_foot"] + np.array([0.0, 0.0, robot.feet[LEFT].ankle_height_m])
     values = function.map(len(signals.arrays["t"]))(signals.arrays["q"].T, standing.T)

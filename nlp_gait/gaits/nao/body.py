@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from casadi import DM, MX, SX, cos, fmax, vertcat, vertsplit
@@ -302,18 +302,20 @@ def make_skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skel
     return lambda signals, parameters: _draw(robot, signals)
 
 
-def _draw(robot: Robot, signals: Signals) -> Skeleton:
-    arrays = signals.arrays
-    at = skeleton.locate_links(robot, signals)
-    torso, neck = at[robot.root], at["Neck"]
-    shoulders = (at["LShoulder"] + at["RShoulder"]) / 2
-    limbs = [Limb(side=TRUNK, points=np.stack([torso, shoulders, neck, at["Head tip"]], axis=1))]
-    soles = []
+def connect_joints(robot: Robot, at: Mapping[str, Any], feet: Mapping[str, Any]) -> list[tuple[str, list[Any]]]:
+    """Return the side and the points of each line, from places of links and under the ankles: (T, 3) numbers or (3,) symbols."""
+    torso, shoulders = at[robot.root], (at["LShoulder"] + at["RShoulder"]) / 2
+    lines = [(TRUNK, [torso, shoulders, at["Neck"], at["Head tip"]])]
     for side, letter in LETTER.items():
-        foot = robot.feet[side]
-        leg = [torso, *(at[f"{letter}{link}"] for link in ("Pelvis", "Tibia")), at[foot.link]]
-        arm = [shoulders, *(at[f"{letter}{link}"] for link in ("Shoulder", "Elbow")), at[f"{letter.lower()}_wrist tip"]]
-        sole_centre = arrays[f"{side}_foot"]
-        limbs += [Limb(side=side, points=np.stack(part, axis=1)) for part in ([*leg, sole_centre], arm)]
-        soles.append(skeleton.make_level_sole(robot, side, sole_centre))
-    return make_flat_skeleton(signals, limbs, soles)
+        leg = [at[f"{letter}{link}"] for link in ("Pelvis", "Tibia")]
+        arm = [at[f"{letter}{link}"] for link in ("Shoulder", "Elbow")]
+        lines.append((side, [torso, *leg, at[robot.feet[side].link], feet[side]]))
+        lines.append((side, [shoulders, *arm, at[f"{letter.lower()}_wrist tip"]]))
+    return lines
+
+
+def _draw(robot: Robot, signals: Signals) -> Skeleton:
+    feet = {side: signals.arrays[f"{side}_foot"] for side in LETTER}
+    lines = connect_joints(robot, skeleton.locate_links(robot, signals), feet)
+    limbs = [Limb(side=side, points=np.stack(points, axis=1)) for side, points in lines]
+    return make_flat_skeleton(signals, limbs, [skeleton.make_level_sole(robot, *foot) for foot in feet.items()])
