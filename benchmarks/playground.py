@@ -1,6 +1,6 @@
 """Candidates per second in the playground, in a real browser: ``python -m benchmarks.playground``.
 
-Needs the extras compiler and test, and a Chromium. Prints the speed of three races, each of 750,000 evaluations, as the page shows
+Needs the extras compiler and test, and a Chromium. Prints the speed of three races of 750,000 evaluations, as the page shows
 it, and the speed of the module alone, without searches and drawing.
 """
 
