@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from nlp_gait.formulation import GaitProblem, Parameter
+from nlp_gait.formulation import GaitProblem
 
 ROUNDING = 1e-12  # a share below this is shown as zero
 SIX_DECIMALS = ".6f"
@@ -110,10 +110,10 @@ MASS = NaturalStep(SHARE, f"{100 * SHARE:g} %")
 LENGTH = BY_UNIT["m"]
 
 
-def choose_natural_step(parameter: Parameter, value: float) -> NaturalStep:
-    """Return the step of a parameter at its current value."""
-    if parameter.unit in BY_UNIT:
-        return BY_UNIT[parameter.unit]
+def choose_natural_step(unit: str, value: float) -> NaturalStep:
+    """Return the step of a quantity at its current value."""
+    if unit in BY_UNIT:
+        return BY_UNIT[unit]
     if value:
         return NaturalStep(SHARE * abs(value), MASS.words)
-    return NaturalStep(SHARE, f"{SHARE:g} {parameter.unit}")
+    return NaturalStep(SHARE, f"{SHARE:g} {unit}")

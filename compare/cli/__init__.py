@@ -18,7 +18,7 @@ from compare.cli.evaluate import evaluate
 from compare.cli.exchange import archive, cite, import_results, logs, verify
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
-from compare.cli.questions.optima import certainty, motions, motors, prices, robust, sweep, walk
+from compare.cli.questions.optima import capabilities, certainty, motions, motors, prices, robust, sweep, walk
 from compare.cli.questions.pareto import pareto
 from compare.cli.report import report, reproduce
 from compare.cli.simulate import simulate
@@ -27,7 +27,7 @@ from compare.cli.solve import plan, search, solve
 PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, plan, search),
     "Comparison": (compare, import_results, report, reproduce, bench, verify, archive),
-    "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk),
+    "Questions": (sweep, prices, pareto, certainty, motions, motors, robust, walk, capabilities),
     "Show and share": (simulate, animate, export, logs, export_objective, export_solver, cite),
 }
 

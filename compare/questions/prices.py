@@ -100,7 +100,9 @@ def price_parameters(optimum: Optimum) -> list[Price]:
                 continue
             name = stem
         prices.append(
-            _make_price(problem, derivatives, i, name, parameter.unit, value, choose_natural_step(parameter, value))
+            _make_price(
+                problem, derivatives, i, name, parameter.unit, value, choose_natural_step(parameter.unit, value)
+            )
         )
     return prices
 

@@ -175,6 +175,19 @@ def sweep(
 
 
 @command
+def capabilities(*, starts: int = 3, seed: int = 0, problem: AnyCycle, output: Output) -> None:
+    """Report the highest walking speed, the longest step and the highest lift of a foot, each with the limits that stop it.
+
+    Bounds on times and velocities that this package scales from NAO's are named as such, and moved where they stop the robot.
+
+    Examples: `nlp-gait capabilities`, `nlp-gait capabilities humanoid-cycle --robot my.urdf --intervals 5`
+    """
+    from compare.questions.capabilities import Capabilities
+
+    output.answer(Capabilities(problem=problem.make_spec(problem.name).load(), starts=starts, seed=seed))
+
+
+@command
 def walk(
     *,
     over: str | None = None,

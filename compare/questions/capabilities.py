@@ -1,0 +1,236 @@
+"""What a robot can do: its highest walking speed, longest step and highest lift of a foot, and the limits that stop it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar, NamedTuple
+
+from compare.analysis.units import choose_natural_step, join_words, with_unit
+from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
+from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solvers.solver import Solver
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Assembly, GaitProblem, Objective, Point
+from nlp_gait.formulation.solution import ActiveConstraint, Solution
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+
+class Goal(NamedTuple):
+    """A quantity to be maximised: an index or a variable of a walking cycle."""
+
+    words: str
+    quantity: str
+    unit: str
+
+
+GOALS = (
+    Goal("highest speed", "speed_m_s", "m/s"),
+    Goal("longest step", "step_length_m", "m"),
+    Goal("highest lift of a foot", "swing_height_m", "m"),
+)
+# Bounds on variables of these units, and the upper ones on the goals, are ours: of NAO, by Froude scaling. Others are clearances.
+OUR_UNITS = ("s", "m/s", "rad/s")
+FACTOR, MOST_ROUNDS = 2.0, 6  # by which our bounds are moved in each round, and the number of rounds
+SHOWN = 4  # limits in a sentence
+FREE = 1e-4  # share of the value: a limit whose natural step changes it by less does not stop the robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A limit that stops the robot."""
+
+    name: str  #: of the row or bound
+    side: str  #: ``"lower"`` or ``"upper"``
+    bound: float  #: [unit]
+    unit: str
+    gain: float  #: change of the quantity for a natural step of the limit, in its own unit
+    ours: bool  #: whether it is one of our bounds rather than the robot's
+
+
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """The greatest value with some of our bounds moved outwards."""
+
+    value: float
+    stops: tuple[Stop, ...]  #: most effective one first
+    moved: Mapping[str, float]  #: parameters of our bounds, by name
+    x: Mapping[str, float]  #: the gait, by variable name
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capability:
+    """How far one quantity goes."""
+
+    words: str
+    quantity: str
+    unit: str
+    rounds: tuple[Round, ...]  #: the first one within all bounds; empty if no gait was found
+    end: str  #: why there are no more rounds
+
+    @property
+    def within(self) -> Round | None:
+        """Within all bounds."""
+        return self.rounds[0] if self.rounds else None
+
+    @property
+    def beyond(self) -> Round | None:
+        """With our bounds moved; None if they do not stop the robot."""
+        return self.rounds[-1] if len(self.rounds) > 1 else None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Capabilities(Question[tuple[Capability, ...]]):
+    """What can this robot do, and what stops it?"""
+
+    name: ClassVar[str] = "capabilities"
+    counts: ClassVar[str] = "solves"
+
+    starts: int = 3  #: random starts for the cheapest cycle, from which each quantity is raised
+    seed: int = 0  #: of the starts
+
+    def __post_init__(self) -> None:
+        """Require a walking cycle whose step length is free."""
+        missing = [goal.quantity for goal in GOALS[1:] if goal.quantity not in self.problem.names]
+        if missing:
+            raise InputError(
+                f"{self.problem.name} has no variable {missing[0]!r}; use nao-cycle or humanoid-cycle with its default objective"
+            )
+
+    def find(self, work: Work) -> Iterator[tuple[Capability, ...]]:
+        solver = work.solver()
+        cheapest = solve(self.problem, starts=self.starts, seed=self.seed, solver=solver)
+        work.progress("cheapest cycle")
+        if not cheapest.feasible:
+            raise InputError(
+                f"{self.problem.name}: no feasible cycle was found from {self.starts} starts; {cheapest.status}"
+            )
+        found: tuple[Capability, ...] = ()
+        for goal in GOALS:
+            found = (*found, raise_quantity(self.problem, goal, cheapest.x, solver, work))
+            yield found
+
+    def report(self, findings: tuple[Capability, ...]) -> Answer:
+        stem = f"{self.problem.name}-capabilities"
+        columns = {
+            "quantity": lambda c: c.words,
+            "within our bounds": lambda c: with_unit(c.within and c.within.value, c.unit, ".4g"),
+            "stopped by": lambda c: describe_stops(c.within),
+            "our bounds moved": lambda c: with_unit(c.beyond and c.beyond.value, c.unit, ".4g"),
+            "then stopped by": lambda c: describe_stops(c.beyond),
+        }
+        rows = [
+            (c.quantity, k, item.value, s.name, s.side, s.bound, s.unit, s.gain, "ours" if s.ours else "robot's")
+            for c in findings
+            for k, item in enumerate(c.rounds)
+            for s in item.stops
+        ]
+        header = ("quantity", "round", "value", "limit", "side", "bound", "unit", "gain_per_natural_step", "origin")
+        robot = self.problem.display.robot
+        return Answer(
+            stem=stem,
+            title=f"What {robot.name if robot is not None else self.problem.name} can do",
+            verdict=tuple(describe_capability(c) for c in findings),
+            parts=[
+                make_table("Greatest values of a walking cycle, and the limits that stop it", findings, columns),
+                "Each value is the maximum of a walking cycle under all limits of the problem; limits are listed by what a "
+                "natural step of each would gain. Bounds on times, velocities, step and lift are ours, scaled from NAO's by "
+                f"Froude's rule: where they stop the robot, they are moved by a factor of {FACTOR:g}, again and again.",
+                *(f"{c.words}: {c.end}." for c in findings),
+                make_csv_table(stem, header, rows),
+            ],
+            data={"problem": self.problem.name, "capabilities": [asdict(c) for c in findings]},
+        )
+
+    def failures(self, findings: tuple[Capability, ...]) -> list[str]:
+        return [f"{c.words}: {c.end}" for c in findings if c.within is None]
+
+
+def raise_quantity(problem: GaitProblem, goal: Goal, x: Mapping[str, float], solver: Solver, work: Work) -> Capability:
+    """Maximise a quantity from a feasible gait x; while our bounds stop it, move them outwards and continue."""
+    raised = maximise(problem, goal)
+    rounds: list[Round] = []
+    moved: dict[str, float] = {}
+    while len(rounds) < MOST_ROUNDS:
+        solution = solve(raised, x0=x, solver=solver, workers=1)
+        work.progress(f"{goal.words} {solution.objective:.4g} {goal.unit}")
+        if not solution.converged:
+            end = f"the next solve ends without a gait ({solution.status})"
+            break
+        x, stops = solution.x, list_stops(solution)
+        rounds.append(Round(value=solution.objective, stops=stops, moved=dict(moved), x=x))
+        change = {name: value for stop in stops if stop.ours for name, value in [move_bound(raised, stop)]}
+        if not change:
+            end = "none of our bounds stops it"
+            break
+        moved |= change
+        raised = raised.with_values(**change)
+    else:
+        end = f"our bounds still stop it after {MOST_ROUNDS} rounds"
+    return Capability(words=goal.words, quantity=goal.quantity, unit=goal.unit, rounds=tuple(rounds), end=end)
+
+
+def maximise(problem: GaitProblem, goal: Goal) -> GaitProblem:
+    """Return the problem that maximises a quantity under the same constraints."""
+
+    def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
+        own = assembly.indexes.get(goal.quantity)
+        return replace(assembly, objective=point[goal.quantity] if own is None else own)
+
+    objective = Objective(name=goal.quantity, unit=goal.unit, sense="maximise")
+    return problem.derive(name=f"{problem.name}-{goal.quantity}", objective=objective, change=change)
+
+
+def list_stops(solution: Solution) -> tuple[Stop, ...]:
+    """Return the limits that stop a maximum, the one whose natural step gains most first."""
+    stops = [make_stop(active) for active in solution.active_constraints]
+    effective = (stop for stop in stops if abs(stop.gain) > FREE * abs(solution.objective))
+    return tuple(sorted(effective, key=lambda stop: -abs(stop.gain)))
+
+
+def make_stop(active: ActiveConstraint) -> Stop:
+    """Return an active constraint as a stop."""
+    variable = active.name.removeprefix("bounds[").removesuffix("]") if active.name.startswith("bounds[") else ""
+    is_goal = any(variable == goal.quantity for goal in GOALS)
+    return Stop(
+        name=active.name,
+        side=active.side,
+        bound=active.bound,
+        unit=active.unit,
+        gain=active.price * choose_natural_step(active.unit, active.bound).size,
+        ours=bool(variable)
+        and active.bound != 0.0
+        and (active.unit in OUR_UNITS or is_goal and active.side == "upper"),
+    )
+
+
+def move_bound(problem: GaitProblem, stop: Stop) -> tuple[str, float]:
+    """Return the parameter of one of our bounds and its value further out; times stay positive."""
+    variable = stop.name.removeprefix("bounds[").removesuffix("]")
+    outwards = (stop.side == "upper") == (stop.bound > 0.0)
+    wider = stop.bound * FACTOR if outwards else stop.bound / FACTOR
+    return f"{variable}.{stop.side}", wider
+
+
+def describe_stops(found: Round | None) -> str:
+    """Return the most effective limits in words, without the samples of their rows."""
+    if found is None:
+        return "-"
+    names = dict.fromkeys(
+        f"{stop.name.partition(',')[0].rstrip(']')}{']' * ('[' in stop.name)}" for stop in found.stops
+    )
+    return join_words(list(names)[:SHOWN]) or "no limit with a price"
+
+
+def describe_capability(found: Capability) -> str:
+    """Return a capability in a sentence."""
+    if found.within is None:
+        return f"{found.words}: {found.end}"
+    value = with_unit(found.within.value, found.unit, ".4g")
+    sentence = f"{found.words}: {value}, stopped by {describe_stops(found.within)}"
+    if found.beyond is None:
+        return f"{sentence}."
+    ours = join_words(sorted({name.rpartition(".")[0] for name in found.beyond.moved}))
+    further = with_unit(found.beyond.value, found.unit, ".4g")
+    stops = describe_stops(found.beyond)
+    return f"{sentence}; bounds of ours among them. With wider ones ({ours}): {further}, stopped by {stops}."
