@@ -21,6 +21,7 @@ from compare.report.document import Table
 from nlp_gait.decoding import decode
 
 CALL = ("check", "part", "arguments")  # keys of a claim in its file that say what decides, see ``bind_checks``
+ROUNDING = 1e-9  # of a tolerance, so that a value at its edge is within it
 SIGNIFICANT = 0.05  # p-value below which a difference is not put down to chance
 T = TypeVar("T")
 
@@ -200,7 +201,7 @@ def _parse_size(text: str) -> tuple[float, str]:
 def _find_within(claim: Claim, printed: ArrayLike, ours: ArrayLike) -> np.ndarray[Any, np.dtype[np.bool_]]:
     size, unit = _parse_size(claim.tolerance)
     scale = np.abs(printed) / 100 if unit == "%" else 1.0
-    return np.atleast_1d(np.abs(np.subtract(ours, printed)) <= size * scale)
+    return np.atleast_1d(np.abs(np.subtract(ours, printed)) <= size * scale * (1 + ROUNDING))
 
 
 def _describe_sizes(within: np.ndarray[Any, np.dtype[np.bool_]], printed: ArrayLike, ours: ArrayLike) -> str:

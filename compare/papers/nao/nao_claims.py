@@ -14,12 +14,21 @@ from typing import Any, Literal
 import numpy as np
 
 from compare.analysis.record_statistics import a12, rank_sum_normal
-from compare.papers import claims
-from compare.papers.claims import Check, Verdict, compare_changes, decide, require_change, require_significance
+from compare.papers.claims import (
+    SIGNIFICANT,
+    Check,
+    Verdict,
+    compare_changes,
+    compare_levels,
+    decide,
+    require_change,
+    require_significance,
+)
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
-from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
+from compare.papers.nao.nao_runs import ALGORITHMS
 from compare.papers.paper_runs import compute_range
+from nlp_gait.formulation import Array
 
 # A solution that costs this share more than the optimum is as good for a walker.
 NEARLY_OPTIMAL = 0.01
@@ -45,6 +54,13 @@ def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
     return require_significance(check, RANK_SUM, test.p_two_sided)
 
 
+def _check_left_tail(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
+    """Check by the left-tailed test whether a swarm's median is less than GA's; it does not hold if the other tail is shown."""
+    p = phase.test(f"{swarm}{kind}", f"ga{kind}").p_less
+    shown = {p < SIGNIFICANT: Verdict.HOLDS, p > 1 - SIGNIFICANT: Verdict.FAILS}
+    return decide(shown.get(True, Verdict.NOT_SHOWN), swarm=NAMES[swarm], p_less=p)
+
+
 def _check_each_run(phase: PhaseFindings, swarm: str) -> Check:
     pairs = list(zip(phase.final_powers(swarm), phase.final_powers("ga"), strict=True))
     won = sum(pso < ga for pso, ga in pairs)
@@ -59,12 +75,15 @@ def _check_near_least(phase: PhaseFindings) -> Check:
     return decide([above["ga"] < share for name, share in above.items() if name != "ga"], found=words)
 
 
-def _check_alike(phase: PhaseFindings, swarm: str) -> Check:
-    """Check whether a swarm's and GA's median solutions differ by no more than the printed ones: of the ranges [%]."""
+def _check_alike(phase: PhaseFindings, swarm: str, first: int = 0, last: int = 9) -> Check:
+    """Check whether a swarm's and GA's median solutions differ by no more than the printed ones: of the ranges [%].
+
+    ``first`` and ``last`` bound the variables compared, by position.
+    """
     printed = [np.array(phase.paper.optima[name].x) for name in ALGORITHMS]
     ours = [np.array(list(phase.median(name).x.values())) for name in (swarm, "ga")]
     width = phase.problem.upper - phase.problem.lower
-    apart = [100 * float((np.abs(a - b) / width).max()) for a, b in (printed, ours)]
+    apart = [100 * float((np.abs(a - b) / width)[first:last].max()) for a, b in (printed, ours)]
     return decide(apart[1] <= apart[0], swarm=NAMES[swarm], printed=apart[0], ours=apart[1])
 
 
@@ -74,7 +93,7 @@ def _check_statistic(phase: PhaseFindings) -> Check:
     z = (printed.rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(variance)
     p = math.erfc(abs(z) / math.sqrt(2))
     both = [printed.z, printed.p_two_sided, printed.p_less]
-    return claims.compare_levels(both, [z, p, p / 2], test=printed, z=z, p_both=p, p_less=p / 2)
+    return compare_levels(both, [z, p, p / 2], test=printed, z=z, p_both=p, p_less=p / 2)
 
 
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
@@ -89,8 +108,23 @@ def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
 def _check_same_optimum(phase: PhaseFindings, swarm: str) -> Check:
     gaps = 100 * (np.array(phase.final_powers(swarm)) / phase.best - 1)
     within = gaps <= 100 * NEARLY_OPTIMAL
-    ends = {"low": gaps.min(), "high": gaps.max(), "within": within.sum(), "runs": len(gaps)}
+    best = [objective or math.inf for objective in phase.median(swarm).history.objective]
+    reached = [k for k, power in enumerate(best, start=1) if power <= phase.best * (1 + NEARLY_OPTIMAL)]
+    after = f"is within 1 % from generation {reached[0]} on" if reached else "is never within 1 %"
+    ends = {"low": gaps.min(), "high": gaps.max(), "within": within.sum(), "runs": len(gaps), "after": after}
     return decide(bool(within.all()), swarm=NAMES[swarm], **ends)
+
+
+def _check_at_bounds(phase: PhaseFindings, algorithm: str, ends: Mapping[str, int]) -> Check:
+    """Check how far variables of a search's median run are from the lower (0) or upper (1) bounds, of the bounds' range [%]."""
+    problem, x = phase.problem, phase.median(algorithm).x
+    far = {}
+    for name, end in ends.items():
+        i = problem.names.index(name)
+        share = (x[name] - problem.lower[i]) / (problem.upper[i] - problem.lower[i])
+        far[f"x{i + 1}"] = 100 * abs(float(share) - end)
+    words = ", ".join(f"{symbol} {share:.1f} %" for symbol, share in far.items())
+    return compare_levels(np.zeros(len(far)), list(far.values()), search=NAMES[algorithm], found=words)
 
 
 def _check_falling(phase: PhaseFindings, over: Literal["hip", "time"]) -> Check:
@@ -122,77 +156,97 @@ def _compute_lead(values: dict[str, float]) -> float:
 
 
 def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -> Check:
-    low, high = findings.swing_power(0.015), findings.swing_power(height_m)
-    printed = 100 * (SWING_POWER_W[algorithm][height_m] / SWING_POWER_W[algorithm][0.015] - 1)
-    ours = 100 * (high / low - 1)
-    rises = _describe_rises(findings, height_m)
-    return compare_changes(printed, ours, low=low, high=high, rise=ours, printed_rise=printed, rises=rises)
-
-
-def _describe_rises(findings: NaoFindings, height_m: float) -> str:
-    """Return how much more than near 0.015 m the cheapest solution near a height costs, in words by search and runs."""
-    rises = []
-    for name in SEARCHES:
-        for words, run in (("all runs", None), ("median run", findings.ssp.median_run(name))):
-            low, high = (
-                findings.ssp.points[name].cheapest_near(SWING_HEIGHT, at, 5e-4, run) for at in (0.015, height_m)
-            )
-            rise = "none found" if math.isnan(high / low) else f"{100 * (high / low - 1):+.1f} %"
-            rises.append(f"{NAMES[name]}, {words} {rise}")
-    return "; ".join(rises)
-
-
-def _check_swing_rise(findings: NaoFindings, algorithm: str) -> Check:
-    """Check how much steeper power rises above 0.024 m than below it [%]."""
-    printed, ours = SWING_POWER_W[algorithm], {point.at: point.power_W for point in findings.swing}
-    steeper, ours_steeper = (
-        (power[0.028] - power[0.024]) / (power[0.024] - power[0.015]) * 9 / 4 for power in (printed, ours)
+    """Check how much more than its least power the median run of a search needs at a swing height [%]."""
+    ssp, at = findings.ssp, PAPER.swing_heights_m.index(height_m)
+    printed = SWING_POWER_W["ga" if algorithm == "ga" else "pso"]
+    printed_rise = 100 * (printed[height_m] / printed[0.015] - 1)
+    middle, every = (ssp.list_swing_powers(algorithm, whole=whole)[at] for whole in (False, True))
+    least = ssp.final_powers(algorithm)
+    rises = [100 * (middle / float(np.median(least)) - 1), 100 * (every / min(least) - 1)]
+    true = 100 * (findings.swing_power(height_m) / findings.swing_power(0.015) - 1)
+    values = {"search": NAMES[algorithm], "height": height_m, "true": true, "printed_rise": printed_rise}
+    values |= {"rise": _describe_change(rises[0]), "every": _describe_change(rises[1])}
+    return (
+        decide(Verdict.UNTESTABLE, **values)
+        if math.isnan(rises[0])
+        else compare_changes(printed_rise, rises[0], **values)
     )
-    rise, found = (100 * (power[0.028] / power[0.015] - 1) for power in (printed, ours))
-    values = {"rise": rise, "found": found, "steeper": steeper, "rises": _describe_rises(findings, 0.028)}
-    return require_change(100 * (ours_steeper - 1), ours=ours_steeper, **values)
+
+
+def _describe_change(change: float) -> str:
+    """Return a change [%] in words; NaN where a history holds no solution."""
+    return "none found" if math.isnan(change) else f"{change:+.1f} %"
+
+
+def _check_swing_beyond(findings: NaoFindings) -> Check:
+    """Check how much more IPOPT's optimum costs at the greatest swing height of Table 7 than at 0.024 m [%]."""
+    low, high = findings.swing_power(0.024), findings.swing_power(0.028)
+    return require_change(100 * (high / low - 1), low=low, high=high, rise=100 * (high / low - 1))
+
+
+def _compute_swing_leads(phase: PhaseFindings, swarm: str, *, whole: bool) -> Array:
+    """Return how much more GA's cheapest solution near each swing height needs than a swarm's [%]."""
+    pso, ga = (phase.list_swing_powers(name, whole=whole) for name in (swarm, "ga"))
+    return np.asarray(100 * (ga / pso - 1))
 
 
 def _check_swing_heights(phase: PhaseFindings, swarm: str) -> Check:
-    """Check how much more GA's cheapest solution near each swing height needs than a swarm's, over all runs [%]."""
-    leads = []
-    for at in PAPER.swing_heights_m:
-        pso, ga = (phase.points[name].cheapest_near(SWING_HEIGHT, at, 5e-4) for name in (swarm, "ga"))
-        leads.append(100 * (ga / pso - 1))
-    words = ["none found" if math.isnan(lead) else f"{lead:+.1f} %" for lead in leads]
-    found = ", ".join(f"{word} at {at:.3f} m" for word, at in zip(words, PAPER.swing_heights_m, strict=True))
-    return require_change(leads, swarm=NAMES[swarm], leads=found)
+    """Check that GA needs more at each height, in the median runs [%]; where one has no solution both outcomes are tried."""
+    leads = [_compute_swing_leads(phase, swarm, whole=whole) for whole in (False, True)]
+    texts = (
+        ", ".join(f"{_describe_change(v)} at {at:.3f} m" for v, at in zip(row, PAPER.swing_heights_m, strict=True))
+        for row in leads
+    )
+    readings = [np.nan_to_num(leads[0], nan=end) for end in (math.inf, -math.inf)]
+    return require_change(readings, swarm=NAMES[swarm], **dict(zip(("middle", "every"), texts, strict=True)))
 
 
 def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
-    """Check GA's power at 0.024 m above PSO's, as read off the histories of all runs."""
-    printed = 100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1)
-    sources = [(name, run) for run in (None, phase.median_run) for name in (swarm, "ga")]
-    powers = [phase.points[at].cheapest_near(SWING_HEIGHT, 0.024, 5e-4, run and run(at)) for at, run in sources]
-    words = ["none" if math.isnan(power) else f"{power:.4f} W" for power in powers]
-    values = {"swarm": NAMES[swarm], "pso": words[0], "ga": words[1], "middle": words[2:]}
-    if "none" in words:
-        return decide(Verdict.UNTESTABLE, **values)
-    return compare_changes(printed, 100 * (powers[1] / powers[0] - 1), **values)
+    """Check GA's power at 0.024 m above PSO's, as read off the histories of the median runs."""
+    printed, at = (
+        100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1),
+        PAPER.swing_heights_m.index(0.024),
+    )
+    middle, every = (float(_compute_swing_leads(phase, swarm, whole=whole)[at]) for whole in (False, True))
+    texts = [f"{phase.list_swing_powers(name)[at]:.4f} W" for name in (swarm, "ga")]
+    values = {"swarm": NAMES[swarm], "pso": texts[0], "ga": texts[1]}
+    values |= {"middle": _describe_change(middle), "every": _describe_change(every)}
+    return decide(Verdict.UNTESTABLE, **values) if math.isnan(middle) else compare_changes(printed, middle, **values)
+
+
+def _compute_swing_range(phase: PhaseFindings, algorithm: str) -> float:
+    """Return how much higher than its best solution a search's median run steps for at most 3 % more power [mm]."""
+    points = phase.points[algorithm]
+    own = points.run == phase.median_run(algorithm)
+    cheap = own & (points.power_W <= 1.03 * points.power_W[own].min())
+    return round(1000 * (float(points.x[cheap, SWING_HEIGHT].max()) - phase.median(algorithm).x["swing_height_m"]), 1)
 
 
 def _check_swing_range(phase: PhaseFindings, algorithm: str, printed_mm: float) -> Check:
-    """Check how much higher than its best solution a search's median run steps for at most 3 % more power."""
-    points, run = phase.points[algorithm], phase.median_run(algorithm)
-    own = points.run == run
-    cheap = own & (points.power_W <= 1.03 * points.power_W[own].min())
-    start = phase.median(algorithm).x["swing_height_m"]
-    ours = 1000 * (float(points.x[cheap, SWING_HEIGHT].max()) - start)
-    values = {"search": NAMES[algorithm], "ours": ours, "start": start, "printed": printed_mm}
-    return compare_changes(printed_mm, round(ours, 1), **values)
+    values = {"search": NAMES[algorithm], "start": phase.median(algorithm).x["swing_height_m"], "printed": printed_mm}
+    ours = _compute_swing_range(phase, algorithm)
+    return compare_levels(printed_mm, ours, **values, ours=ours)
+
+
+def _check_swing_range_lead(phase: PhaseFindings, swarm: str, printed_mm: float) -> Check:
+    """Check how much wider a swarm's range is than GA's [mm]."""
+    pso, ga = (_compute_swing_range(phase, name) for name in (swarm, "ga"))
+    return compare_changes(printed_mm, pso - ga, swarm=NAMES[swarm], printed=printed_mm, pso=pso, ga=ga, lead=pso - ga)
 
 
 def _check_velocity(phase: PhaseFindings, name: str) -> Check:
+    """Check the share of the searches' velocities within the printed range: at the ends of the runs, and of all solutions."""
     printed = PAPER.velocity_ranges[name]
     symbols = {i: f"x{i + 1}" for i in printed.variables}
     chosen = list(printed.variables)
-    ends = {title: np.array([[*run.x.values()] for run in runs])[:, chosen] for title, runs in phase.searches.items()}
-    inside = {title: (printed.low <= values) & (values <= printed.high) for title, values in ends.items()}
+    readings = [phase.gather_solutions(whole=whole) for whole in (False, True)]
+    inside = [
+        {
+            title: float(((printed.low <= x[:, chosen]) & (x[:, chosen] <= printed.high)).mean())
+            for title, x in found.items()
+        }
+        for found in readings
+    ]
     outside = [
         f"{search.upper()} {symbol} = {optimum.x[i]}"
         for search, optimum in phase.paper.optima.items()
@@ -204,24 +258,34 @@ def _check_velocity(phase: PhaseFindings, name: str) -> Check:
         low, high = phase.range_within(i, NEARLY_OPTIMAL)
         cheap = f"{low:z.4f} to {high:z.4f}" if math.isfinite(low) else "no point of the sweep"
         near.append(f"{symbol} = {[*phase.optimum.x.values()][i]:z.4f} ({cheap})")
-    within = (f"{NAMES[title]} {100 * values.mean():.0f} %" for title, values in inside.items())
-    texts = {"symbols": " and ".join(symbols.values()), "near": ", ".join(near), "within": ", ".join(within)}
+    ends = compute_range(np.concatenate([x[:, chosen] for x in readings[0].values()]).ravel())
+    texts = {"symbols": " and ".join(symbols.values()), "near": ", ".join(near), **_describe_shares(inside)}
     texts["outside"] = f" (but {', '.join(outside)} in print)" if outside else ""
-    found = compute_range(np.concatenate(list(ends.values())).ravel())
-    values = {"low": printed.low, "high": printed.high, "nearly": 100 * NEARLY_OPTIMAL, "ends": found}
-    return decide(bool(np.mean(list(inside.values())) >= MOST), **texts, **values)
+    values = {"low": printed.low, "high": printed.high, "nearly": 100 * NEARLY_OPTIMAL, "ends": ends}
+    holds = [float(np.mean(list(shares.values()))) >= MOST for shares in inside]
+    return decide(holds, **texts, **values, agree=len(set(holds)) == 1)
+
+
+def _describe_shares(readings: Sequence[Mapping[str, float]]) -> dict[str, str]:
+    """Return shares by search in words, of the ends of the runs and of all solutions."""
+    words = (", ".join(f"{NAMES[title]} {100 * share:.0f} %" for title, share in found.items()) for found in readings)
+    return dict(zip(("shares", "whole"), words, strict=True))
 
 
 def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
-    """Check whether the ratio of lateral velocities is nearer to one for PSO's runs than for GA's."""
-    start, end = "hip_vy_start_m_s", "hip_vy_end_m_s"
-    pso, ga = ([abs(run.x[start] / run.x[end]) for run in phase.searches[name]] for name in (swarm, "ga"))
-    printed = {name: abs(optimum.x[5] / optimum.x[6]) for name, optimum in phase.paper.optima.items()}
-    far = [np.abs(np.log(ratios)).tolist() for ratios in (pso, ga)]
-    p = rank_sum_normal(*far).p_two_sided
-    values = {"pso": np.median(pso), "ga": np.median(ga), "best": abs(phase.optimum.x[start] / phase.optimum.x[end])}
-    check = decide(bool(np.median(far[0]) < np.median(far[1])), swarm=NAMES[swarm], printed=printed, p=p, **values)
-    return require_significance(check, RANK_SUM, p)
+    """Check how far a swarm's lateral velocities are from equal: the larger over the smaller one, median of the runs."""
+
+    def compute_factor(start: float, end: float) -> float:
+        return math.exp(abs(math.log(abs(start / end))))
+
+    factors = {
+        name: float(np.median([compute_factor(run.x["hip_vy_start_m_s"], run.x["hip_vy_end_m_s"]) for run in runs]))
+        for name, runs in phase.searches.items()
+    }
+    printed = {name: compute_factor(*optimum.x[5:7]) for name, optimum in phase.paper.optima.items()}
+    return compare_levels(
+        printed["pso"], factors[swarm], swarm=NAMES[swarm], printed=printed, pso=factors[swarm], ga=factors["ga"]
+    )
 
 
 def _check_wider(findings: NaoFindings, position: int, ranges: Sequence[str] = ()) -> Check:
@@ -266,14 +330,15 @@ def _check_exponential(findings: NaoFindings) -> Check:
 
 
 def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:
-    """Check whether most runs end with these signs of variables."""
-    shares = {
-        title: float(np.mean([all(sign * run.x[name] > 0 for name, sign in signs.items()) for run in runs]))
-        for title, runs in phase.searches.items()
-    }
-    words = ", ".join(f"{NAMES[title]} {100 * share:.0f} %" for title, share in shares.items())
+    """Check whether most solutions of each search have these signs of variables: at the ends of the runs, and of all."""
+    columns, sign = [phase.problem.names.index(name) for name in signs], np.array(list(signs.values()))
+    shares = [
+        {title: float((sign * x[:, columns] > 0).all(axis=1).mean()) for title, x in found.items()}
+        for found in (phase.gather_solutions(whole=whole) for whole in (False, True))
+    ]
     best = ", ".join(f"{phase.optimum.x[name]:z.4f}" for name in signs)
-    return decide(all(share > 0.5 for share in shares.values()), shares=words, best=best)
+    holds = [min(found.values()) > 0.5 for found in shares]
+    return decide(holds, **_describe_shares(shares), best=best, agree=len(set(holds)) == 1)
 
 
 def _check_dearer(phase: PhaseFindings, positions: Sequence[int], beyond: float) -> Check:
@@ -311,17 +376,39 @@ def _check_faster(findings: NaoFindings) -> Check:
 
     There is no verdict if the shortest duration of single support is its bound, not the robot's.
     """
-    speeds, ranges = [], []
+    fast, slow = _list_speeds(findings)
+    change = 100 * (fast[1] / fast[0] - 1)
+    check = require_change(change, speeds=fast, ranges=fast / slow, change=change)
+    return replace(check, verdict=Verdict.UNTESTABLE) if _is_at_bound(findings.ssp) else check
+
+
+def _check_speed_range(findings: NaoFindings, by: Literal["ratio", "difference"]) -> Check:
+    """Check how much larger the range of feasible mean speeds is in double than in single support [%].
+
+    Where a bound ends that of single support, a smaller one of double support fails and a larger one gives no verdict.
+    """
+    fast, slow = _list_speeds(findings)
+    ranges = fast / slow if by == "ratio" else fast - slow
+    change = 100 * (ranges[1] / max(ranges[0], 1e-9) - 1)
+    check = require_change(change, ranges=ranges, change=change, fast=fast, slow=slow)
+    return replace(check, verdict=Verdict.UNTESTABLE) if change > 0 and _is_at_bound(findings.ssp) else check
+
+
+def _list_speeds(findings: NaoFindings) -> tuple[Array, Array]:
+    """Return the hip's greatest and least mean speed over the feasible durations of single and double support [m/s]."""
+    ends = []
     for phase in findings.phases:
         times = [point.at for point in phase.sweeps[phase.paper.duration] if point.feasible]
         hip = phase.problem.signals(phase.problem.check_x(phase.paper.optima["pso"].x)).arrays["hip"]
-        speeds.append(float(hip[-1, 0] - hip[0, 0]) / min(times))
-        ranges.append(max(times) / min(times))
-    change = 100 * (speeds[1] / speeds[0] - 1)
-    check, ssp = require_change(change, speeds=speeds, ranges=ranges, change=change), findings.ssp
-    shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
-    bound = 1.001 * ssp.problem.lower[ssp.paper.duration]
-    return check if shortest > bound else replace(check, verdict=Verdict.UNTESTABLE)
+        ends.append([float(hip[-1, 0] - hip[0, 0]) / time for time in (min(times), max(times))])
+    fast, slow = np.array(ends).T
+    return fast, slow
+
+
+def _is_at_bound(phase: PhaseFindings) -> bool:
+    """Whether the shortest feasible duration is its bound."""
+    shortest = min(point.at for point in phase.sweeps[phase.paper.duration] if point.feasible)
+    return shortest <= 1.001 * float(phase.problem.lower[phase.paper.duration])
 
 
 def _check_same_median(phase: PhaseFindings, swarm: str) -> Check:

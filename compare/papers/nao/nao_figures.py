@@ -12,7 +12,7 @@ from compare.drawing.animation import plot_poses
 from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.gait_figure import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points
-from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT
+from compare.papers.nao.nao_paper import PAPER
 from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
 from compare.papers.paper_runs import get_point
 from nlp_gait.formulation import Array, Result
@@ -26,7 +26,6 @@ POWER_TICKS_W = (0.5, 0.6, 0.7, 0.85, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 # Points that fall into one cell of a panel look like one; the grid is finer than the print.
 CELLS = 400
 POSE_SAMPLES = 40
-READING_TOLERANCE_M = 5e-4  # within which a solution counts as having a swing height
 
 
 def draw_figures(findings: NaoFindings) -> dict[str, Figure]:
@@ -113,27 +112,17 @@ def _draw_swing(findings: NaoFindings) -> Figure:
     figure = new_figure(5.2, 3.2)
     axes = figure.subplots()
 
-    def plot(power: Sequence[float], line: str, colour: str, label: str) -> None:
+    def plot(power: Sequence[float] | Array, line: str, colour: str, label: str) -> None:
         axes.plot(heights, np.array(power) / np.nanmin(power), line, color=colour, label=label)
 
     plot([held.power_W for held in findings.swing], "o-", COLOURS["ipopt"], "IPOPT")
     for name, marker in zip(ALGORITHMS, "sv", strict=True):
         plot(PAPER.swing_power_W[name], f"{marker}--", PAPER_COLOUR, f"paper, {name.upper()}")
     for name, marker in zip(SEARCHES, "s^v", strict=True):
-        read = read_swing_powers(phase, name, phase.median_run(name))
-        plot(read, f"{marker}:", COLOURS[name], f"ours, {NAMES[name]}")
+        plot(phase.list_swing_powers(name), f"{marker}:", COLOURS[name], f"ours, {NAMES[name]}")
     axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / least power [1]")
     axes.legend()
     return figure
-
-
-def read_swing_powers(phase: PhaseFindings, algorithm: str, run: int | None) -> list[float]:
-    """Return the least power of single support within 0.5 mm of each of the paper's swing heights [W].
-
-    It is read off the history of one run of a search, or of all runs for None.
-    """
-    points = phase.points[algorithm]
-    return [points.cheapest_near(SWING_HEIGHT, at, READING_TOLERANCE_M, run) for at in PAPER.swing_heights_m]
 
 
 def _draw_gait(phase: PhaseFindings) -> Figure:

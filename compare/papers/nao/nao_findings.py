@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from compare.analysis.record_statistics import RankSum, rank_sum_normal
-from compare.papers.nao.nao_paper import PAPER, PrintedPhase
+from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, PrintedPhase
 from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
 from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord
@@ -22,6 +22,7 @@ from nlp_gait.formulation import Array, GaitProblem
 
 NAMES = {"pso-constant": "PSO, constant weight", "pso": "PSO, damped", "ga": "GA", "ipopt": "IPOPT"}
 FINE = 2001  # points at which a line between the points of a sweep is read
+READING_TOLERANCE_M = 5e-4  # within which a solution counts as having a swing height
 # IPOPT's line bends most where solutions cost at most this share more than the best one.
 CHEAP = 0.02
 
@@ -81,6 +82,21 @@ class PhaseFindings:
     def median(self, algorithm: str) -> RunRecord:
         """Return the run of median power."""
         return self.searches[algorithm][self.median_run(algorithm)]
+
+    def gather_solutions(self, *, whole: bool) -> dict[str, Array]:
+        """Return x (m, n) by search: the ends of its runs, or all feasible solutions that they evaluated."""
+        if whole:
+            return {name: points.x for name, points in self.points.items()}
+        return {name: np.array([list(run.x.values()) for run in runs]) for name, runs in self.searches.items()}
+
+    def list_swing_powers(self, algorithm: str, *, whole: bool = False) -> Array:
+        """Return the least power of a search near each of the paper's swing heights [W]; NaN where it has no solution.
+
+        It is read off the history of the run of median power, which Table 7 shows, or of all runs.
+        """
+        points, run = self.points[algorithm], None if whole else self.median_run(algorithm)
+        heights = PAPER.swing_heights_m
+        return np.array([points.cheapest_near(SWING_HEIGHT, at, READING_TOLERANCE_M, run) for at in heights])
 
     @cached_property
     def printed_here(self) -> dict[str, Mapping[str, float]]:
@@ -164,7 +180,7 @@ class NaoFindings:
     dsp: PhaseFindings  # double support
     swing: Sequence[SweepPoint]  # IPOPT's optima of single support over the paper's swing heights
     durations: Sequence[SweepPoint]  # likewise over durations
-    other: NaoFindings | None = None  # on another robot
+    others: Mapping[str, NaoFindings] = field(default_factory=dict)  # with other choices, by choice
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:

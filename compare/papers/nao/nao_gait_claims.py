@@ -6,8 +6,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from compare.papers.claims import Check, compare_changes, compare_levels, decide, require_change
-from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings
+from compare.analysis.record_statistics import rank_sum_normal
+from compare.papers.claims import (
+    Check,
+    Series,
+    compare_changes,
+    compare_levels,
+    decide,
+    require_change,
+    require_significance,
+)
+from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
+from compare.papers.nao.nao_paper import SWING_HEIGHT
 from compare.papers.nao.nao_runs import ALGORITHMS, WEBOTS_DRIVE
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.joints import measure_leg
@@ -21,16 +31,22 @@ KINDS = {"HipYawPitch": "hip yaw-pitch", "Hip": "hip roll and pitch", "Knee": "k
 
 def compute_joint_shares(problem: GaitProblem, x: Sequence[float], *, heat: bool = True) -> dict[str, float]:
     """Return the share of each kind of joint in the power of a solution, or in its mechanical part; the last is the arms'."""
+    drawn = _compute_joint_powers(problem, x, heat=heat)
+    shares = dict.fromkeys([*KINDS, "arms"], 0.0)
+    for joint, value in drawn.items():
+        shares[next((kind for kind in KINDS if joint[1:].startswith(kind)), "arms")] += value / sum(drawn.values())
+    return shares
+
+
+def _compute_joint_powers(problem: GaitProblem, x: Sequence[float], *, heat: bool = True) -> dict[str, float]:
+    """Return the energy that each joint draws, or its mechanical part [J]."""
     signals = problem.signals(problem.check_x(x))
     drawn = (
         np.abs(signals.arrays["tau"] * signals.arrays["qd"])
         + heat * problem.value("heat_loss_W_per_Nm2") * signals.arrays["tau"] ** 2
     )
-    mean = np.trapezoid(drawn, signals.arrays["t"], axis=0)
-    shares = dict.fromkeys([*KINDS, "arms"], 0.0)
-    for joint, value in zip(signals.joints, mean / mean.sum(), strict=True):
-        shares[next((kind for kind in KINDS if joint[1:].startswith(kind)), "arms")] += float(value)
-    return shares
+    energies = np.asarray(np.trapezoid(drawn, signals.arrays["t"], axis=0))
+    return dict(zip(signals.joints, map(float, energies), strict=True))
 
 
 def describe_effect(phase: PhaseFindings, choice: str) -> str:
@@ -115,13 +131,16 @@ def _check_arms(findings: NaoFindings) -> Check:
     return require_change([max(gain) for gain in gains], gains=gains, cost=cost)
 
 
-def _check_pace(phase: PhaseFindings, slow: bool) -> Check:
-    """Check how much smaller the least margin is at the slowest or the fastest pace than at the best [%]."""
+def _check_pace(phase: PhaseFindings, slow: bool, share: bool = True) -> Check:
+    """Check how much smaller the least margin is at the slowest or the fastest pace than at the best [%], or [mm] if no share."""
     paces = _vary_pace(phase, phase.problem.names[phase.paper.duration])
     margins = {at: 1000 * min(found["dbm_x_min_m"], found["dbm_y_min_m"]) for at, found in paces.items()}
     best, end = max(margins, key=margins.__getitem__), max(margins) if slow else min(margins)
-    fall = 100 * (1 - margins[end] / margins[best])
-    return require_change(fall, end=end, at_end=margins[end], best=best, at_best=margins[best], fall=fall)
+    lost = margins[best] - margins[end]
+    fall = 100 * lost / margins[best]
+    return require_change(
+        fall if share else lost, end=end, lost=lost, at_end=margins[end], best=best, at_best=margins[best], fall=fall
+    )
 
 
 def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, float]]:
@@ -213,6 +232,57 @@ def _check_joints(findings: NaoFindings, kind: str) -> Check:
     work = compute_joint_shares(ssp.problem, others[0], heat=False)[kind]
     values = {"shares": "; ".join(texts), "work": 100 * work, "each": [100 * shares[kind] for shares in every]}
     return decide([max(shares, key=shares.__getitem__) == kind for shares in every], **values)
+
+
+def _check_swing_hip(findings: NaoFindings) -> Check:
+    """Check whether most of the hips' power in single support is that of the swing leg's hip: roll and pitch."""
+    ssp, shares = findings.ssp, []
+    for x in (*(ssp.paper.optima[name].x for name in ALGORITHMS), [*ssp.optimum.x.values()]):
+        for heat in (True, False):
+            drawn = _compute_joint_powers(ssp.problem, x, heat=heat)
+            swing, support = (sum(drawn[f"{side}Hip{axis}"] for axis in ("Roll", "Pitch")) for side in "RL")
+            shares.append(100 * swing / (swing + support))
+    return decide([share > 50 for share in shares], shares=Series(shares[0::2]), work=Series(shares[1::2]))
+
+
+def _check_swing_joints(findings: NaoFindings) -> Check:
+    """Check whether a higher swing foot moves the swing leg's knee and ankle pitch more than its hip pitch [degrees]."""
+    ssp, angles = findings.ssp, []
+    x = ssp.problem.by_name(ssp.problem.check_x(ssp.paper.optima["pso"].x))
+    for end in (ssp.problem.lower, ssp.problem.upper):
+        signals = ssp.problem.signals(np.array(list((x | {"swing_height_m": end[SWING_HEIGHT]}).values())))
+        columns = [signals.joints.index(f"R{joint}Pitch") for joint in ("Hip", "Knee", "Ankle")]
+        angles.append(np.degrees(signals.arrays["q"][:, columns]))
+    hip, knee, ankle = np.abs(angles[1] - angles[0]).max(axis=0)
+    return decide(bool(min(knee, ankle) > hip), hip=hip, knee=knee, ankle=ankle)
+
+
+def _check_hip_variation(phase: PhaseFindings) -> Check:
+    """Check how much less PSO's printed solution moves the hip vertically than GA's [%]."""
+    pso, ga = (_compute_hip_rise(phase, optimum.x) for optimum in phase.paper.optima.values())
+    return require_change(100 * (1 - pso / ga), pso=pso, ga=ga, change=100 * (pso / ga - 1))
+
+
+def _check_run_hip_variation(phase: PhaseFindings, swarm: str) -> Check:
+    """Check how much less a swarm's solutions move the hip vertically than GA's, medians of the runs [%]."""
+    pso, ga = ([_compute_hip_rise(phase, [*run.x.values()]) for run in phase.searches[name]] for name in (swarm, "ga"))
+    change, p = 100 * (float(np.median(pso)) / float(np.median(ga)) - 1), rank_sum_normal(pso, ga).p_two_sided
+    values = {"swarm": NAMES[swarm], "pso": np.median(pso), "ga": np.median(ga), "change": change, "p": p}
+    return require_significance(require_change(-change, **values), "rank-sum test", p)
+
+
+def _check_few_mm(phase: PhaseFindings) -> Check:
+    """Check the hip's vertical range in the printed solutions and at the ends of all runs [mm]."""
+    printed = [_compute_hip_rise(phase, optimum.x) for optimum in phase.paper.optima.values()]
+    ends = [_compute_hip_rise(phase, [*run.x.values()]) for runs in phase.searches.values() for run in runs]
+    return compare_levels(
+        np.zeros(len(printed) + len(ends)), [*printed, *ends], printed=Series(printed), most=max(ends)
+    )
+
+
+def _compute_hip_rise(phase: PhaseFindings, x: Sequence[float]) -> float:
+    """Return the hip's vertical range over the samples [mm]."""
+    return 1000 * float(np.ptp(phase.problem.signals(phase.problem.check_x(x)).arrays["hip"][:, 2]))
 
 
 def _check_stretched(findings: NaoFindings) -> Check:

@@ -14,10 +14,10 @@ from compare.analysis.record_statistics import a12, holm
 from compare.papers.claims import SIGNIFICANT, bind_checks
 from compare.papers.nao import nao_claims, nao_gait_claims
 from compare.papers.nao import nao_runs as nao
-from compare.papers.nao.nao_figures import draw_figures, read_swing_powers
+from compare.papers.nao.nao_figures import draw_figures
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
 from compare.papers.nao.nao_gait_claims import MARGINS, compute_joint_shares, describe_effect
-from compare.papers.nao.nao_paper import PAPER, PHASES, SWING_POWER_W, PrintedPhase
+from compare.papers.nao.nao_paper import PAPER, SWING_POWER_W, PrintedPhase
 from compare.papers.nao.nao_runs import ALGORITHMS, NaoEffort, SweepPoint
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
@@ -35,11 +35,22 @@ from nlp_gait.simulation import simulate
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
 from nlp_gait.simulation.simulate import SETTLE_TIME
 
+SWING_LEADS = {"swing-lead": "pso-constant", "swing-lead-damped": "pso"}  # searches by claim
 MEANS = ("dbm_x_mean_limit_m", "dbm_y_mean_limit_m")
 
 
 def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
-    """Run searches and IPOPT on both phases, and sweep over their variables."""
+    """Run searches and IPOPT on both phases, and sweep over their variables; again with other choices."""
+    findings, others = NaoFindings(**_run_phases(runner, effort)), {}
+    for choice in effort.others:
+        folder = make_writable_folder(runner.folder / choice)
+        changed = _run_phases(replace(runner, folder=folder), effort.choose_other(choice))
+        others[choice] = replace(findings, **changed)
+    return replace(findings, others=others)
+
+
+def _run_phases(runner: Runner, effort: NaoEffort) -> dict[str, Any]:
+    """Return the fields of the findings that an effort computes: those of its phases."""
     store, tasks = Store(runner.folder), nao.make_tasks(effort)
     searches = [task for task in tasks if task.title in nao.SEARCHES]
     for task in searches:
@@ -47,17 +58,15 @@ def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
             locate_record(runner.folder, task).unlink(missing_ok=True)  # only a run gives its points
     runs = runner.run_tasks(tasks, partial(nao.run_and_store_points, runner.folder))
     simulated = runner.compute(nao.make_simulations(effort), code=(nao, simulate))
-    ssp, dsp = (
-        _sweep_phase(runner, effort, phase, runs, _load_all_points(store, phase, searches), simulated)
-        for phase in PHASES
-    )
+    phases = {
+        phase.problem.removeprefix("nao-"): _sweep_phase(
+            runner, effort, phase, runs, _load_all_points(store, phase, searches), simulated
+        )
+        for phase in effort.phases
+    }
     special = _solve_sweeps(runner, nao.make_special_sweeps(effort))
-    other = None
-    if effort.other_robot:
-        folder = make_writable_folder(runner.folder / effort.other_robot)
-        other = run_nao(replace(runner, folder=folder), effort.on_other_robot())
-    swing, durations = special[nao.SWING_SWEEP], special[nao.DURATION_SWEEP]
-    return NaoFindings(ssp=ssp, dsp=dsp, swing=swing, durations=durations, other=other)
+    fields = {nao.SWING_SWEEP: "swing", nao.DURATION_SWEEP: "durations"}
+    return {**phases, **{fields[name]: points for name, points in special.items()}}
 
 
 def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
@@ -127,6 +136,7 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "ssp": _compute_phase_values(ssp),
         "dsp": _compute_phase_values(dsp),
         "costs": compute_range(100 * (here["power_W"] / dsp.best - 1) for here in dsp.printed_here.values()),
+        **_compute_lever_values(dsp),
         "gaps": compute_range(power - here for power, here, _ in printed),
         "misses": compute_range(100 * (twice / power - 1) for power, _, twice in printed),
         "nearest": list(findings.torque_changes_Nm)[int(misses.argmin())],
@@ -162,29 +172,52 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
     }
 
 
+def _compute_lever_values(dsp: PhaseFindings) -> dict[str, Any]:
+    """What the text's reading of (28), (29) changes in double support: what the printed solutions cost, and the optimum."""
+    optimum, printed = dsp.optimum_with("lever"), dsp.printed_by_choice["lever"]
+    best = optimum.verdict.objective if optimum else math.nan
+    x = [*optimum.x.values()] if optimum else [math.nan] * len(dsp.optimum.x)
+    costs = [100 * (here["power_W"] / best - 1) for here in printed.values()]
+    return {"lever_costs": costs, "lever_x": x, "dsp_x": [*dsp.optimum.x.values()]}
+
+
 def _list_bounds(phase: PhaseFindings) -> list[str]:
     return [f"{row.lower:g} to {row.upper:g} {row.unit}" for row in phase.problem.variables]
 
 
-def _compare_verdicts(findings: NaoFindings) -> dict[str, str]:
-    """Return the rows whose verdict differs on the other robot, and those that Holm's correction of all tests would change."""
+def _compare_verdicts(findings: NaoFindings) -> dict[str, Any]:
+    """Return verdicts with other choices, the rows that they change, and those that Holm's correction would change."""
     checks, claims = REPRODUCTION.checks, REPRODUCTION.printed.claims
     texts = {name: replace(claims[name], detail="") for name in checks}
     here = {name: check(findings) for name, check in checks.items()}
     rows = {name: check.apply(texts[name]) for name, check in here.items()}
+    agree = [check.values["agree"] for check in here.values() if "agree" in check.values]
+    swings = {swarm: REPRODUCTION.checks[name](findings).values for name, swarm in SWING_LEADS.items()}
     p = {name: float(check.values["p"]) for name, check in here.items() if "p" in check.values}
     corrected = dict(zip(p, holm([*p.values()]), strict=True))
     lost = [f"{rows[name].text} (p = {p[name]:.2g})" for name in p if p[name] < SIGNIFICANT <= corrected[name]]
-    found = {"tests": f"{len(p)}", "level": f"{100 * SIGNIFICANT:.0f}", "holm": "; ".join(lost) or "none"}
-    if not findings.other:
-        return found | {"other": "not computed at this effort"}
-    there = {name: check(findings.other).apply(texts[name]) for name, check in checks.items()}
-    changed = [
-        f"{row.text}: {there[name].verdict} {there[name].detail}".rstrip() + f" instead of {row.verdict}"
-        for name, row in rows.items()
-        if there[name].verdict != row.verdict
-    ]
-    return found | {"other": f"{len(changed)} of {len(rows)} verdicts are others: {'; '.join(changed) or 'none'}"}
+    changed, there = dict.fromkeys(NaoEffort.others, "not computed at this effort"), {}
+    for choice, other in findings.others.items():
+        there[choice] = {name: check(other).apply(texts[name]) for name, check in checks.items()}
+        words = [
+            f"{row.text}: {there[choice][name].verdict} {there[choice][name].detail}".rstrip()
+            + f" instead of {row.verdict}"
+            for name, row in rows.items()
+            if there[choice][name].verdict != row.verdict
+        ]
+        changed[choice] = f"{len(words)} of {len(rows)} verdicts are others: {'; '.join(words) or 'none'}"
+    known = {choice: {name: row.verdict for name, row in verdicts.items()} for choice, verdicts in there.items()}
+    unknown = dict.fromkeys(checks, "not computed at this effort")
+    return {
+        "tests": f"{len(p)}",
+        "level": f"{100 * SIGNIFICANT:.0f}",
+        "holm": "; ".join(lost) or "none",
+        "changed": changed,
+        "verdicts": {choice: known.get(choice, unknown) for choice in changed},
+        "whole_tested": len(agree),
+        "whole_differ": agree.count(False),
+        "swing": swings,
+    }
 
 
 def _count_backward(findings: NaoFindings) -> dict[str, float]:
@@ -315,7 +348,7 @@ def _list_variants(phase: PhaseFindings) -> Rows:
 def _list_swing_heights(findings: NaoFindings) -> Rows:
     """Table 7, rows 6 to 11: least power at a swing height; true optima, and what search histories show."""
     phase = findings.ssp
-    read = [read_swing_powers(phase, name, run) for name in nao.SEARCHES for run in (phase.median_run(name), None)]
+    read = [phase.list_swing_powers(name, whole=whole) for name in nao.SEARCHES for whole in (False, True)]
     cheapest = findings.swing[0].power_W
     rows = []
     for k, held in enumerate(findings.swing):

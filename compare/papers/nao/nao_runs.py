@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.papers.nao.nao_paper import PAPER, PHASES, SSP, SWING_HEIGHT
+from compare.papers.nao.nao_paper import PAPER, PHASES, SSP, SWING_HEIGHT, PrintedPhase
 from compare.papers.paper_runs import Effort, make_computation
 from compare.study.record import RunRecord
 from compare.study.run_task import run_task
@@ -59,21 +59,26 @@ class NaoEffort(Effort):
     choices: tuple[str, ...] = tuple(PAPER.choices)  # with an optimum; all have values at the printed solutions
     choice_starts: int = 5  # of IPOPT for each of them
     intervals: int = 10  # between the samples of a phase, as in the paper
-    robot: str = "nao-v5"
-    other_robot: str = "nao-v6"  # on which all verdicts are found again, see ``on_other_robot``; none if empty
+    choice: str = ""  # one of the paper's ``choices`` that all is computed with; none if empty
+    others: tuple[str, ...] = ("v6", "lever")  # choices with which all verdicts are found again, see ``choose_other``
     sweep_starts: int = 2  # at both ends of a sweep
     sweep_points: tuple[int, int] = (13, 10)  # over the range of all feasible solutions, and of the cheap ones
 
     @property
     def steps(self) -> int:
         """Runs, two special sweeps and one over each variable, a simulation of each printed solution, and the report."""
-        variables, solutions = sum(len(p.optima["pso"].x) for p in PHASES), sum(len(p.optima) for p in PHASES)
-        other = self.on_other_robot().steps - 1 if self.other_robot else 0
-        return len(make_tasks(self)) + 2 + variables + solutions + 1 + other
+        sweeps = sum(len(p.optima["pso"].x) for p in self.phases) + len(make_special_sweeps(self))
+        other = sum(self.choose_other(choice).steps - 1 for choice in self.others)
+        return len(make_tasks(self)) + sweeps + len(make_simulations(self)) + 1 + other
 
-    def on_other_robot(self) -> NaoEffort:
-        """Return the effort on the other robot: all searches, fewer starts of IPOPT and points of its sweeps."""
-        chosen = replace(self, robot=self.other_robot, other_robot="", choices=("v6",), choice_starts=1)
+    @property
+    def phases(self) -> tuple[PrintedPhase, ...]:
+        """Phases that the choice changes; both without one."""
+        return tuple(p for p in PHASES if not self.choice or p.problem in PAPER.choices[self.choice].phases)
+
+    def choose_other(self, choice: str) -> NaoEffort:
+        """Return the effort with another choice: all searches, fewer starts of IPOPT and points of its sweeps."""
+        chosen = replace(self, choice=choice, others=(), choices=("v6",), choice_starts=1)
         fewer = min(3, self.variant_runs), min(8, self.starts)
         return replace(chosen, variant_runs=fewer[0], starts=fewer[1], sweep_points=(5, 4))
 
@@ -90,7 +95,7 @@ class SweepPoint:
 def make_tasks(effort: NaoEffort) -> list[Task]:
     """Return searches and starts of IPOPT; equal runs of the searches start from the same population."""
     stop, tasks = Stop(evaluations=effort.evaluations), []
-    for phase in PHASES:
+    for phase in effort.phases:
         spec = make_spec(phase.problem, effort)
         for name in SEARCHES:
             tasks += [Task(problem=spec, solver=name, stop=stop, run=k) for k in range(effort.runs)]
@@ -118,7 +123,8 @@ def list_choices(problem: str, effort: NaoEffort, *, solved: bool = True) -> dic
 
 def make_spec(problem: str, effort: NaoEffort) -> ProblemSpec:
     """Return a phase of the paper."""
-    return ProblemSpec(name=problem, options={"intervals": effort.intervals, "robot": effort.robot})
+    spec = ProblemSpec(name=problem, options={"intervals": effort.intervals, "robot": "nao-v5"})
+    return spec.with_options(**PAPER.choices[effort.choice].options) if effort.choice else spec
 
 
 def run_and_store_points(folder: Path, task: Task, start: RunRecord | None = None) -> RunRecord:
@@ -148,7 +154,9 @@ def _name_points(task: Task) -> str:
 
 
 def make_special_sweeps(effort: NaoEffort) -> list[Computation]:
-    """Return IPOPT over the paper's swing heights, and over durations of single support."""
+    """Return IPOPT over the paper's swing heights, and over durations of single support; nothing without that phase."""
+    if SSP not in effort.phases:
+        return []
     spec, starts = make_spec(SSP.problem, effort), effort.sweep_starts
     return [
         make_sweep(SWING_SWEEP, spec, SWING_HEIGHT, PAPER.swing_heights_m, starts),
@@ -180,7 +188,7 @@ def make_simulations(effort: NaoEffort) -> list[Computation]:
     """Return the simulation of each printed solution, as in section 5.4."""
     return [
         make_computation(f"simulate-{phase.problem}-{name}", spec, partial(simulate_solution, spec), x=list(optimum.x))
-        for phase in PHASES
+        for phase in effort.phases
         for spec in [make_spec(phase.problem, effort)]
         for name, optimum in phase.optima.items()
     ]

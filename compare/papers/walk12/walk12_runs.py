@@ -71,7 +71,7 @@ class Walk12Effort(Effort):
         """Runs, the two paths, the printed integration step, the walks, and the report."""
         table_3, table_4 = len(TABLE_3) * (self.starts + 2 * self.runs), len(TABLE_4) * len(HORIZONS) * self.starts
         variants = sum(map(len, READINGS.values())) + len(BENT_FREELY_WEIGHTS) + len(TABLE_3) + 1
-        searches = len(GA_VARIANTS) + 2 * len(TABLE_4)  # Table IV has the GA with Q over one step
+        searches = len(GA_VARIANTS) + 2 * len(TABLE_4) * len(HORIZONS)
         runs = 2 * (table_3 + table_4) + variants * self.starts + searches * self.runs + 1
         return runs + 2 + 1 + 2 * len(self.walked_weights) + 1
 
@@ -109,8 +109,7 @@ def make_first_tasks(effort: Walk12Effort) -> Iterator[Task]:
         title = title_table_4(row, horizon, most_stable=True)
         most_stable = _make_spec(title, 1.0, F1MAX, {"horizon": horizon}, step_time_s=row.step_time_s)
         yield from make_start_tasks(most_stable, effort.starts)
-        if horizon == "step":
-            yield from make_search_tasks(most_stable, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from make_search_tasks(most_stable, "ga", GA, effort.runs, GA_EVALUATIONS)
     for zmp, weights in READINGS.items():
         for weight in weights:
             read = _make_spec(f"{zmp}-{weight:g}", weight, F1MAX, {"zmp": zmp})
@@ -138,8 +137,7 @@ def make_second_tasks(effort: Walk12Effort, runs: Runs) -> Iterator[Task]:
         options, title = {"horizon": horizon}, title_table_4(row, horizon)
         spec = _make_spec(title, row.weight, f1max, options, step_time_s=row.step_time_s)
         yield from make_start_tasks(spec, effort.starts)
-        if horizon == "step":
-            yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
 
 
 def _make_table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Task]:

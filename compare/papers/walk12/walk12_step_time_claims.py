@@ -6,11 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from compare.papers.claims import Check, Verdict, compare_changes, compare_levels, decide, require_change
-from compare.papers.paper_runs import choose_best, compute_range, get_point
+from compare.papers.claims import Check, compare_changes, compare_levels, require_change
+from compare.papers.paper_runs import choose_best, compute_range
+from compare.papers.walk12.walk12_claims import list_x
 from compare.papers.walk12.walk12_findings import Walk12Findings, choose_median, list_rounded
-from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
-from compare.papers.walk12.walk12_runs import HORIZONS, PAPER, compute_f1, title_table_4
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_4, PaperRow
+from compare.papers.walk12.walk12_runs import HORIZONS, compute_f1, title_table_4
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.gaits.walk12.walk12_problem import Horizon
@@ -50,26 +51,40 @@ def _check_f1_over_time(_: Walk12Findings, horizon: Horizon) -> Check:
 
 
 def _check_variables_over_time(findings: Walk12Findings, horizon: Horizon, solver: str) -> Check:
-    rows = [TABLE_3[1].x, *(row.x for row in TABLE_4)]
-    choose = choose_best if solver == IPOPT else choose_median
-    ours = [
-        choose(findings.records(PAPER, 0.15, solver)),
-        *(_choose(findings, row, horizon, solver) for row in TABLE_4),
-    ]
-    printed, found = (1e3 * np.ptp(np.array(x), axis=0) for x in (rows, [get_point(run) for run in ours]))
+    """Check the range of each variable over the T of Table IV [mm]."""
+    printed, found = np.ptp([row.x for row in TABLE_4], axis=0) * 1e3, np.ptp(list_x(findings, solver, horizon), axis=0)
     texts = [", ".join(f"{value:.0f}" for value in values) for values in (printed, found)]
     return compare_levels(printed, found, ranges=texts[0], found=texts[1])
 
 
+def _check_f_of_table_4(_: Walk12Findings, horizon: Horizon) -> Check:
+    """Check f of the printed gaits in the model under the printed f1max of each T."""
+    ours = [_compute_f(row, row.f1max, horizon) for row in TABLE_4]
+    return compare_levels([row.f for row in TABLE_4], ours, found=", ".join(f"{f:.4f}" for f in ours))
+
+
+def _check_optimal_over_time(findings: Walk12Findings, horizon: Horizon) -> Check:
+    """Check f of the printed gaits against the optima, under the model's f1max of each T."""
+    best = [_choose(findings, row, horizon, IPOPT).verdict.objective for row in TABLE_4]
+    ours = [_compute_f(row, most, horizon) for row, most in zip(TABLE_4, list_f1max(findings, horizon), strict=True)]
+    gaps = compute_range(100 * (1 - f / b) for f, b in zip(ours, best, strict=True))
+    return compare_levels(best, ours, gaps=gaps)
+
+
+def _compute_f(row: PaperRow, f1max: float, horizon: Horizon) -> float:
+    """Return f of a printed gait under a normalisation."""
+    return row.weight * compute_f1(row, horizon=horizon) / f1max + (1 - row.weight) * row.x[0] / F2MAX
+
+
 def _check_f_over_time(findings: Walk12Findings) -> Check:
-    """Report the spread of f over T; no verdict, since the paper prints no size."""
+    """Check the spread of the optimal f over T with both horizons of Q [%]."""
     values: dict[str, list[float]] = {
         h: [_choose(findings, row, h, IPOPT).verdict.objective for row in TABLE_4] for h in HORIZONS
     }
     values["printed"] = [row.f for row in TABLE_4]
     spreads = {name: 100 * (max(f) / min(f) - 1) for name, f in values.items()}
     texts = {name: ", ".join(f"{value:.4f}" for value in f) for name, f in values.items()}
-    return decide(Verdict.UNTESTABLE, f=texts, spread=spreads)
+    return compare_levels(np.zeros(len(HORIZONS)), [spreads[h] for h in HORIZONS], f=texts, spread=spreads)
 
 
 def _check_share_over_time(findings: Walk12Findings) -> Check:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.gaits.nao.body import load_nao, make_nao
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, YAW_PITCHES
 
@@ -32,6 +32,21 @@ def compute_powers(problem: GaitProblem, x: Sequence[float]) -> dict[str, float]
         "left_ends": float(total[:-1].mean()),
         "right_ends": float(total[1:].mean()),
     }
+
+
+def compute_torque_changes_by_reading(
+    problem: GaitProblem, x: Sequence[float], within: int = 50
+) -> tuple[float, float]:
+    """Return the largest torque change of a leg's joint, and of any joint within an interval: greatest minus least [Nm].
+
+    ``within`` is the number of parts into which an interval is divided.
+    """
+    signals = problem.signals(problem.check_x(x))
+    legs = [joint[1:] not in ARM_JOINTS for joint in signals.joints]
+    fine = load(problem.name, **{**problem.options, "intervals": within * int(problem.options["intervals"])})
+    tau = fine.signals(fine.check_x(x)).arrays["tau"]
+    ranges = [np.ptp(tau[k : k + within + 1], axis=0).max() for k in range(0, len(tau) - 1, within)]
+    return float(np.abs(np.diff(signals.arrays["tau"][:, legs], axis=0)).max()), float(max(ranges))
 
 
 def compute_mean_margins(problem: GaitProblem, x: Sequence[float]) -> dict[str, float]:

@@ -25,7 +25,12 @@ from nlp_gait.simulation import mjcf
 from nlp_gait.simulation import simulate as simulating
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 from tests.compare.papers.nao_geometry import compare_geometry
-from tests.compare.papers.nao_readings import compute_load_shares, compute_mean_margins, compute_powers
+from tests.compare.papers.nao_readings import (
+    compute_load_shares,
+    compute_mean_margins,
+    compute_powers,
+    compute_torque_changes_by_reading,
+)
 from tests.compare.papers.nao_torque_changes import compute_torque_changes
 
 
@@ -129,16 +134,22 @@ def test_an_interrupted_reproduction_continues(finished: Finished) -> None:
 
 def test_the_full_effort_counts_all_its_steps() -> None:
     searches, choices = len(PHASES) * ((3 + 8) * 11 + 3 * 44), 5 * (6 + 7)
-    other = len(PHASES) * (3 * 11 + 8 * 3 + 3 * 44 + 8 + 1)  # on the other robot
-    assert REPRODUCTION.full.steps == searches + len(PHASES) * 20 + choices + other + 2 * (2 + 9 + 8 + 4) + 1
+    other = 3 * (3 * 11 + 8 * 3 + 3 * 44 + 8 + 1)  # both phases on NAO V6, double support by the text on (28), (29)
+    sweeps = [2 + 9 + 8 + 4, 2 + 9 + 8 + 4, 8 + 2]
+    assert REPRODUCTION.full.steps == searches + len(PHASES) * 20 + choices + other + sum(sweeps) + 1
 
 
-def test_verdicts_on_another_robot_are_compared(finished: Finished) -> None:
+def test_verdicts_with_other_choices_are_compared(finished: Finished) -> None:
     findings = finished.findings
     assert "verdicts are others" not in finished.report and "not computed at this effort" in finished.report
     lines = [with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0))]
-    changed = compute_values(replace(lines[0], other=lines[1]))["other"]
-    assert f"{REPRODUCTION.printed.claims['higher-hip-ssp'].text}: does not hold instead of holds" in changed
+    values = compute_values(replace(lines[0], others={"v6": lines[1]}))
+    assert (
+        f"{REPRODUCTION.printed.claims['higher-hip-ssp'].text}: does not hold instead of holds"
+        in values["changed"]["v6"]
+    )
+    assert values["verdicts"]["v6"]["higher-hip-ssp"] == "does not hold"
+    assert values["changed"]["lever"] == values["verdicts"]["lever"]["higher-hip-ssp"] == "not computed at this effort"
 
 
 def verdict(findings: NaoFindings, name: str) -> str:
@@ -234,6 +245,8 @@ def test_numbers_in_the_texts_are_those_of_our_model(printed: dict[str, GaitProb
                 powers[key] for key in (("legs", "one_motor") if name == "pso" else ()) + ("left_ends", "right_ends")
             ]
             assert all(f"{power:.4f}" in texts for power in ends), (phase.problem, name)
+            changes = compute_torque_changes_by_reading(problem, optimum.x)
+            assert all(f"{change:.4f}" in texts for change in changes), (phase.problem, name)
             if phase is SSP:
                 assert all(f"{value:.1f}" in texts for value in compute_mean_margins(problem, optimum.x).values())
     shares = compute_load_shares(printed["nao-dsp"], DSP.optima["pso"].x)
