@@ -59,8 +59,8 @@ FAMILIES = {
     "reach": "knees not stretched (cosine)",
     "dbm_x": "balance margin along the foot",
     "dbm_y": "balance margin across the foot",
-    "dbm_x_mean": "its mean along the foot",
-    "dbm_y_mean": "its mean across the foot",
+    "dbm_x_mean": "mean margin along the foot",
+    "dbm_y_mean": "mean margin across the foot",
 }
 
 

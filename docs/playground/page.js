@@ -52,7 +52,7 @@ class Numbers {
     const excess = (100 * (f / this.model.optimum.power - 1));
     const violated = rows.filter((row) => row > 0).length;
     this.power.textContent = `${f.toFixed(5)} W`;
-    this.gap.textContent = violation > 0 ? "" : excess < 0.0001 ? "the proven optimum" : `${formatGap(excess)} above the optimum`;
+    this.gap.textContent = violation > 0 ? "" : excess < LEAST_GAP ? "the proven optimum" : `${formatGap(excess)} above the optimum`;
     this.state.textContent = violation > 0 ? `not feasible: ${violated} of ${rows.length} constraints violated` : `feasible: all ${rows.length} constraints met`;
     this.summary.classList.toggle("violated", violation > 0);
     for (const { name, scale, unit, row, cells } of this.families) {

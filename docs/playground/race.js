@@ -1,6 +1,7 @@
 "use strict";
 // Searches race within the page: a slice of work at a time, so that the page stays responsive.
 const SLICE_MS = 12, REDRAW_MS = 250;
+const LEAST_GAP = 0.0001; // per cent; smaller ones are not distinguished
 
 class Race {
   // show(x, name) is called with the best point so far, in the problem's units, at most every REDRAW_MS; choose(x) when a user picks it.
@@ -27,7 +28,7 @@ class Race {
     };
     this.budget = select("evaluations each", [[10000, "10,000"], [50000, "50,000"], [250000, "250,000"]], () => this.draw());
     this.budget.value = "50000";
-    this.axis = select("shown as", [["power", "power"], ["gap", "% above the optimum"]], () => this.draw());
+    this.axis = select("shown as", [["power", "power"], ["gap", "gap [%]"]], () => this.draw());
     this.speed = element("output", { class: "speed" }, bar);
   }
 
@@ -116,6 +117,7 @@ class Race {
     return known.length ? findBest(known.map((run) => ({ ...run.best, name: run.name }))) : null;
   }
 
+  // Per cent above the optimum, which is proven to six digits.
   gap(power) {
     return 100 * (power / this.model.optimum.power - 1);
   }
@@ -141,21 +143,20 @@ class Race {
   }
 
   drawChart() {
-    const asGap = this.axis.value === "gap", value = (power) => (asGap ? this.gap(power) : power), unit = asGap ? "%" : "W";
+    const asGap = this.axis.value === "gap", value = (power) => (asGap ? Math.max(this.gap(power), LEAST_GAP) : power), unit = asGap ? "%" : "W";
     const most = Number(this.budget.value);
     const series = this.runs.filter((run) => run.history.length).map(({ name, colour, line, history, evaluations, best }) => ({ name, colour, line, shape: "step",
       points: [...history, [evaluations, best.f]].map(([at, power]) => [at, value(power), `${name}: ${formatNumber(value(power))} ${unit} after ${at.toLocaleString("en")}`]) }));
     const mark = { name: "proven optimum", colour: "#000000", line: ":", shape: "line", points: [10, most].map((at) => [at, this.model.optimum.power]) };
-    this.chart.show(asGap ? series : [mark, ...series], { y: asGap ? "above the optimum [%]" : "power [W]", log: [true, asGap] });
+    this.chart.show(asGap ? series : [mark, ...series], { y: asGap ? "gap to the optimum [%]" : "power [W]", log: [true, asGap] });
   }
 
   describe(fresh, finished, leader) {
     if (fresh) return `The mark to beat: ${this.model.optimum.power.toFixed(6)} W.`;
     if (!leader || leader.violation > 0) return "No search has found a feasible gait yet.";
-    const gap = this.gap(leader.f), words = gap < 0.0001 ? "the proven optimum to six digits" : `${formatGap(gap)} above the proven optimum`;
+    const gap = this.gap(leader.f), words = gap < LEAST_GAP ? "the proven optimum to six digits" : `${formatGap(gap)} above the proven optimum`;
     return `${finished ? "Closest" : "Closest so far"}: ${leader.name} with ${leader.f.toFixed(6)} W, ${words}.`;
   }
 }
 
-// The optimum is proven to six digits.
-const formatGap = (percent) => (percent < 0.0001 ? "< 0.0001 %" : `${Number(percent.toFixed(Math.max(0, 2 - Math.floor(Math.log10(percent)))))} %`);
+const formatGap = (percent) => (percent < LEAST_GAP ? `< ${LEAST_GAP} %` : `${Number(percent.toFixed(Math.max(0, 2 - Math.floor(Math.log10(percent)))))} %`);
