@@ -212,6 +212,7 @@ def plan(
     steps: int | None = None,
     speed: float | None = None,
     distance: float | None = None,
+    slope_deg: float = 0.0,
     intervals: int = 10,
     values: list[str] | None = None,
     starts: int = 3,
@@ -232,6 +233,7 @@ def plan(
         steps,
         speed_m_s=speed,
         distance_m=distance,
+        slope_deg=slope_deg,
         intervals=intervals,
         values=parse_values(values, "--set"),
         starts=starts,
@@ -244,7 +246,7 @@ def plan(
     else:
         stdout.print(
             f"{found.steps} steps, {found.distance_m:.3f} m in {found.duration_s:.2f} s: {found.energy_J:.2f} J, "
-            f"{found.energy_J / found.distance_m:.2f} J/m; inner steps of {found.solution.x['step_length_m']:.4f} m"
+            f"{found.energy_J / found.distance_m:.2f} J/m; steps of {found.solution.x['step_length_m']:.4f} m"
         )
         if target is not None:
             print_written(target)

@@ -20,12 +20,11 @@ from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.cycle_motion import STEP
-from nlp_gait.gaits.biped.walk import GREATEST_SPEED, LEAST_SPEED, start_from_cycle
+from nlp_gait.gaits.biped.walk import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
 from nlp_gait.gaits.nao.body import load_nao
 from nlp_gait.progress import Progress, ignore_progress
 
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
-FEW_STEPS = 2  # of these, one is a half step at the start, one at the stop
 SENTENCES: Mapping[str, Mapping[str, Any]] = tomllib.loads(
     files(__package__).joinpath("walk_remedies.toml").read_text(encoding="utf-8")
 )
@@ -75,18 +74,20 @@ def plan_walk(
     *,
     speed_m_s: float | None = None,
     distance_m: float | None = None,
+    slope_deg: float = 0.0,
     intervals: int = 10,
     values: dict[str, float] | None = None,
     starts: int = 3,
     progress: Progress = ignore_progress,
 ) -> WalkPlan:
-    """Plan a walk from standing to standing on the flat with least energy per metre.
+    """Plan a walk from standing to standing with least energy per metre.
 
     Args:
         robot: name or file; robots of NAO's build swing their arms and have closed-form legs, others are planned as humanoids.
         steps: swings of a foot, both half steps included; None for 10, or for as many as the distance takes.
         speed_m_s: of the inner steps; None for the cheapest.
         distance_m: that the feet advance; None for the cheapest steps.
+        slope_deg: by which the ground rises forward; the distance is along it.
         intervals: of each phase.
         values: parameters and bounds of ``nao-walk`` or ``humanoid-walk``, by name.
         starts: most start points, until one converges.
@@ -100,13 +101,19 @@ def plan_walk(
         if value is not None and not (isinstance(value, (int, float)) and 0.0 < value < math.inf):
             raise InputError(f"{name} must be a finite number > 0, got {value!r}")
     name = find_walk(robot)
-    count = 10 if steps is None else check_count("steps", steps, at_least=FEW_STEPS)
-    problem = load(name, robot=robot, steps=count, intervals=intervals)
+    count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
+    problem = load(name, robot=robot, steps=count, intervals=intervals, slope_deg=slope_deg)
     if steps is None and distance_m is not None:
         natural = problem.by_name(problem.start_point(np.random.default_rng(0)))[STEP]
-        problem = load(name, robot=robot, steps=max(FEW_STEPS, round(distance_m / natural) + 1), intervals=intervals)
+        count = max(HALF_STEPS, round(distance_m / natural) + 1)
+        problem = load(name, **{**problem.options, "steps": count})
     problem = problem.with_values(**(values or {}))
     if speed_m_s is not None:
+        if LEAST_SPEED not in problem.values:
+            raise InputError(
+                f"speed_m_s={speed_m_s:g} is that of the inner steps, and a walk of {HALF_STEPS} half steps has none; "
+                "plan more steps, or leave the speed out"
+            )
         problem = problem.with_values(**{LEAST_SPEED: speed_m_s, GREATEST_SPEED: speed_m_s})
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
@@ -129,7 +136,7 @@ def _fix_step(problem: GaitProblem, distance_m: float) -> GaitProblem:
     least, most = float(problem.lower[i]), float(problem.upper[i])
     if not least <= step_m <= most:
         fewest, largest = math.ceil(distance_m / most) + 1, math.floor(distance_m / least) + 1
-        remedy = f"use {fewest} to {largest} steps" if FEW_STEPS <= fewest <= largest else "choose another distance"
+        remedy = f"use {fewest} to {largest} steps" if HALF_STEPS <= fewest <= largest else "choose another distance"
         raise InputError(
             f"{distance_m:g} m in {steps} steps needs steps of {step_m:.3g} m; they are {least:g} to {most:g} m long; {remedy}"
         )

@@ -42,7 +42,8 @@ class SimulationModel:
     """What a physics engine needs of a problem."""
 
     robot: RobotModel  #: as the engine models it, where links that never move are welded
-    gravity: float  #: [m/s^2]
+    gravity: float  #: magnitude [m/s^2]
+    slope_rad: float = 0.0  #: by which the floor rises forward; all places are in its axes
     heat_loss: str | None = None  #: parameter with the heat constant K [W/(Nm)^2]; None for motors without known heat
     repeats: bool = False  #: several steps can be simulated one after the other
     steps: int | None = None  #: of a whole walk; None for a phase, or for one step

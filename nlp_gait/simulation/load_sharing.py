@@ -23,7 +23,7 @@ from nlp_gait.robots.tree import tree_from
 from nlp_gait.simulation.feedback import check_period
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
 from nlp_gait.symbolic.balance import SOLE_FRICTION, shift_down, shift_up, sole_limits
-from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.dynamics import newton_euler, tilt_gravity
 
 MOVED = ("q", "qd", "qdd")
 WRENCH = 6  # its components
@@ -108,7 +108,7 @@ def compute_instants(plan: Plan, samples: slice) -> Instants:
     q, qd, qdd = (dict(zip(joints, ca.vertsplit(symbol), strict=True)) for symbol in symbols)
     pushes = {feet["right"].link: shift_up(wrench, feet["right"].ankle_height_m)}
     tree = tree_from(plan.robot, feet["left"].link)
-    torques, at_ankle = newton_euler(tree, q, qd, qdd, plan.gravity, pushes=pushes)
+    torques, at_ankle = newton_euler(tree, q, qd, qdd, tilt_gravity(plan.gravity, plan.slope_rad), pushes=pushes)
     loads = ca.vertcat(*(torques[name] for name in joints)), shift_down(at_ankle, feet["left"].ankle_height_m)
     parts = [part for value in loads for part in (value, -ca.jacobian(value, wrench))]
     function = ca.Function("loads", symbols, ca.substitute(parts, [wrench], [SX.zeros(WRENCH)]))

@@ -16,6 +16,7 @@ from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.shapes import Prism, Shape
+from nlp_gait.symbolic.dynamics import tilt_gravity
 
 # Compared with 0.1 ms, power is 1 % higher in single support; in double support it is 12 % higher with set-points held for 40 ms
 # and equal with smooth ones. At 1 ms the light feet chatter.
@@ -38,7 +39,14 @@ Shapes = Mapping[str, Sequence[Shape]]
 def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
     """Return the model of a plan's robot and ground; see ``make_model``."""
     return make_model(
-        plan.robot, plan.shapes(sole), drive, plan.gravity, friction, ground=plan.ground, planar=plan.planar
+        plan.robot,
+        plan.shapes(sole),
+        drive,
+        plan.gravity,
+        friction,
+        slope_rad=plan.slope_rad,
+        ground=plan.ground,
+        planar=plan.planar,
     )
 
 
@@ -49,17 +57,19 @@ def make_model(
     gravity: float,
     friction: float = FRICTION,
     *,
+    slope_rad: float = 0.0,
     ground: Sequence[Tread] = (),
     planar: bool = False,
 ) -> str:
     """Return the model of a robot on a floor with position drives; only solid shapes can touch the ground.
 
-    Gravity is along -z [m/s^2]. The ground adds stairs; if planar, the robot's root stays in the plane y = 0.
+    Gravity [m/s^2] is in the axes of the floor, which rises forward by an angle. The ground adds stairs; if planar, the robot's
+    root stays in the plane y = 0.
     """
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     _, option, default, _, assets, world, actuators = root
     root.set("model", robot.name)
-    option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(0.0, 0.0, -gravity)}
+    option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(*tilt_gravity(gravity, slope_rad))}
     default[0].set("friction", _numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
     _add_hulls(assets, shapes)
     _add_stairs(world, ground)

@@ -32,7 +32,8 @@ class Plan:
     full_robot: Robot  #: with all joints, for its shapes
     signals: Signals  #: planned time histories on a dense grid
     heat_loss: float  #: K [W/(Nm)^2]
-    gravity: float  #: [m/s^2]
+    gravity: float  #: magnitude [m/s^2]
+    slope_rad: float = 0.0  #: by which the floor rises forward; all places are in its axes
     ground: tuple[Tread, ...] = ()  #: stairs on the floor, which is at z = 0
     steps: int | None = None  #: that the motion has; None for one phase or one cycle
     planar: bool = False  #: the robot's root stays in the plane y = 0
@@ -161,6 +162,7 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
         signals=signals,
         heat_loss=0.0 if model.heat_loss is None else problem.value(model.heat_loss),
         gravity=model.gravity,
+        slope_rad=model.slope_rad,
         ground=() if model.ground is None else model.ground(at, steps or 1),
         steps=steps or model.steps,
         planar=model.planar,

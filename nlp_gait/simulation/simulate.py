@@ -54,7 +54,8 @@ class Conditions:
     friction: float = FRICTION  # coefficient of sliding friction
     mass_factor: float = 1.0  # on masses and inertias of all links; the gait was planned for 1
     stiffness_factor: float = 1.0  # on the stiffness of the joints' drives; their damping stays
-    slope_rad: tuple[float, float] = (0.0, 0.0)  # (x, y) slope of the floor: positive rises forward or to the left
+    # (x, y) slope of the floor, besides the plan's: positive rises forward or to the left
+    slope_rad: tuple[float, float] = (0.0, 0.0)
     push: Push | None = None
 
     def __post_init__(self) -> None:
@@ -65,9 +66,9 @@ class Conditions:
         if not all(abs(slope) < math.pi / 4 for slope in self.slope_rad):
             raise InputError(f"slope_rad must be within +-pi/4, got {self.slope_rad}")
 
-    def gravity(self, magnitude: float) -> tuple[float, float, float]:
-        """Return gravity in the axes of the sloping floor [m/s^2]."""
-        x, y = (math.tan(slope) for slope in self.slope_rad)
+    def gravity(self, magnitude: float, planned_rad: float = 0.0) -> tuple[float, float, float]:
+        """Return gravity in the axes of the sloping floor [m/s^2]; the planned slope rises forward."""
+        x, y = (math.tan(slope + more) for slope, more in zip(self.slope_rad, (planned_rad, 0.0), strict=True))
         scale = magnitude / math.sqrt(1.0 + x * x + y * y)
         return (-x * scale, -y * scale, -scale)
 
@@ -153,7 +154,7 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     model.body_inertia *= conditions.mass_factor
     model.actuator_gainprm[:, 0] *= conditions.stiffness_factor
     model.actuator_biasprm[:, 1] *= conditions.stiffness_factor
-    model.opt.gravity[:] = conditions.gravity(plan.gravity)
+    model.opt.gravity[:] = conditions.gravity(plan.gravity, plan.slope_rad)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)
     at, start = Addresses(model, plan), np.zeros(1)

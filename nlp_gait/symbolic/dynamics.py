@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -57,12 +58,17 @@ class Inertia(NamedTuple):
     second: np.ndarray[Any, Any]
 
 
+def tilt_gravity(magnitude: float, slope_rad: float) -> tuple[float, float, float]:
+    """Return gravity (3,) [m/s^2] in the axes of ground that rises forward by an angle: x along it, z normal to it."""
+    return 0.0 - magnitude * math.sin(slope_rad), 0.0, -magnitude * math.cos(slope_rad)
+
+
 def newton_euler(
     tree: Sequence[Body],
     q: Mapping[str, SX],
     qd: Mapping[str, SX],
     qdd: Mapping[str, SX],
-    gravity: float,
+    gravity: float | tuple[float, float, float],
     shares: Mapping[str, SX] | None = None,
     upright: Collection[str] = (),
     pushes: Mapping[str, Wrench] | None = None,
@@ -74,7 +80,7 @@ def newton_euler(
         q: joint angles by name [rad]; a constant angle costs no operations.
         qd: joint velocities by name [rad/s].
         qdd: joint accelerations by name [rad/s^2].
-        gravity: magnitude, acting along -z [m/s^2].
+        gravity: magnitude, acting along -z, or the vector (3,) [m/s^2].
         shares: factors on mass and inertia of links by name, for a link that two trees carry together.
         upright: links that do not turn, which saves operations.
         pushes: other wrenches on links by name, about their reference points and in their axes.
@@ -151,17 +157,18 @@ def _accelerate(
     rotations: Sequence[SX],
     qd: Mapping[str, SX],
     qdd: Mapping[str, SX],
-    gravity: float,
+    gravity: float | tuple[float, float, float],
     upright: Collection[str],
 ) -> tuple[list[SX], list[SX]]:
     """Return force and moment that the motion of each body needs, about its reference point, in its axes."""
     moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
     forces: list[SX] = []
     moments: list[SX] = []
+    down = gravity if isinstance(gravity, tuple) else (0.0, 0.0, -gravity)
     for body, inertia, rotation in zip(tree, inertias, rotations, strict=True):
         spin, spin_rate = SX(3, 1), SX(3, 1)
         if body.joint is None:
-            acceleration = SX(DM([0, 0, gravity]))  # gravity as an upward acceleration of the ground
+            acceleration = SX(DM([0.0 - part for part in down]))  # gravity as an upward acceleration of the ground
         else:
             parent_spin, parent_spin_rate, parent_turning, parent_acceleration = moved[body.parent]
             acceleration = rotation.T @ (parent_acceleration + parent_turning @ DM(body.offset_m))

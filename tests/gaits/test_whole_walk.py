@@ -11,9 +11,12 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, find_walk, plan_walk
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import GaitProblem, load_result
+from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaits.biped.walk import start_from_cycle
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import Conditions
+from nlp_gait.symbolic.dynamics import tilt_gravity
 from tests.compare.cli.calls import as_json
 
 STEPS = 3
@@ -51,6 +54,38 @@ def test_neighbouring_phases_share_angles_and_rates(problem: GaitProblem, x: np.
         jump = np.abs(np.diff(arrays[name], axis=0) - trapezoid).max()
         largest = np.abs(arrays[rate]).max()
         assert jump < 0.6 * t.max() * largest  # accelerations jump by at most their largest value between two samples
+
+
+def test_a_walk_of_two_half_steps_has_no_inner_step() -> None:
+    """It has no row, variable or speed of one, so no limit of an inner step can stop it."""
+    two = nlp_gait.load("nao-walk", steps=2)
+    others = {name for name in nlp_gait.load("nao-walk", steps=STEPS).names} - set(two.names)
+    assert {"swing_height_m", "single_support_time_s", "double_support_time_s", "hip_x_touch_down_m"} <= others
+    x = two.start_point(np.random.default_rng(0))
+    model = build_exact_model(two)
+    found = model.at(x, two.p)
+    assert not [row.name for row in model.rows(found) if row.name.startswith(("ssp_", "dsp_", "speed"))]
+    assert not {"greatest_speed_m_s", "least_speed_m_s"} & set(two.values) and "speed_m_s" not in found.indexes
+    arrays = two.signals(x).arrays
+    assert found.indexes["duration_s"] == pytest.approx(arrays["t"][-1])
+    assert found.indexes["distance_m"] == pytest.approx(arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0])
+    assert found.indexes["distance_m"] == pytest.approx(two.by_name(x)["step_length_m"])
+
+
+def test_on_a_slope_the_weight_acts_behind_the_centre_of_mass() -> None:
+    """At rest the ZMP is where the vertical line through the centre of mass meets the slope, which is also the engine's."""
+    problem = nlp_gait.load("nao-walk", steps=STEPS, slope_deg=5.0)
+    values = problem.by_name(problem.start_point(np.random.default_rng(0)))
+    still = {name: 0.0 for name in values if "start_lift_off" in name}  # the weight shift is a rest
+    still |= {f"hip_{axis}_start_lift_off_m": values[f"hip_{axis}_stand_m"] for axis in "xz"}
+    found = np.array(list({**values, **still}.values()))
+    arrays = {name: array[:5] for name, array in problem.signals(found).arrays.items()}
+    below = arrays["com"][:, 0] - np.tan(np.radians(5.0)) * arrays["com"][:, 2]
+    np.testing.assert_allclose(arrays["zmp"][:, 0], below, atol=1e-9)
+    plan = make_plan(Result(problem=problem, x=found))
+    gravity = Conditions().gravity(plan.gravity, plan.slope_rad)
+    np.testing.assert_allclose(gravity, tilt_gravity(plan.gravity, np.radians(5.0)), rtol=1e-12)
+    assert Conditions().gravity(9.8) == (0.0, 0.0, -9.8)
 
 
 @pytest.mark.slow
@@ -121,6 +156,8 @@ def test_a_violation_names_step_constraint_amount_and_remedy(row: str, sentence:
     [
         ({"steps": 1}, "steps"),
         ({"steps": 4, "distance_m": 3.0}, r"needs steps of 1 m; they are .* m long; use 26 to 151 steps"),
+        ({"steps": 2, "speed_m_s": 0.05}, "a walk of 2 half steps has none; plan more steps"),
+        ({"slope_deg": 60.0}, r"slope_deg must be within \+-30, got 60.0"),
         ({"speed_m_s": 0.0}, "speed_m_s must be a finite number > 0, got 0.0"),
         ({"distance_m": float("nan")}, "distance_m must be a finite number > 0"),
     ],

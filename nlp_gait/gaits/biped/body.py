@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import Literal, Self, TypeAlias
 
 import numpy as np
 from casadi import MX, SX, fmax
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
@@ -21,13 +23,14 @@ from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import make_skeleton
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign, tree_from
-from nlp_gait.symbolic.dynamics import Wrench, newton_euler
+from nlp_gait.symbolic.dynamics import Wrench, newton_euler, tilt_gravity
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
 
 PhaseName: TypeAlias = Literal["ssp", "dsp"]
 TIMES: dict[PhaseName, str] = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
 LIFT = "swing_height_m"
+STEEPEST_DEG = 30.0  # slope of the ground
 
 
 def read_duration(at: InstantPoint, phase: PhaseName) -> SX:
@@ -70,7 +73,7 @@ class Body(ABC):
     leg_joints: Mapping[str, Sequence[str]]
     coordinates: tuple[Coordinate, ...]  # angles that a cycle plans besides the hip
     upright: frozenset[str]  # links that never turn
-    gravity: float  # [m/s^2]
+    gravity: float  # magnitude [m/s^2]
     feet_y: tuple[float, float]  # of the left and the right foot in all gaits, each below its own hip [m]
     leg_length_m: float  # from hip to ankle
     hip_height_m: tuple[float, float]  # least and greatest height of the hip
@@ -79,6 +82,7 @@ class Body(ABC):
     hip_name: str = "torso origin"  # of this point, in words
     step_length_m: float = 0.06  # default, from foot to foot
     heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
+    slope_rad: float = 0.0  # by which the ground rises forward; all places are in its axes
     closed_form: bool = True  # False if Newton's method computes the legs' angles
     drive_limits: bool = False  # whether torques and speeds are within the limits of the robot's file
     length_scale: float = 1.0  # lengths relative to NAO's
@@ -91,6 +95,17 @@ class Body(ABC):
     def robot(self) -> Robot:
         """The robot as the dynamics take it: links welded that never move, perhaps with the inertia of its rotors."""
         return self.motors.model
+
+    def tilt_ground(self, slope_deg: float) -> Self:
+        """Return the robot on ground that rises forward by an angle; raises InputError beyond ``STEEPEST_DEG``."""
+        if isinstance(slope_deg, bool) or not abs(slope_deg) <= STEEPEST_DEG:
+            raise InputError(f"slope_deg must be within +-{STEEPEST_DEG:g}, got {slope_deg!r}")
+        return replace(self, slope_rad=math.radians(slope_deg))
+
+    @property
+    def gravity_vector(self) -> tuple[float, float, float]:
+        """Gravity (3,) in the axes of the ground [m/s^2]."""
+        return tilt_gravity(self.gravity, self.slope_rad)
 
     @cached_property
     def mirror(self) -> tuple[list[int], Array]:
@@ -114,7 +129,7 @@ class Body(ABC):
 
         def solve(link: str, names: Sequence[str]) -> tuple[dict[str, SX], Wrench]:
             tree = tree_from(self.robot, link, names)
-            return newton_euler(tree, q, qd, qdd, self.gravity, shares, self.upright)
+            return newton_euler(tree, q, qd, qdd, self.gravity_vector, shares, self.upright)
 
         q, qd, qdd = ({name: motion[order] for name, motion in motions.items()} for order in range(3))
         torques, wrench = solve(fixed_link, joints)

@@ -182,7 +182,7 @@ def make_planned_loads(body: Body) -> Loader:
         q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
         feet, wrench = {side: ankle[:2] for side, ankle in now.ankles.items()}, now.wrench
         pushes = {right.link: shift_up(wrench, right.ankle_height_m)}
-        torques, at_ankle = newton_euler(tree, q, qd, qdd, body.gravity, upright=body.upright, pushes=pushes)
+        torques, at_ankle = newton_euler(tree, q, qd, qdd, body.gravity_vector, upright=body.upright, pushes=pushes)
         own = shift_down(at_ankle, left.ankle_height_m)
         arm = ca.vertcat(feet["R"] - feet["L"], 0)
         both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))

@@ -106,7 +106,12 @@ def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False, steps:
     """
     simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
     model = SimulationModel(
-        robot=simulated, gravity=body.gravity, heat_loss=HEAT_LOSS.name, repeats=repeats, steps=steps
+        robot=simulated,
+        gravity=body.gravity,
+        slope_rad=body.slope_rad,
+        heat_loss=HEAT_LOSS.name,
+        repeats=repeats,
+        steps=steps,
     )
     display = replace(problem.display, robot=body.full, skeleton=body.skeleton, simulation_model=model)
     return replace(problem, display=display)

@@ -2,12 +2,13 @@
 
 All inner steps are the same cycle, whose states at both switches are variables; the start ends in the cycle's state, and the stop
 begins there. So the size of the problem does not depend on the number of steps, and hip, feet and joints have continuous
-positions and velocities for any x.
+positions and velocities for any x. A walk of two half steps has no inner step, and neither variables nor rows of one.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -60,6 +61,7 @@ from nlp_gait.gaits.biped.joined_phases import (
     join_phases,
     list_rows_over_time,
 )
+from nlp_gait.gaits.biped.limits import RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
@@ -69,7 +71,7 @@ from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 CYCLE_END = "cycle_end"
-MOST_STEPS = 1000
+HALF_STEPS, MOST_STEPS = 2, 1000  # the first and the last step are half steps
 LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
 NO_LIMIT = 100.0  # [m/s]
 START_NOISE = 0.002  # of start points, as a share of the bounds' ranges
@@ -118,9 +120,15 @@ class WholeWalk:
     phases: Mapping[str, Phase]  # by kind
 
     @property
+    def parts(self) -> dict[str, Part]:
+        """The phases that it consists of: without those of the inner steps if there are none."""
+        return {name: part for name, part in PARTS.items() if self.steps > HALF_STEPS or name not in TIMES}
+
+    @property
     def counts(self) -> dict[str, int]:
         """How often each part occurs in the walk."""
-        return dict.fromkeys(PARTS, 1) | {STAND: 0, "ssp": self.steps - 2, "dsp": self.steps - 2}
+        often = {STAND: 0, "ssp": self.steps - HALF_STEPS, "dsp": self.steps - HALF_STEPS}
+        return {name: often.get(name, 1) for name in self.parts}
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -133,55 +141,63 @@ class WholeWalk:
             (STEPS, "1", float(self.steps), "number of steps; set by the option steps", self.steps, self.steps)
         )
         found = collect_parameters(self.phases)
-        return (*count, *speeds, *sorted(found, key=lambda p: p.name.endswith((".lower", ".upper"))))
+        own = (*count, *speeds) if "ssp" in self.parts else count
+        return (*own, *sorted(found, key=lambda p: p.name.endswith((".lower", ".upper"))))
 
     def assemble(self, at: Point, ops: Nonsmooth) -> Assembly:
         """Return energy per metre, rows and indexes."""
-        points = {name: self.read_part(name, at) for name in PARTS}
+        parts = self.parts
+        points = {name: self.read_part(name, at) for name in parts}
         samples: dict[str, Samples] = {}
         for kinds in (("ssp",), ("dsp", STAND)):  # double support differs in its limits only
-            names = [name for name, part in PARTS.items() if part.kind in kinds]
+            names = [name for name, part in parts.items() if part.kind in kinds]
             several = self.phases[kinds[0]].sample_several([points[name] for name in names], ops)
             samples |= dict(zip(names, several, strict=True))
         found = {
             name: assemble_part(name, part.kind, self.phases[part.kind], points[name], samples[name], ops)
-            for name, part in PARTS.items()
+            for name, part in parts.items()
         }
         times = {name: point[DURATION] for name, point in points.items()}
-        energies = {name: found[name].indexes[f"{name}_power_W"] * times[name] for name in PARTS}
-        inner = at[STEPS] - 2
+        energies = {name: found[name].indexes[f"{name}_power_W"] * times[name] for name in parts}
+        inner = at[STEPS] - HALF_STEPS
         energy, duration = (
-            sum((part[name] * (inner if name in TIMES else 1) for name in PARTS if name != STAND), MX(0))
+            sum((part[name] * (inner if name in TIMES else 1) for name in parts if name != STAND), MX(0))
             for part in (energies, times)
         )
-        distance, period = (inner + 1) * at[STEP], times["ssp"] + times["dsp"]
-        speed = Constraint(
-            name="speed",
-            unit="m/s",
-            scale=0.01,
-            value=at[STEP] / period,
-            lower=at[LEAST_SPEED],
-            upper=at[GREATEST_SPEED],
-            over="once",
-        )
+        distance = (inner + 1) * at[STEP]
+        speeds, indexes = self._limit_speed(at, times, energies) if "ssp" in parts else ((), {})
         return Assembly(
             objective=energy / distance,
-            constraints=(*(row for part in found.values() for row in part.constraints), speed),
+            constraints=(*(row for part in found.values() for row in part.constraints), *speeds),
             indexes={
                 "energy_J": energy,
                 "distance_m": distance,
                 "duration_s": duration,
-                "speed_m_s": at[STEP] / period,
                 "energy_J_per_m": energy / distance,
-                "cycle_energy_J_per_m": (energies["ssp"] + energies["dsp"]) / at[STEP],
+                **indexes,
                 **{name: value for part in found.values() for name, value in part.indexes.items()},
             },
         )
 
+    def _limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+        """Return the row and the indexes of the inner steps."""
+        speed = at[STEP] / (times["ssp"] + times["dsp"])
+        row = Constraint(
+            name="speed",
+            unit="m/s",
+            scale=0.01,
+            value=speed,
+            lower=at[LEAST_SPEED],
+            upper=at[GREATEST_SPEED],
+            over="once",
+        )
+        cost = (energies["ssp"] + energies["dsp"]) / at[STEP]
+        return (row,), {"speed_m_s": speed, "cycle_energy_J_per_m": cost}
+
     def read_part(self, name: str, at: NumericPoint) -> NumericPoint:
         """Return the point of one phase: its own variables, see ``make_phase_variables``, from those of the walk."""
         part, step = PARTS[name], at[STEP]
-        lift = at[part.lift] if part.kind == "ssp" else at[LIFT]
+        lift = at[part.lift] if part.kind == "ssp" else 0.0
         values = [*self._read_state(part.begin, at), *self._read_state(part.end, at), lift]
         values += [ca.fmax(at[part.duration], LEAST_DURATION), part.feet[0] * step, part.feet[1] * step]
         names = [variable.name for variable in self.phases["ssp"].variables]
@@ -205,7 +221,7 @@ class WholeWalk:
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
         """All phases as functions of time; of the inner steps the first one."""
         counts = self.counts
-        parts = ((name, part.kind, part.duration, counts[name]) for name, part in PARTS.items())
+        parts = ((name, part.kind, part.duration, counts[name]) for name, part in self.parts.items())
         return list_rows_over_time(parts, self.phases, self.read_part)
 
     def signals(self, at: NumericPoint) -> Signals:
@@ -214,7 +230,7 @@ class WholeWalk:
         def join(*names: str) -> Signals:
             return join_phases(self.phases[PARTS[name].kind].signals(self.read_part(name, at)) for name in names)
 
-        inner = [join("ssp", "dsp")] * (self.steps - 2)
+        inner = [join("ssp", "dsp")] * (self.steps - HALF_STEPS) if "ssp" in self.parts else []
         steps = [join("shift", "start_ssp", "start_dsp"), *inner, join("stop_ssp", "stop_dsp")]
         return join_steps(steps, self.body.robot, np.array([float(at[STEP]), 0.0, 0.0]))
 
@@ -242,7 +258,7 @@ def make_whole_walk(body: Body, steps: int, sharing: LoadSharing, grid: Grid, go
         )
         for kind, own in {"ssp": margins["ssp"], "dsp": margins["dsp"], STAND: beside}.items()
     }
-    return WholeWalk(body=body, steps=steps, variables=make_walk_variables(body), phases=phases)
+    return WholeWalk(body=body, steps=steps, variables=make_walk_variables(body, steps), phases=phases)
 
 
 def make_phase_variables(body: Body) -> tuple[Variable, ...]:
@@ -259,11 +275,15 @@ def make_phase_variables(body: Body) -> tuple[Variable, ...]:
     )
 
 
-def make_walk_variables(body: Body) -> tuple[Variable, ...]:
-    """Return the variables of the cycle, and those of both ends of the walk after them."""
+def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
+    """Return the variables of the cycle, and those of both ends of the walk after them.
+
+    Without inner steps, only the state between the half steps and the step length remain of the cycle.
+    """
     cycle = make_cycle_variables(body)
     own = {variable.name: variable for variable in cycle}
-    found = list(cycle)
+    inner = {LIFT, *TIMES.values()} | {name for name in own if "touch_down" in name}
+    found = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
     for name, switch in STATES.items():
         found += make_state_variables(body, name, switch)
     # The pose at both ends is symmetric and at rest, so the other coordinates are zero.
@@ -286,7 +306,7 @@ def make_walk_variables(body: Body) -> tuple[Variable, ...]:
 
 def plan_whole_walk(body: Body, steps: int, grid: Grid, goal: Goal, sharing: LoadSharing) -> GaitProblem:
     """Return the problem of a whole walk of least energy per metre; for the options see ``gaits.nao``."""
-    steps = check_count("steps", steps, at_least=2, at_most=MOST_STEPS)
+    steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
     walk = make_whole_walk(body, steps, sharing, grid, goal)
     durations = [PARTS[name].duration for name, count in walk.counts.items() for _ in range(count)]
     problem = GaitProblem(
@@ -299,7 +319,9 @@ def plan_whole_walk(body: Body, steps: int, grid: Grid, goal: Goal, sharing: Loa
         grid=grid,
         rows_over_time=walk.rows_over_time if body.closed_form else (),
         display=Display(motion=walk.signals, durations=tuple(durations)),
-        hints=SolverHints(start=partial(start_walk, walk.variables), starts=3, searchable=False),
+        hints=SolverHints(
+            start=partial(start_walk, walk.variables, math.tan(body.slope_rad)), starts=3, searchable=False
+        ),
     )
     return add_robot(problem, body, steps=steps)
 
@@ -311,19 +333,26 @@ def _load_start() -> dict[str, float]:
     return shares
 
 
-def start_walk(variables: Sequence[Variable], parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Draw a start point (n,) near a walk of NAO in proportion to the bounds, at the required speed."""
+def start_walk(
+    variables: Sequence[Variable], rise: float, parameters: Mapping[str, float], rng: np.random.Generator
+) -> Array:
+    """Draw a start point (n,) near a walk of NAO in proportion to the bounds, at the required speed.
+
+    On ground that rises forward, by ``rise`` for each metre, the hip is ahead by that share of its height.
+    """
     shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
     x = {
         variable.name: variable.lower + width * shares.get(variable.name, 0.5)
         for variable, width in zip(variables, widths, strict=True)
     }
-    speed = x[STEP] / sum(x[time] for time in TIMES.values())
-    wanted = min(max(speed, parameters[LEAST_SPEED]), parameters[GREATEST_SPEED])
-    if wanted < speed:
-        x[TIMES["dsp"]] += x[STEP] / wanted - x[STEP] / speed
-    elif wanted > speed:
-        x[STEP] *= wanted / speed
+    for name in x:
+        if name.startswith("hip_x_"):
+            x[name] += rise * x[f"hip_z_{STAND}_m"]
+    if LEAST_SPEED in parameters:
+        speed = x[STEP] / sum(x[time] for time in TIMES.values())
+        wanted = min(max(speed, parameters[LEAST_SPEED]), parameters[GREATEST_SPEED])
+        x[TIMES["dsp"]] += max(x[STEP] / wanted - x[STEP] / speed, 0.0)
+        x[STEP] *= max(wanted / speed, 1.0)
     lower, upper = (np.array([parameters[f"{name}.{end}"] for name in x]) for end in ("lower", "upper"))
     noise = START_NOISE * np.array(widths) * rng.uniform(-1.0, 1.0, len(x))
     return np.asarray(np.clip(np.array(list(x.values())) + noise, lower, upper))

@@ -100,6 +100,7 @@ def humanoid_walk(
     steps: int = 10,
     intervals: int = 10,
     samples_per_interval: int = 0,
+    slope_deg: float = 0.0,
     drive_limits: bool = True,
     motors: str = "",
 ) -> GaitProblem:
@@ -111,7 +112,7 @@ def humanoid_walk(
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
-    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
     return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"))
 

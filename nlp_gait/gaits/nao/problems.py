@@ -158,6 +158,7 @@ def nao_walk(
     intervals: int = 10,
     rotational_inertia: bool = True,
     samples_per_interval: int = 0,
+    slope_deg: float = 0.0,
     motors: str = "",
 ) -> GaitProblem:
     """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
@@ -171,12 +172,13 @@ def nao_walk(
         intervals: of each phase.
         rotational_inertia: False takes every link as a point mass.
         samples_per_interval: above 1 for a denser grid.
+        slope_deg: by which the ground rises forward; all places are in its axes, in which gravity is tilted.
         motors: features of the real motors; the mean square of a continuous torque is that of each phase.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
     return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"))
 
