@@ -14,8 +14,8 @@ REMEDY = "WebAssembly needs the package ziglang: pip install 'nlp-gait[compiler]
 # Two candidates at a time by the 128-bit instructions that every browser has since 2023.
 LANES = ("-DLANES=2", "-msimd128")
 TARGET = ("-target", "wasm32-wasi")
-# No exceptions, which would need the run-time library of C++.
-LEAN = ("-fno-exceptions", "-fno-rtti")
+# No exceptions, which would need the run-time library of C++; no debug information, which takes most of the time.
+LEAN = ("-fno-exceptions", "-fno-rtti", "-g0")
 
 
 def has_compiler() -> bool:
