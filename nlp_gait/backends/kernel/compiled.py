@@ -31,7 +31,7 @@ from nlp_gait.formulation.numbers import to_floats
 SCALAR_FUNCTIONS = ("-DNO_VECTOR_LIBM",)
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 # Candidates in one call of the virtual machine; more would only use more memory.
-BLOCK = 64
+BLOCKS = (64, 16, 4, 1)
 
 
 class NativeKernel:
@@ -85,12 +85,8 @@ class InterpretedKernel:
     """Evaluates a kernel in CasADi's virtual machine, one thread at a time: many times slower, the same numbers."""
 
     def __init__(self, kernel: Kernel) -> None:
-        n, k, m = kernel.function.size1_in(0), kernel.function.size1_in(1), kernel.function.size1_out(1)
-        x, p = ca.MX.sym("x", n, BLOCK), ca.MX.sym("p", k)
-        cost, g = kernel.function.map(BLOCK)(x, ca.repmat(p, 1, BLOCK))
-        self._function = ca.Function("block", [x, p], [cost, g])
+        self._blocks = {size: _map_kernel(kernel, size) for size in BLOCKS}
         self._weights = kernel.weights
-        self._shape = n, m
         self.description = "interpreted by CasADi's virtual machine"
 
     @lock_casadi
@@ -98,19 +94,25 @@ class InterpretedKernel:
         self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
     ) -> None:
         """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n)."""
-        block = np.zeros((self._shape[0], BLOCK))
-        for first in range(0, len(X), BLOCK):
-            rows = slice(first, min(first + BLOCK, len(X)))
-            count = rows.stop - rows.start
-            block[:, :count] = X[rows].T
-            cost, values = (np.array(output)[:, :count].T for output in self._function(block, p))
-            # Plain maximum, not fmax: a NaN must not pass for feasible.
-            violations = np.maximum(np.maximum(lower - values, values - upper), 0.0)
-            finite = np.isfinite(X[rows]).all(axis=1)
-            f[rows] = np.where(finite, cost[:, 0], np.inf)
-            violation[rows] = np.where(finite, violations @ self._weights, np.inf)
-            if g is not None:
-                g[rows] = values
+        first = 0
+        for size, block in self._blocks.items():
+            while len(X) - first >= size:
+                rows = slice(first, first + size)
+                cost, values = (np.array(output).T for output in block(X[rows].T, p))
+                # Plain maximum, not fmax: a NaN must not pass for feasible.
+                violations = np.maximum(np.maximum(lower - values, values - upper), 0.0)
+                finite = np.isfinite(X[rows]).all(axis=1)
+                f[rows] = np.where(finite, cost[:, 0], np.inf)
+                violation[rows] = np.where(finite, violations @ self._weights, np.inf)
+                if g is not None:
+                    g[rows] = values
+                first += size
+
+
+def _map_kernel(kernel: Kernel, size: int) -> ca.Function:
+    x, p = ca.MX.sym("x", kernel.function.size1_in(0), size), ca.MX.sym("p", kernel.function.size1_in(1))
+    cost, g = kernel.function.map(size)(x, ca.repmat(p, 1, size))
+    return ca.Function("block", [x, p], [cost, g])
 
 
 # Least work of a thread; handing over work costs about 0.05 ms.

@@ -14,6 +14,7 @@ import pytest
 
 from compare.papers import load_reproduction
 from compare.report import writing
+from tests.compilers import hide_compilers
 from tests.compare.pictures import save_coarsely
 
 
@@ -36,19 +37,27 @@ class Finished:
 
 
 def reproduce(
-    paper: str, folder: Path, *, coarse: bool = False, drawn: Collection[str] = (), **changes: Any
+    paper: str,
+    folder: Path,
+    *,
+    coarse: bool = False,
+    drawn: Collection[str] = (),
+    compiled: bool = True,
+    **changes: Any,
 ) -> Finished:
     """Run in this process, since workers would build every problem again; coarse pictures are drawn once and small.
 
     ``drawn`` are the only ones that are drawn, if it names any; others, of the same kinds, are not drawn.
 
-    ``changes`` are those of the quick effort.
+    Without ``compiled`` no compiler is found. ``changes`` are those of the quick effort.
     """
     reproduction = load_reproduction(paper)
     finished = Finished(paper=paper, folder=folder, effort=replace(reproduction.quick, **changes))
     with pytest.MonkeyPatch.context() as patch:
         if coarse:
             patch.setattr(writing, "save", partial(save_coarsely, drawn=drawn))
+        if not compiled:
+            hide_compilers(patch)
         finished.findings = reproduction.reproduce(folder, finished.effort, finished.progress.append, jobs=1)
     return finished
 

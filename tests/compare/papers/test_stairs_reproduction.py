@@ -30,7 +30,7 @@ DRAWN = ("fig06-07", "fig13", "fig28")  # sticks, the network, the rollout
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return reproduce("stairs", tmp_path_factory.mktemp("stairs"), coarse=True, drawn=DRAWN, **LESS)
+    return reproduce("stairs", tmp_path_factory.mktemp("stairs"), coarse=True, drawn=DRAWN, compiled=False, **LESS)
 
 
 def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
