@@ -101,6 +101,7 @@ def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_compiler")
 def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     path = tmp_path / "walk.json"
