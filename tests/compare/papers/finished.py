@@ -14,8 +14,8 @@ import pytest
 
 from compare.papers import load_reproduction
 from compare.report import writing
-from tests.compilers import hide_compilers
 from tests.compare.pictures import save_coarsely
+from tests.compilers import hide_compilers
 
 
 @dataclass(kw_only=True)
