@@ -6,7 +6,7 @@ const LEAST_GAP = 0.0001; // per cent; smaller ones are not distinguished
 class Race {
   // show(x, name) is called with the best point so far, in the problem's units, at most every REDRAW_MS; choose(x) when a user picks it.
   constructor(parent, model, { show, choose }) {
-    Object.assign(this, { model, show, choose, seed: 1, running: false });
+    Object.assign(this, { model, show, choose, seed: 0, running: false });
     this.addControls(element("div", { class: "controls" }, parent));
     this.chart = new Chart(parent, { label: "race", x: "evaluations", y: "power [W]", log: [true, false], height: 320 });
     this.addTable(element("div", { class: "wide" }, parent));
@@ -19,7 +19,7 @@ class Race {
   addControls(bar) {
     this.button = element("button", { type: "button", class: "start" }, bar, "Start");
     this.button.addEventListener("click", () => (this.running ? this.pause() : this.start()));
-    element("button", { type: "button", class: "again" }, bar, "New race").addEventListener("click", () => { this.seed += 1; this.restart(); this.start(); });
+    element("button", { type: "button", class: "again" }, bar, "New race").addEventListener("click", () => { this.restart(); this.start(); });
     const select = (words, options, act) => {
       const made = element("select", {}, element("label", {}, bar, `${words} `));
       for (const [value, shown] of options) element("option", { value }, made, shown);
@@ -54,6 +54,7 @@ class Race {
   }
 
   restart() {
+    this.seed += 1;
     this.running = false;
     this.evaluations = this.elapsed = 0;
     this.runs = SEARCHES.map(({ make, ...about }, k) => ({ ...about, evaluations: 0, best: null, history: [],
