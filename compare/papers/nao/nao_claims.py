@@ -7,7 +7,7 @@ code that it cites (the id with ``-damped``). Other checks are in ``nao_gait_cla
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -27,7 +27,6 @@ from compare.papers.claims import (
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS
-from compare.papers.paper_runs import compute_range
 from nlp_gait.formulation import Array
 
 # A solution that costs this share more than the optimum is as good for a walker.
@@ -142,39 +141,42 @@ def _check_falling(phase: PhaseFindings, over: Literal["hip", "time"]) -> Check:
 def _check_torque_change(phase: PhaseFindings, swarm: str) -> Check:
     """Check PSO's median against GA's over the final solutions of all runs."""
     pso, ga = ([run.verdict.indexes["torque_change_Nm"] for run in phase.searches[name]] for name in (swarm, "ga"))
-    printed = _compute_lead({name: phase.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS})
-    ours = _compute_lead({"pso": float(np.median(pso)), "ga": float(np.median(ga))})
-    middle = [phase.median(name).verdict.indexes["torque_change_Nm"] for name in (swarm, "ga")]
-    p = rank_sum_normal(pso, ga).p_two_sided
-    values = {"swarm": NAMES[swarm], "pso": np.median(pso), "ga": np.median(ga), "middle": middle, "p": p}
-    return require_significance(compare_changes(printed, ours, printed_lead=printed, lead=ours, **values), RANK_SUM, p)
-
-
-def _compute_lead(values: dict[str, float]) -> float:
-    """Return how much PSO's value is above GA's [%]."""
-    return 100 * (values["pso"] / values["ga"] - 1)
+    optima, middle = (
+        phase.paper.optima,
+        [phase.median(name).verdict.indexes["torque_change_Nm"] for name in (swarm, "ga")],
+    )
+    printed = 100 * (optima["pso"].indexes["torque_change_Nm"] / optima["ga"].indexes["torque_change_Nm"] - 1)
+    values = {
+        "swarm": NAMES[swarm],
+        "pso": np.median(pso),
+        "ga": np.median(ga),
+        "middle": middle,
+        "printed_lead": printed,
+    }
+    ours, p = 100 * float(np.median(pso) / np.median(ga) - 1), rank_sum_normal(pso, ga).p_two_sided
+    return require_significance(compare_changes(printed, ours, **values, lead=ours, p=p), RANK_SUM, p)
 
 
 def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -> Check:
     """Check how much more than its least power the median run of a search needs at a swing height [%]."""
-    ssp, at = findings.ssp, PAPER.swing_heights_m.index(height_m)
-    printed = SWING_POWER_W["ga" if algorithm == "ga" else "pso"]
-    printed_rise = 100 * (printed[height_m] / printed[0.015] - 1)
-    middle, every = (ssp.list_swing_powers(algorithm, whole=whole)[at] for whole in (False, True))
-    least = ssp.final_powers(algorithm)
-    rises = [100 * (middle / float(np.median(least)) - 1), 100 * (every / min(least) - 1)]
+    ssp, printed = findings.ssp, SWING_POWER_W["ga" if algorithm == "ga" else "pso"]
+    rises = [
+        100 * (ssp.list_swing_powers(algorithm, whole=whole)[PAPER.swing_heights_m.index(height_m)] / least - 1)
+        for whole, least in ((False, np.median(ssp.final_powers(algorithm))), (True, min(ssp.final_powers(algorithm))))
+    ]
     true = 100 * (findings.swing_power(height_m) / findings.swing_power(0.015) - 1)
-    values = {"search": NAMES[algorithm], "height": height_m, "true": true, "printed_rise": printed_rise}
-    values |= {"rise": _describe_change(rises[0]), "every": _describe_change(rises[1])}
-    return (
-        decide(Verdict.UNTESTABLE, **values)
-        if math.isnan(rises[0])
-        else compare_changes(printed_rise, rises[0], **values)
+    return _compare_histories(
+        100 * (printed[height_m] / printed[0.015] - 1), *rises, search=NAMES[algorithm], height=height_m, true=true
     )
 
 
+def _compare_histories(printed: float, middle: float, every: float, /, **values: Any) -> Check:
+    """Compare a change [%] with that in the median run's history, or runs' histories; NaN where it holds no solution."""
+    values |= {"printed": printed, "middle": _describe_change(middle), "every": _describe_change(every)}
+    return decide(Verdict.UNTESTABLE, **values) if math.isnan(middle) else compare_changes(printed, middle, **values)
+
+
 def _describe_change(change: float) -> str:
-    """Return a change [%] in words; NaN where a history holds no solution."""
     return "none found" if math.isnan(change) else f"{change:+.1f} %"
 
 
@@ -184,21 +186,24 @@ def _check_swing_beyond(findings: NaoFindings) -> Check:
     return require_change(100 * (high / low - 1), low=low, high=high, rise=100 * (high / low - 1))
 
 
-def _compute_swing_leads(phase: PhaseFindings, swarm: str, *, whole: bool) -> Array:
-    """Return how much more GA's cheapest solution near each swing height needs than a swarm's [%]."""
-    pso, ga = (phase.list_swing_powers(name, whole=whole) for name in (swarm, "ga"))
-    return np.asarray(100 * (ga / pso - 1))
+def _compute_swing_leads(phase: PhaseFindings, swarm: str) -> tuple[Array, Array]:
+    """Return how much more GA needs near each swing height than a swarm, by the median runs and by all runs [%]."""
+    middle, every = (
+        100 * (phase.list_swing_powers("ga", whole=whole) / phase.list_swing_powers(swarm, whole=whole) - 1)
+        for whole in (False, True)
+    )
+    return middle, every
 
 
 def _check_swing_heights(phase: PhaseFindings, swarm: str) -> Check:
     """Check that GA needs more at each height, in the median runs [%]; where one has no solution both outcomes are tried."""
-    leads = [_compute_swing_leads(phase, swarm, whole=whole) for whole in (False, True)]
-    texts = (
+    leads = _compute_swing_leads(phase, swarm)
+    texts = [
         ", ".join(f"{_describe_change(v)} at {at:.3f} m" for v, at in zip(row, PAPER.swing_heights_m, strict=True))
         for row in leads
-    )
+    ]
     readings = [np.nan_to_num(leads[0], nan=end) for end in (math.inf, -math.inf)]
-    return require_change(readings, swarm=NAMES[swarm], **dict(zip(("middle", "every"), texts, strict=True)))
+    return require_change(readings, swarm=NAMES[swarm], middle=texts[0], every=texts[1])
 
 
 def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
@@ -207,11 +212,9 @@ def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
         100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1),
         PAPER.swing_heights_m.index(0.024),
     )
-    middle, every = (float(_compute_swing_leads(phase, swarm, whole=whole)[at]) for whole in (False, True))
-    texts = [f"{phase.list_swing_powers(name)[at]:.4f} W" for name in (swarm, "ga")]
-    values = {"swarm": NAMES[swarm], "pso": texts[0], "ga": texts[1]}
-    values |= {"middle": _describe_change(middle), "every": _describe_change(every)}
-    return decide(Verdict.UNTESTABLE, **values) if math.isnan(middle) else compare_changes(printed, middle, **values)
+    pso, ga = (f"{phase.list_swing_powers(name)[at]:.4f} W" for name in (swarm, "ga"))
+    middle, every = (float(leads[at]) for leads in _compute_swing_leads(phase, swarm))
+    return _compare_histories(printed, middle, every, swarm=NAMES[swarm], pso=pso, ga=ga)
 
 
 def _compute_swing_range(phase: PhaseFindings, algorithm: str) -> float:
@@ -235,18 +238,9 @@ def _check_swing_range_lead(phase: PhaseFindings, swarm: str, printed_mm: float)
 
 
 def _check_velocity(phase: PhaseFindings, name: str) -> Check:
-    """Check the share of the searches' velocities within the printed range: at the ends of the runs, and of all solutions."""
+    """Check the share of the searches' velocities that are within the printed range, in the mean of the searches."""
     printed = PAPER.velocity_ranges[name]
-    symbols = {i: f"x{i + 1}" for i in printed.variables}
-    chosen = list(printed.variables)
-    readings = [phase.gather_solutions(whole=whole) for whole in (False, True)]
-    inside = [
-        {
-            title: float(((printed.low <= x[:, chosen]) & (x[:, chosen] <= printed.high)).mean())
-            for title, x in found.items()
-        }
-        for found in readings
-    ]
+    symbols, chosen = {i: f"x{i + 1}" for i in printed.variables}, list(printed.variables)
     outside = [
         f"{search.upper()} {symbol} = {optimum.x[i]}"
         for search, optimum in phase.paper.optima.items()
@@ -258,34 +252,53 @@ def _check_velocity(phase: PhaseFindings, name: str) -> Check:
         low, high = phase.range_within(i, NEARLY_OPTIMAL)
         cheap = f"{low:z.4f} to {high:z.4f}" if math.isfinite(low) else "no point of the sweep"
         near.append(f"{symbol} = {[*phase.optimum.x.values()][i]:z.4f} ({cheap})")
-    ends = compute_range(np.concatenate([x[:, chosen] for x in readings[0].values()]).ravel())
-    texts = {"symbols": " and ".join(symbols.values()), "near": ", ".join(near), **_describe_shares(inside)}
+    ends = np.concatenate([x[:, chosen] for x in phase.gather_solutions(whole=False).values()])
+    texts = {"symbols": " and ".join(symbols.values()), "near": ", ".join(near)}
     texts["outside"] = f" (but {', '.join(outside)} in print)" if outside else ""
-    values = {"low": printed.low, "high": printed.high, "nearly": 100 * NEARLY_OPTIMAL, "ends": ends}
-    holds = [float(np.mean(list(shares.values()))) >= MOST for shares in inside]
-    return decide(holds, **texts, **values, agree=len(set(holds)) == 1)
+    values = {
+        "low": printed.low,
+        "high": printed.high,
+        "nearly": 100 * NEARLY_OPTIMAL,
+        "ends": (ends.min(), ends.max()),
+    }
+    return _check_shares(
+        phase,
+        lambda x: (printed.low <= x[:, chosen]) & (x[:, chosen] <= printed.high),
+        lambda shares: float(np.mean(shares)) >= MOST,
+        **texts,
+        **values,
+    )
 
 
-def _describe_shares(readings: Sequence[Mapping[str, float]]) -> dict[str, str]:
-    """Return shares by search in words, of the ends of the runs and of all solutions."""
-    words = (", ".join(f"{NAMES[title]} {100 * share:.0f} %" for title, share in found.items()) for found in readings)
-    return dict(zip(("shares", "whole"), words, strict=True))
+def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:
+    """Check whether most solutions of each search have these signs of variables."""
+    columns, sign = [phase.problem.names.index(name) for name in signs], np.array(list(signs.values()))
+    best = ", ".join(f"{phase.optimum.x[name]:z.4f}" for name in signs)
+    return _check_shares(
+        phase, lambda x: (sign * x[:, columns] > 0).all(axis=1), lambda shares: min(shares) > 0.5, best=best
+    )
+
+
+def _check_shares(
+    phase: PhaseFindings, select: Callable[[Array], Any], is_most: Callable[[list[float]], bool], **values: Any
+) -> Check:
+    """Check the shares of the searches' solutions that are selected: at the ends of their runs, and of all feasible ones."""
+    holds = []
+    for key, whole in (("shares", False), ("whole", True)):
+        shares = {name: float(select(x).mean()) for name, x in phase.gather_solutions(whole=whole).items()}
+        values[key] = ", ".join(f"{NAMES[name]} {100 * share:.0f} %" for name, share in shares.items())
+        holds.append(is_most([*shares.values()]))
+    return decide(holds, **values, agree=holds[0] == holds[1])
 
 
 def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
     """Check how far a swarm's lateral velocities are from equal: the larger over the smaller one, median of the runs."""
-
-    def compute_factor(start: float, end: float) -> float:
-        return math.exp(abs(math.log(abs(start / end))))
-
-    factors = {
-        name: float(np.median([compute_factor(run.x["hip_vy_start_m_s"], run.x["hip_vy_end_m_s"]) for run in runs]))
-        for name, runs in phase.searches.items()
-    }
-    printed = {name: compute_factor(*optimum.x[5:7]) for name, optimum in phase.paper.optima.items()}
-    return compare_levels(
-        printed["pso"], factors[swarm], swarm=NAMES[swarm], printed=printed, pso=factors[swarm], ga=factors["ga"]
+    ends = phase.gather_solutions(whole=False)
+    pso, ga = (
+        float(np.median(np.exp(np.abs(np.log(np.abs(ends[name][:, 5] / ends[name][:, 6])))))) for name in (swarm, "ga")
     )
+    printed = {name: max(map(abs, o.x[5:7])) / min(map(abs, o.x[5:7])) for name, o in phase.paper.optima.items()}
+    return compare_levels(printed["pso"], pso, swarm=NAMES[swarm], printed=printed, pso=pso, ga=ga)
 
 
 def _check_wider(findings: NaoFindings, position: int, ranges: Sequence[str] = ()) -> Check:
@@ -329,18 +342,6 @@ def _check_exponential(findings: NaoFindings) -> Check:
     return decide(exponential > law, exponential=exponential, law=law, fast=rates[0], slow=rates[-1])
 
 
-def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:
-    """Check whether most solutions of each search have these signs of variables: at the ends of the runs, and of all."""
-    columns, sign = [phase.problem.names.index(name) for name in signs], np.array(list(signs.values()))
-    shares = [
-        {title: float((sign * x[:, columns] > 0).all(axis=1).mean()) for title, x in found.items()}
-        for found in (phase.gather_solutions(whole=whole) for whole in (False, True))
-    ]
-    best = ", ".join(f"{phase.optimum.x[name]:z.4f}" for name in signs)
-    holds = [min(found.values()) > 0.5 for found in shares]
-    return decide(holds, **_describe_shares(shares), best=best, agree=len(set(holds)) == 1)
-
-
 def _check_dearer(phase: PhaseFindings, positions: Sequence[int], beyond: float) -> Check:
     """Check how much more the cheapest optimum costs at which a velocity is at least this far beyond zero [%], per variable."""
     dearer = []
@@ -371,27 +372,18 @@ def _check_positive(phase: PhaseFindings) -> Check:
     return require_change(change, words=words, share=100 * len(positive) / len(power))
 
 
-def _check_faster(findings: NaoFindings) -> Check:
-    """Check how much faster the hip moves forwards in the shortest feasible duration of double than of single support [%].
+def _check_speeds(findings: NaoFindings, by: Literal["fastest", "ratio", "difference"]) -> Check:
+    """Check how much higher a speed, or larger a range of speeds, is feasible in double than in single support [%].
 
-    There is no verdict if the shortest duration of single support is its bound, not the robot's.
+    There is no verdict if it is, but a bound ends the durations of single support, not the robot.
     """
     fast, slow = _list_speeds(findings)
-    change = 100 * (fast[1] / fast[0] - 1)
-    check = require_change(change, speeds=fast, ranges=fast / slow, change=change)
-    return replace(check, verdict=Verdict.UNTESTABLE) if _is_at_bound(findings.ssp) else check
-
-
-def _check_speed_range(findings: NaoFindings, by: Literal["ratio", "difference"]) -> Check:
-    """Check how much larger the range of feasible mean speeds is in double than in single support [%].
-
-    Where a bound ends that of single support, a smaller one of double support fails and a larger one gives no verdict.
-    """
-    fast, slow = _list_speeds(findings)
-    ranges = fast / slow if by == "ratio" else fast - slow
-    change = 100 * (ranges[1] / max(ranges[0], 1e-9) - 1)
-    check = require_change(change, ranges=ranges, change=change, fast=fast, slow=slow)
-    return replace(check, verdict=Verdict.UNTESTABLE) if change > 0 and _is_at_bound(findings.ssp) else check
+    speeds = {"fastest": fast, "ratio": fast / slow, "difference": fast - slow}[by]
+    change, ssp = 100 * (speeds[1] / max(speeds[0], 1e-9) - 1), findings.ssp
+    shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
+    is_at_bound = shortest <= 1.001 * ssp.problem.lower[ssp.paper.duration]
+    check = require_change(change, speeds=speeds, ranges=fast / slow, change=change)
+    return replace(check, verdict=Verdict.UNTESTABLE) if change > 0 and is_at_bound else check
 
 
 def _list_speeds(findings: NaoFindings) -> tuple[Array, Array]:
@@ -399,16 +391,10 @@ def _list_speeds(findings: NaoFindings) -> tuple[Array, Array]:
     ends = []
     for phase in findings.phases:
         times = [point.at for point in phase.sweeps[phase.paper.duration] if point.feasible]
-        hip = phase.problem.signals(phase.problem.check_x(phase.paper.optima["pso"].x)).arrays["hip"]
+        hip = phase.sample_printed().arrays["hip"]
         ends.append([float(hip[-1, 0] - hip[0, 0]) / time for time in (min(times), max(times))])
     fast, slow = np.array(ends).T
     return fast, slow
-
-
-def _is_at_bound(phase: PhaseFindings) -> bool:
-    """Whether the shortest feasible duration is its bound."""
-    shortest = min(point.at for point in phase.sweeps[phase.paper.duration] if point.feasible)
-    return shortest <= 1.001 * float(phase.problem.lower[phase.paper.duration])
 
 
 def _check_same_median(phase: PhaseFindings, swarm: str) -> Check:

@@ -12,13 +12,14 @@ import numpy as np
 
 from compare.analysis.record_statistics import RankSum, rank_sum_normal
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, PrintedPhase
-from compare.papers.nao.nao_runs import SweepPoint, compute_power_with_legs_twice, evaluate_indexes
+from compare.papers.nao.nao_runs import SweepPoint, evaluate_indexes
 from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.signals import Signals
 
 NAMES = {"pso-constant": "PSO, constant weight", "pso": "PSO, damped", "ga": "GA", "ipopt": "IPOPT"}
 FINE = 2001  # points at which a line between the points of a sweep is read
@@ -122,13 +123,14 @@ class PhaseFindings:
 
     def evaluate_printed(self, **changes: float) -> Mapping[str, float]:
         """Return the performance figures of the paper's PSO solution with other values of some variables, by name."""
-        x = self.problem.by_name(self.problem.check_x(self.paper.optima["pso"].x)) | changes
-        return evaluate_indexes(self.problem, list(x.values()))
+        return evaluate_indexes(self.problem, self._change_printed(changes))
 
-    @cached_property
-    def printed_with_legs_twice(self) -> dict[str, float]:
-        """Power of the paper's solutions with the legs' mechanical term counted twice [W], by search."""
-        return {name: compute_power_with_legs_twice(self.problem, o.x) for name, o in self.paper.optima.items()}
+    def sample_printed(self, **changes: float) -> Signals:
+        """Return the signals of the paper's PSO solution with other values of some variables, by name."""
+        return self.problem.signals(self._change_printed(changes))
+
+    def _change_printed(self, changes: dict[str, float]) -> list[float]:
+        return list((self.problem.by_name(self.problem.check_x(self.paper.optima["pso"].x)) | changes).values())
 
     def test(self, algorithm: str, other: str = "ga") -> RankSum:
         """Return the rank-sum test of a search's powers against another's."""

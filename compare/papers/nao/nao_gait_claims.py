@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.robots import load_robot
 
 MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
+STRAIGHT = {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}  # variables of a hip without vertical motion
 TORQUE_LIMIT = "torque_change_limit_Nm"
 PACES = 9  # durations at which a printed gait is evaluated
 KINDS = {"HipYawPitch": "hip yaw-pitch", "Hip": "hip roll and pitch", "Knee": "knees", "Ankle": "ankles"}
@@ -64,45 +66,33 @@ def describe_effect(phase: PhaseFindings, choice: str) -> str:
     return f"{phase.paper.title}, printed solutions of PSO and GA: {', '.join(texts)}, margins by up to {margin:.1f} mm{best}"
 
 
-def _check_power(phase: PhaseFindings) -> Check:
-    here = [phase.printed_here[name]["power_W"] for name in ALGORITHMS]
-    printed = [phase.paper.optima[name].power_W for name in ALGORITHMS]
-    return compare_levels(printed, here, printed=printed, here=here)
-
-
 def _check_levels(phase: PhaseFindings, indexes: Sequence[str]) -> Check:
     """Check printed performance figures of both printed solutions."""
-    pairs = [(o.indexes[i], phase.printed_here[name][i]) for name, o in phase.paper.optima.items() for i in indexes]
+    pairs = [(o.figures[i], phase.printed_here[name][i]) for name, o in phase.paper.optima.items() for i in indexes]
     printed, here = np.array(pairs).T
     share, gap = 100 * np.abs(here / printed - 1), np.abs(here - printed)
     values = {"printed": printed, "all_printed": ", ".join(f"{value:.4f}" for value in printed), "here": here}
     return compare_levels(printed, here, **values, share=share.max(), gap_mm=1000 * gap.max())
 
 
-def _check_lead(phase: PhaseFindings, indexes: Sequence[str], sign: float, level: bool = False) -> Check:
-    """Check by how much PSO's printed solution is above GA's, or below it for a negative sign [mm, to a tenth].
+def _check_lead(
+    phase: PhaseFindings, indexes: Sequence[str], sign: float = 1.0, share: bool = False, level: bool = False
+) -> Check:
+    """Check by how much PSO's printed solution is above GA's, or below it for a negative sign [mm, to a tenth], or a share [%].
 
     As a level, the sign does not count.
     """
     optima, here = phase.paper.optima, phase.printed_here
-    printed = [1000 * sign * (optima["pso"].indexes[i] - optima["ga"].indexes[i]) for i in indexes]
-    ours = np.round([1000 * sign * (here["pso"][i] - here["ga"][i]) for i in indexes], 1)
-    compare = compare_levels if level else compare_changes
-    return compare(np.round(printed, 1), ours, printed=printed, ours=ours)
-
-
-def _check_torque_lead(phase: PhaseFindings) -> Check:
-    name, optima, here = "torque_change_Nm", phase.paper.optima, phase.printed_here
-    printed = 100 * (optima["pso"].indexes[name] / optima["ga"].indexes[name] - 1)
-    ours = 100 * (here["pso"][name] / here["ga"][name] - 1)
-    return compare_changes(printed, ours, printed=printed, ours=ours)
-
-
-def _check_similar_power(phase: PhaseFindings) -> Check:
-    optima, here = phase.paper.optima, phase.printed_here
-    printed, ours = optima["ga"].power_W / optima["pso"].power_W, here["ga"]["power_W"] / here["pso"]["power_W"]
+    pairs = [
+        [(found["pso"][i], found["ga"][i]) for i in indexes]
+        for found in ({n: o.figures for n, o in optima.items()}, here)
+    ]
+    printed, ours = ([100 * (a / b - 1) if share else 1000 * sign * (a - b) for a, b in rows] for rows in pairs)
+    if not share:
+        printed_mm, ours = np.round(printed, 1).tolist(), np.round(ours, 1).tolist()
     velocities = [(optima[name].x[3], optima[name].x[5]) for name in ALGORITHMS]
-    return compare_levels(printed, ours, printed=printed, ours=ours, velocities=velocities)
+    compare = compare_levels if level else compare_changes
+    return compare(printed if share else printed_mm, ours, printed=printed, ours=ours, velocities=velocities)
 
 
 def _check_more_stable(findings: NaoFindings) -> Check:
@@ -154,7 +144,7 @@ def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, floa
 
 def _check_straight(findings: NaoFindings) -> Check:
     """Check how much larger the least margins are without vertical motion of the hip [mm]."""
-    pairs = [(_straighten(phase), phase.printed_here["pso"]) for phase in findings.phases]
+    pairs = [(phase.evaluate_printed(**STRAIGHT), phase.printed_here["pso"]) for phase in findings.phases]
     ours = [1000 * (straight[index] - here[index]) for straight, here in pairs for index in MARGINS[:2]]
     return require_change(ours, ours=ours)
 
@@ -162,18 +152,15 @@ def _check_straight(findings: NaoFindings) -> Check:
 def _check_oscillation(findings: NaoFindings) -> Check:
     """Check how much less power the hip's vertical motion needs than a straight line [%]."""
     ours = [
-        100 * (1 - phase.printed_here["pso"]["power_W"] / _straighten(phase)["power_W"]) for phase in findings.phases
+        100 * (1 - phase.printed_here["pso"]["power_W"] / phase.evaluate_printed(**STRAIGHT)["power_W"])
+        for phase in findings.phases
     ]
     return require_change(ours, ours=ours)
 
 
 def _check_oscillation_torque(findings: NaoFindings) -> Check:
     """Check how much less torque the hip's vertical motion needs than a straight line [%]: root mean square over all joints."""
-    torques = []
-    for phase in findings.phases:
-        x = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x))
-        straight = x | {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}
-        torques.append([phase.problem.signals(np.array(list(at.values()))).arrays["tau"] for at in (x, straight)])
+    torques = [[phase.sample_printed(**at).arrays["tau"] for at in ({}, STRAIGHT)] for phase in findings.phases]
     ours = [100 * (1 - float(np.linalg.norm(curved) / np.linalg.norm(line))) for curved, line in torques]
     greatest = [100 * (1 - float(np.abs(curved).max() / np.abs(line).max())) for curved, line in torques]
     return require_change(ours, ours=ours, greatest=greatest)
@@ -183,9 +170,9 @@ def _check_relief(findings: NaoFindings) -> Check:
     """Check how much less torque knees and ankles need with the hip at its upper bound than with the lowest hip [%, rms]."""
     ours = []
     for phase in findings.phases:
-        x, ends = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x)), []
+        ends = []
         for height in (phase.lowest_hip_m, phase.problem.upper[0]):
-            signals = phase.problem.signals(np.array(list((x | {"hip_height_m": height}).values())))
+            signals = phase.sample_printed(hip_height_m=height)
             kinds = [[name[1:].startswith(kind) for name in signals.joints] for kind in ("Knee", "Ankle")]
             ends.append([float(np.sqrt((signals.arrays["tau"][:, kind] ** 2).mean())) for kind in kinds])
         ours += [100 * (1 - high / low) for low, high in zip(*ends, strict=True)]
@@ -205,10 +192,6 @@ def _check_torque_limit(phase: PhaseFindings) -> Check:
     ends = [run.verdict.indexes["torque_change_Nm"] for runs in phase.searches.values() for run in runs]
     greatest, limit = max([*ends, phase.optimum.verdict.indexes["torque_change_Nm"]]), phase.problem.value(TORQUE_LIMIT)
     return decide(greatest > 0.99 * limit, greatest=greatest, limit=limit, phase=phase.paper.title)
-
-
-def _straighten(phase: PhaseFindings) -> Mapping[str, float]:
-    return phase.evaluate_printed(hip_vz_start_m_s=0.0, hip_vz_end_m_s=0.0)
 
 
 def _check_contradiction(findings: NaoFindings) -> Check:
@@ -248,27 +231,25 @@ def _check_swing_hip(findings: NaoFindings) -> Check:
 def _check_swing_joints(findings: NaoFindings) -> Check:
     """Check whether a higher swing foot moves the swing leg's knee and ankle pitch more than its hip pitch [degrees]."""
     ssp, angles = findings.ssp, []
-    x = ssp.problem.by_name(ssp.problem.check_x(ssp.paper.optima["pso"].x))
     for end in (ssp.problem.lower, ssp.problem.upper):
-        signals = ssp.problem.signals(np.array(list((x | {"swing_height_m": end[SWING_HEIGHT]}).values())))
+        signals = ssp.sample_printed(swing_height_m=end[SWING_HEIGHT])
         columns = [signals.joints.index(f"R{joint}Pitch") for joint in ("Hip", "Knee", "Ankle")]
         angles.append(np.degrees(signals.arrays["q"][:, columns]))
     hip, knee, ankle = np.abs(angles[1] - angles[0]).max(axis=0)
     return decide(bool(min(knee, ankle) > hip), hip=hip, knee=knee, ankle=ankle)
 
 
-def _check_hip_variation(phase: PhaseFindings) -> Check:
-    """Check how much less PSO's printed solution moves the hip vertically than GA's [%]."""
-    pso, ga = (_compute_hip_rise(phase, optimum.x) for optimum in phase.paper.optima.values())
-    return require_change(100 * (1 - pso / ga), pso=pso, ga=ga, change=100 * (pso / ga - 1))
-
-
-def _check_run_hip_variation(phase: PhaseFindings, swarm: str) -> Check:
-    """Check how much less a swarm's solutions move the hip vertically than GA's, medians of the runs [%]."""
-    pso, ga = ([_compute_hip_rise(phase, [*run.x.values()]) for run in phase.searches[name]] for name in (swarm, "ga"))
-    change, p = 100 * (float(np.median(pso)) / float(np.median(ga)) - 1), rank_sum_normal(pso, ga).p_two_sided
-    values = {"swarm": NAMES[swarm], "pso": np.median(pso), "ga": np.median(ga), "change": change, "p": p}
-    return require_significance(require_change(-change, **values), "rank-sum test", p)
+def _check_hip_variation(phase: PhaseFindings, swarm: str = "") -> Check:
+    """Check how much less a swarm's solutions move the hip vertically than GA's, medians of the runs or as printed [%]."""
+    if swarm:
+        found = [[list(run.x.values()) for run in phase.searches[name]] for name in (swarm, "ga")]
+    else:
+        found = [[list(optimum.x)] for optimum in phase.paper.optima.values()]
+    rises = [[_compute_hip_rise(phase, x) for x in solutions] for solutions in found]
+    (pso, ga), p = map(np.median, rises), rank_sum_normal(*rises).p_two_sided
+    values = {"pso": pso, "ga": ga, "change": 100 * float(pso / ga - 1)}
+    check = require_change(-values["change"], **values, swarm=NAMES.get(swarm))
+    return require_significance(replace(check, values={**check.values, "p": p}), "rank-sum test", p) if swarm else check
 
 
 def _check_few_mm(phase: PhaseFindings) -> Check:

@@ -16,7 +16,13 @@ class PrintedOptimum:
 
     x: tuple[float, ...]  # x1, x2 and so on
     power_W: float  # least mean power
+    legs_twice_W: float  # ours: power with the mechanical term of the moving leg joints counted twice
     indexes: Mapping[str, float]  # performance figures, named as the problem's indexes
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Performance figures with the power, as the problem's indexes."""
+        return {"power_W": self.power_W, **self.indexes}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,6 @@ from nlp_gait.simulation import simulate
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
 from nlp_gait.simulation.simulate import SETTLE_TIME
 
-SWING_LEADS = {"swing-lead": "pso-constant", "swing-lead-damped": "pso"}  # searches by claim
 MEANS = ("dbm_x_mean_limit_m", "dbm_y_mean_limit_m")
 
 
@@ -121,7 +120,7 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
     ssp, dsp = findings.phases
     runs = ssp.searches["pso"]
     printed = [
-        (optimum.power_W, phase.printed_here[name]["power_W"], phase.printed_with_legs_twice[name])
+        (optimum.power_W, phase.printed_here[name]["power_W"], optimum.legs_twice_W)
         for phase in findings.phases
         for name, optimum in phase.paper.optima.items()
     ]
@@ -192,31 +191,29 @@ def _compare_verdicts(findings: NaoFindings) -> dict[str, Any]:
     here = {name: check(findings) for name, check in checks.items()}
     rows = {name: check.apply(texts[name]) for name, check in here.items()}
     agree = [check.values["agree"] for check in here.values() if "agree" in check.values]
-    swings = {swarm: REPRODUCTION.checks[name](findings).values for name, swarm in SWING_LEADS.items()}
     p = {name: float(check.values["p"]) for name, check in here.items() if "p" in check.values}
     corrected = dict(zip(p, holm([*p.values()]), strict=True))
     lost = [f"{rows[name].text} (p = {p[name]:.2g})" for name in p if p[name] < SIGNIFICANT <= corrected[name]]
-    changed, there = dict.fromkeys(NaoEffort.others, "not computed at this effort"), {}
+    changed = dict.fromkeys(NaoEffort.others, unknown := "not computed at this effort")
+    verdicts = {choice: dict.fromkeys(checks, unknown) for choice in changed}
     for choice, other in findings.others.items():
-        there[choice] = {name: check(other).apply(texts[name]) for name, check in checks.items()}
+        there = {name: check(other).apply(texts[name]) for name, check in checks.items()}
+        verdicts[choice] = {name: row.verdict for name, row in there.items()}
         words = [
-            f"{row.text}: {there[choice][name].verdict} {there[choice][name].detail}".rstrip()
-            + f" instead of {row.verdict}"
+            f"{row.text}: {there[name].verdict} {there[name].detail}".rstrip() + f" instead of {row.verdict}"
             for name, row in rows.items()
-            if there[choice][name].verdict != row.verdict
+            if there[name].verdict != row.verdict
         ]
         changed[choice] = f"{len(words)} of {len(rows)} verdicts are others: {'; '.join(words) or 'none'}"
-    known = {choice: {name: row.verdict for name, row in verdicts.items()} for choice, verdicts in there.items()}
-    unknown = dict.fromkeys(checks, "not computed at this effort")
     return {
         "tests": f"{len(p)}",
         "level": f"{100 * SIGNIFICANT:.0f}",
         "holm": "; ".join(lost) or "none",
         "changed": changed,
-        "verdicts": {choice: known.get(choice, unknown) for choice in changed},
+        "verdicts": verdicts,
         "whole_tested": len(agree),
         "whole_differ": agree.count(False),
-        "swing": swings,
+        "checks": {name: check.values for name, check in here.items()},
     }
 
 
@@ -310,8 +307,7 @@ def _list_indexes(phase: PhaseFindings) -> Rows:
         row: list[Value] = [index]
         for name, ours in (("pso", ("pso-constant", "pso")), ("ga", ("ga",))):
             printed = phase.paper.optima[name]
-            row += [printed.power_W if index == "power_W" else printed.indexes[index], phase.printed_here[name][index]]
-            row += [phase.printed_by_choice["v6"][name][index]]
+            row += [printed.figures[index], phase.printed_here[name][index], phase.printed_by_choice["v6"][name][index]]
             row += [phase.median(search).verdict.indexes[index] for search in ours]
         rows.append([*row, best, other.verdict.indexes[index] if other else None])
     return rows
@@ -396,7 +392,7 @@ def _list_gaps(phase: PhaseFindings) -> Rows:
     rows = []
     for name in ALGORITHMS:
         printed, here = phase.paper.optima[name].power_W, phase.printed_here[name]["power_W"]
-        twice = phase.printed_with_legs_twice[name]
+        twice = phase.paper.optima[name].legs_twice_W
         rows.append((f"{phase.paper.title}, {name.upper()}", printed, here, printed - here, twice))
     return rows
 

@@ -20,7 +20,6 @@ from metaheuristics.algorithms.genetic import GeneticAlgorithm, Polynomial, Simu
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.optima.continuation import solve_both_ways
 from nlp_gait.formulation import Array, GaitProblem, Result
-from nlp_gait.gaits.nao.joints import PLANNED_JOINTS
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import simulate_plan
@@ -212,12 +211,3 @@ def simulate_solution(spec: ProblemSpec, x: Sequence[float]) -> dict[str, Any]:
 def evaluate_indexes(problem: GaitProblem, x: Sequence[float]) -> Mapping[str, float]:
     """Return the performance figures of a solution by the exact functions."""
     return build_exact_model(problem).at(problem.check_x(x), problem.p).indexes
-
-
-def compute_power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
-    """Return the power with the mechanical term of the moving leg joints counted twice [W]; see the note in the report."""
-    signals = problem.signals(problem.check_x(x))
-    legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
-    mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
-    mean = np.trapezoid(mechanical, signals.arrays["t"]) / signals.arrays["t"][-1]
-    return float(evaluate_indexes(problem, x)["power_W"] + mean)

@@ -14,7 +14,7 @@ import numpy as np
 from compare.papers.paper_runs import Runs, choose_best, list_objectives
 from compare.papers.walk12 import walk12_runs
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4_DIGITS, PaperRow
-from compare.papers.walk12.walk12_runs import CORNER_M, PAPER, PathPoint, compute_f1, title_table_3
+from compare.papers.walk12.walk12_runs import PAPER, PathPoint, compute_f1, title_table_3
 from compare.papers.walk12.walk12_walks import WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
@@ -135,22 +135,6 @@ def compute_leg_lengths(x: tuple[float, ...]) -> Array:
     arrays = compute_steps(robot, np.array(x), steps=1, intervals=400).arrays
     knees = arrays["q"][:, [JOINTS.index(name) for name in KNEES]]
     return np.sqrt(robot.thigh_m**2 + robot.shank_m**2 + 2 * robot.thigh_m * robot.shank_m * np.cos(knees))
-
-
-def compute_hip_miss(distance: float | None = None) -> float:
-    """Return the distance between the hip and where the angles of the printed (2) put it, for a vertical leg [m].
-
-    (2) takes theta_B, the complement of the angle at the ankle, from an arccosine that is never negative; below
-    sqrt(d1^2 - d2^2) that angle exceeds a right one. Without a distance between hip and ankle [m] the leg is that of the corner.
-    """
-    robot = load_point_mass_biped()
-    d1, d2, distance = robot.thigh_m, robot.shank_m, distance or robot.leg_m - 2 * CORNER_M
-    theta_a = math.acos((d1**2 + d2**2 - distance**2) / (2 * d1 * d2))
-    ankle = math.pi / 2 - math.acos(d1 * math.sin(theta_a) / distance)
-    thigh = ankle - (math.pi - theta_a)
-    along = d2 * math.sin(ankle) + d1 * math.sin(thigh)
-    up = d2 * math.cos(ankle) + d1 * math.cos(thigh)
-    return math.hypot(along, up - distance)
 
 
 def compute_straightest_knee(x: Sequence[float]) -> float:

@@ -36,6 +36,7 @@ class Walk12Paper:
     table_3: tuple[PaperRow, ...]
     table_4: tuple[PaperRow, ...]
     table_4_digits: tuple[float, float, float, float]  # half the last printed digit of x [m]
+    hip_miss_mm: int  # ours: of the angles of (2), where all four variables are at their upper bounds
     # Ours, by what is read in another way: changes of f1 [%], errors of the ZMP by moments of the links [mm]
     changes: Mapping[str, tuple[float, float]]
     shares: Mapping[str, float]  # ours: of the gaits within the bounds (7) [%]

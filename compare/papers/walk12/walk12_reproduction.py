@@ -15,11 +15,11 @@ from compare.judge import DENSE_INTERVALS
 from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.walk12 import walk12_claims, walk12_findings, walk12_step_time_claims, walk12_walks
+from compare.papers.walk12 import walk12_claims, walk12_findings, walk12_paper, walk12_step_time_claims, walk12_walks
 from compare.papers.walk12 import walk12_runs as runs
 from compare.papers.walk12.walk12_claims import count_upright
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
-from compare.papers.walk12.walk12_findings import Walk12Findings, compute_hip_miss, list_rounded
+from compare.papers.walk12.walk12_findings import Walk12Findings, list_rounded
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
 from compare.papers.walk12.walk12_step_time_claims import list_f1max
@@ -95,7 +95,7 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         "hip_speed": lengths[1] / 2 / TABLE_3[-1].step_time_s,
         "hip_aside_mm": 1e3 * robot.hip_distance_m / 2,
         "sole_reach_mm": 1e3 * robot.foot_width_m / 2,
-        "branch_m": math.sqrt(abs(robot.thigh_m**2 - robot.shank_m**2)),
+        "branch_m": CHECKS["inverse-kinematics"](findings).values["branch_m"],
         "corner_m": CORNER_M,
         "corner_leg_mm": 1e3 * (robot.leg_m - 2 * CORNER_M),
         "instants": int(problem.options["intervals"]) // 2 + 1,
@@ -161,7 +161,7 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
     return {
         "f1_change": {zmp: findings.describe_f1_change(zmp) for zmp in get_args(Zmp)},
         "read": {zmp: _describe_reading(findings, zmp) for zmp in runs.READINGS},
-        "hip_miss_mm": 1e3 * compute_hip_miss(),
+        "hip_miss_mm": walk12_paper.PAPER.hip_miss_mm,
         "corner_f": corner.verdict.objective,
         "lateral_jump": math.pi * find_row(0.15).x[1],
         "up_mm": 1e3 * load_point_mass_biped().foot_com_height_m,

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from compare.papers.nao.nao_runs import evaluate_indexes
 from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.gaits.nao.body import load_nao, make_nao
-from nlp_gait.gaits.nao.joints import ARM_JOINTS, YAW_PITCHES
+from nlp_gait.gaits.nao.joints import ARM_JOINTS, PLANNED_JOINTS, YAW_PITCHES
 
 SUPPORT_X_M = 0.06  # X_i of (21), section 4.1
 
@@ -32,6 +33,15 @@ def compute_powers(problem: GaitProblem, x: Sequence[float]) -> dict[str, float]
         "left_ends": float(total[:-1].mean()),
         "right_ends": float(total[1:].mean()),
     }
+
+
+def compute_power_with_legs_twice(problem: GaitProblem, x: Sequence[float]) -> float:
+    """Return the power with the mechanical term of the moving leg joints counted twice [W]; see the note in the report."""
+    signals = problem.signals(problem.check_x(x))
+    legs = [i for i, joint in enumerate(signals.joints) if joint in PLANNED_JOINTS]
+    mechanical = np.abs(signals.arrays["tau"] * signals.arrays["qd"])[:, legs].sum(axis=1)
+    mean = np.trapezoid(mechanical, signals.arrays["t"]) / signals.arrays["t"][-1]
+    return float(evaluate_indexes(problem, x)["power_W"] + mean)
 
 
 def compute_torque_changes_by_reading(

@@ -10,7 +10,7 @@ import pytest
 
 from compare.papers.claims import Verdict
 from compare.papers.walk12 import walk12_runs, walk12_walks
-from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, SHARES, TABLE_3, TABLE_4
+from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, PAPER, SHARES, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
 from nlp_gait.simulation import measurements, mjcf, simulate
@@ -18,6 +18,7 @@ from tests.compare.papers.finished import Finished, check_report, recompute, rep
 from tests.compare.papers.walk12_readings import (
     compute_corner_slopes,
     compute_f1_variants,
+    compute_hip_miss,
     compute_shares,
     is_rounding,
 )
@@ -66,6 +67,7 @@ def test_numbers_in_the_texts_are_those_of_our_model() -> None:
         ends = [f1[name] if name.endswith("mm") else 100 * (f1[name] / f1["ours"] - 1) for f1 in known]
         assert printed == (round(min(ends), 2), round(max(ends), 2)), name
     assert {name: round(share, 1) for name, share in compute_shares().items()} == SHARES
+    assert round(1e3 * compute_hip_miss()) == PAPER.hip_miss_mm and compute_hip_miss(0.308) < 1e-9
     slopes = compute_corner_slopes()
     assert all(f"{slopes[name]:+.3f} per m" in texts for name in ("foot_lift_m", "bending_height_m"))
     assert f"{sum(map(is_rounding, TABLE_3))} of 7" in texts

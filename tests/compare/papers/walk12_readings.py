@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cache
 from itertools import product
@@ -102,6 +103,22 @@ def compute_corner_slopes() -> dict[str, float]:
 
     shifts = dict(zip(problem.names, STEP_M * np.eye(4), strict=True))
     return {name: (f(corner - shift) - f(corner)) / STEP_M for name, shift in shifts.items()}
+
+
+def compute_hip_miss(distance: float | None = None) -> float:
+    """Return the distance between the hip and where the angles of the printed (2) put it, for a vertical leg [m].
+
+    (2) takes theta_B, the complement of the angle at the ankle, from an arccosine that is never negative; below
+    sqrt(d1^2 - d2^2) that angle exceeds a right one. Without a distance between hip and ankle [m] the leg is that of the corner.
+    """
+    robot = load_point_mass_biped()
+    d1, d2, distance = robot.thigh_m, robot.shank_m, distance or robot.leg_m - 2 * CORNER_M
+    theta_a = math.acos((d1**2 + d2**2 - distance**2) / (2 * d1 * d2))
+    ankle = math.pi / 2 - math.acos(d1 * math.sin(theta_a) / distance)
+    thigh = ankle - (math.pi - theta_a)
+    along = d2 * math.sin(ankle) + d1 * math.sin(thigh)
+    up = d2 * math.cos(ankle) + d1 * math.cos(thigh)
+    return math.hypot(along, up - distance)
 
 
 def compute_shares() -> dict[str, float]:
