@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from typer.main import get_command
 
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.formulation import GaitProblem, registry
@@ -87,6 +88,14 @@ def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 def without_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no compiler be found."""
     hide_compilers(monkeypatch)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def commands_declared_once() -> Iterator[None]:
+    """Typer makes the commands from their declarations once, not at each call."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("typer.testing._get_command", cache(get_command))
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -52,6 +52,7 @@ def test_digits_make_the_box_within_the_bounds() -> None:
     assert str(outside.at_best) == "bounds[step_length_m] is violated by 0.035 m"
 
 
+@pytest.mark.slow
 def test_what_cannot_be_enclosed_is_found_by_optimisation(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise InputError("an operation that cannot be enclosed")
@@ -96,6 +97,7 @@ def test_what_is_no_printed_point_is_refused(printed: str, message: str) -> None
         evaluate_rounded(WALK, printed.split(","))
 
 
+@pytest.mark.slow
 def test_the_command() -> None:
     call = ("evaluate", "walk12", "--x", "0.1000,0.0010,0.0200,0.0010", "--rounded")
     text = nlp_gait(*call).stdout

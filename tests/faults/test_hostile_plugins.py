@@ -120,6 +120,7 @@ def test_many_hostile_plug_ins_leave_the_others_records_whole(
                 assert re.search(said, record.status), (ways[record.solver], record.status)
 
 
+@pytest.mark.slow
 def test_a_study_with_workers_takes_them_too(tmp_path: Path) -> None:
     bad = f"{written(tmp_path, 'bad', 'ends its process')}:Algorithm"
     tasks = [Task(problem=WALK, solver=a, label=b, stop=PATIENT) for a, b in ((bad, "bad"), ("pso", ""), ("ga", ""))]

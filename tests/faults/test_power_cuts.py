@@ -196,6 +196,7 @@ def writes(text: str) -> Iterator[str]:
                 yield f"line {node.lineno}: {name}"
 
 
+@pytest.mark.slow
 def test_every_writer_goes_through_one_module() -> None:
     found = {}
     for package in ("nlp_gait", "metaheuristics", "compare"):

@@ -23,6 +23,7 @@ from tests.evaluation import evaluated
 OTHER: dict[str, Any] = {
     "robot": "nao-v6",
     "steps": 4,
+    "slope_deg": 3.0,
     "intervals": 12,
     "rotational_inertia": False,
     "step_length_m": 0.07,

@@ -37,6 +37,7 @@ def points(id: str, count: int = 130) -> Array:
     return np.random.default_rng(1).uniform(instance.lower, instance.upper, (count, len(instance.names)))
 
 
+@pytest.mark.slow
 def test_files_stand_alone(built: tuple[str, Path]) -> None:
     """No file of this package is included, and what is linked is libc and libm."""
     id, folder = built

@@ -131,6 +131,7 @@ def test_features_and_description_say_what_it_is(walk: gaitbench.Instance) -> No
         assert part in walk.description
 
 
+@pytest.mark.slow
 def test_best_points_are_neither_at_the_bounds_nor_in_the_middle() -> None:
     """27 % of GaitBench 1's variables are at a bound, and up to 43 % in the middle."""
     z = np.concatenate([gaitbench.generate("walk12-stable", seed).best_x for seed in range(5)])

@@ -175,6 +175,7 @@ def test_an_instance_says_what_it_is_and_keeps_its_bounds() -> None:
             bounds[0] = 0.0
 
 
+@pytest.mark.usefixtures("without_compiler")
 def test_the_one_equation_of_splines_is_a_band() -> None:
     """The foot passes the middle of its path within a tenth of a millimetre to either side."""
     instance = gaitbench.load("ssp-v5-quintic")

@@ -168,6 +168,7 @@ def test_what_cannot_be_planned_is_refused(options: dict[str, float], words: str
         plan_walk("nao-v5", **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
     row = ConstraintValue(name="ssp_reach[left leg, 3]", value=1.0, lower=None, upper=0.99, violation=0.01, unit="1")
     x0 = problem.start_point(np.random.default_rng(0))

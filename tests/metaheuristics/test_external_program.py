@@ -65,8 +65,12 @@ def test_a_program_may_end_by_itself() -> None:
     assert said.evaluations == 1 and "good enough" in said.reasons[0]
     ended = run("sh", "-c", "printf '{\"x\": [[0.5, 1], [1.0000000001, 0]]}\\n'; read a; read a")
     assert ended.evaluations == 2 and ended.reasons == ("the program ended",)
+
+
+@pytest.mark.slow
+def test_a_program_may_leave_a_process_behind_that_holds_its_output() -> None:
     held = run("sh", "-c", "printf '{\"x\": [0, 1]}\\n'; read a; read a; sleep 30 & exit 0")
-    assert held.evaluations == 1  # a process that it leaves behind holds its output
+    assert held.evaluations == 1
 
 
 @pytest.mark.parametrize(
@@ -75,7 +79,7 @@ def test_a_program_may_end_by_itself() -> None:
         ("exit 3", "status 3: no message"),
         ("echo oh dear >&2; exit 1", "status 1: oh dear"),
         ("kill -9 $$", "status -9"),
-        ("sleep 30", "sent nothing for 0.5 s"),
+        pytest.param("sleep 30", "sent nothing for 0.5 s", marks=pytest.mark.slow),  # it is waited for
         ("echo hello", "neither"),
         ("echo '[1, 2]'", "neither"),
         ("""printf '{"x": [[0.1,'""", "neither"),
@@ -100,6 +104,7 @@ def test_a_missing_program_is_named() -> None:
         run("/no/such")
 
 
+@pytest.mark.slow
 def test_the_caller_in_cpp(tmp_path: Path) -> None:
     program = tmp_path / "random_search"
     command = [*find_compiler().command, "-o", str(program), str(CALLERS / "random_search.cpp")]
@@ -107,6 +112,7 @@ def test_the_caller_in_cpp(tmp_path: Path) -> None:
     assert run(str(program)).evaluations == 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "caller", ["octave-cli --quiet genetic.m", "julia random_search.jl", "Rscript random_search.R"]
 )

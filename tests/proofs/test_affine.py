@@ -27,7 +27,7 @@ def test_every_operation_encloses_exact_values_at_random_points(quadratic: bool)
         assert not list(find_lost_values(name, EACH, rng, quadratic=quadratic))
 
 
-@pytest.mark.parametrize("name", ["walk12", "nao-dsp"])
+@pytest.mark.parametrize("name", [pytest.param("walk12", marks=pytest.mark.slow), "nao-dsp"])
 def test_problems_hold_every_value_at_sampled_points_of_random_boxes(name: str) -> None:
     problem = nlp_gait.load(name, intervals=2)
     kernel, rng = build_kernel(problem), np.random.default_rng(SEED)

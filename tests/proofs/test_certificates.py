@@ -29,6 +29,7 @@ BEST = np.array([-1.0124, 0.0])  # of two valleys, without its line
 PHASES = ("nao-dsp", "nao-ssp")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["walk12", *PHASES])
 def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
     assert count_lost_boxes(load(name), best_x(name), 200, np.random.default_rng(SEED)) == 0

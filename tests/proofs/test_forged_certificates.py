@@ -162,6 +162,7 @@ def test_paths_refute_a_false_bound_without_a_better_point(monkeypatch: pytest.M
         check_certificate(replace(honest, certificate=proof), paths=20, starts=0)
 
 
+@pytest.mark.slow
 def test_an_honest_certificate_passes_and_its_proof_repeats(
     problem: GaitProblem, honest: CertificateFile, tmp_path: Path
 ) -> None:

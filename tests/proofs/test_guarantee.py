@@ -118,6 +118,7 @@ def test_a_mean_is_that_over_time() -> None:
     assert 0.0 < violation.least <= 1e-3 <= violation.most
 
 
+@pytest.mark.slow
 def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
     problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
     rows = make_time_functions(problem, problem.rows_over_time[0]).instants

@@ -138,6 +138,7 @@ def test_no_feasible_point_of_a_box_costs_less_than_its_bound_or_is_cut_off() ->
     assert tight > 6  # bounds that are far off would hide an error
 
 
+@pytest.mark.slow
 def test_boxes_that_contain_the_best_gait_keep_it_and_have_bounds_that_converge_to_its_cost() -> None:
     problem, x = load("nao-ssp"), best_x("nao-ssp")
     bounds, cost = make_bounds(problem), build_exact_model(problem).at(x, problem.p).cost

@@ -32,6 +32,7 @@ def test_the_printed_formulas_enclose_the_judge(rule: str) -> None:
     assert compared >= 5
 
 
+@pytest.mark.slow
 def test_a_true_bound_is_proven_and_a_false_one_is_not() -> None:
     step = make_step("simpson")
     assert prove(step, LAMBDA, 1.4 * BEST).left == 0

@@ -62,11 +62,13 @@ def small_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "MEMORY_LIMIT_BYTES", MEMORY_BYTES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "reason"), [*_make_bombs()])
 def test_a_model_that_counts_too_much_is_rejected(tmp_path: Path, text: str, reason: str) -> None:
     _check_rejected(tmp_path, text, reason)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 3, 9])
 def test_a_model_that_takes_too_much_is_rejected(
     tmp_path: Path, number: int, monkeypatch: pytest.MonkeyPatch, small_limits: None
@@ -90,6 +92,7 @@ def _check_rejected(folder: Path, text: str, reason: str) -> None:
     assert time.monotonic() - began < TIME_S + SLACK_S  # far less than the limit of 60 s
 
 
+@pytest.mark.slow
 def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
     pytest.importorskip("lxml")
     file = tmp_path / "bomb.dae"
@@ -105,6 +108,7 @@ def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
         mesh_points(file)
 
 
+@pytest.mark.slow
 def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
     pytest.importorskip("urdf_parser_py")
     file = tmp_path / "chain.urdf"
@@ -114,6 +118,7 @@ def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
         urdf_record(str(file))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [401, 900])
 def test_a_robot_with_many_joints_is_rejected(tmp_path: Path, joints: int) -> None:
     pytest.importorskip("mujoco")

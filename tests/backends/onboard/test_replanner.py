@@ -38,6 +38,7 @@ def test_a_limit_that_nothing_satisfies_is_named_with_its_amount() -> None:
     assert found.violated[0].name == "row" and found.violated[0].violation >= 3.0 - 1e-6
 
 
+@pytest.mark.slow
 def test_every_change_of_the_parameters_leads_to_ipopts_optimum(nao: Replanner) -> None:
     problem, rng = nao.problem, np.random.default_rng(0)
     for _ in range(3):

@@ -86,6 +86,7 @@ def test_a_wrong_style_file_is_refused(style: str, message: str, tmp_path: Path)
         FurtherFiles(pdf=True, style=file).write(tmp_path, [])
 
 
+@pytest.mark.slow
 def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
     style = tmp_path / "my.mplstyle"
     style.write_text("figure.figsize: 3.0, 2.0  # a narrow column\n")

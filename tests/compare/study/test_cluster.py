@@ -108,6 +108,7 @@ def test_user_code_reaches_workers_and_killed_processes_lose_no_run(
     assert 0 < len(finished) == len(list((tmp_path / "lost" / "records").rglob("*.json"))) < len(more.tasks())
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.study.cluster.CONNECT_TIMEOUT", "1s")

@@ -10,7 +10,7 @@ import pytest
 
 import nlp_gait
 from compare.study import references
-from compare.study.references import Reference, find_reference, load_shipped
+from compare.study.references import Reference, describe_gap, find_reference, load_shipped
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH, identify_problem
@@ -90,9 +90,17 @@ def test_other_settings_have_no_reference() -> None:
     assert "for this problem" in find_reference({"name": "mine", HASH: "0"}).source
 
 
+def test_the_gap_of_a_proof_is_relative() -> None:
+    assert describe_gap(49.0, 50.0) == describe_gap(-51.0, -50.0) == "2 %"
+    assert describe_gap(50.0 * (1 + 1e-6), 50.0) == "six digits" != describe_gap(50.0 * (1 + 1e-5), 50.0)
+
+
 def test_a_problem_with_another_hash_must_have_the_shipped_value_at_the_shipped_point(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    by_simpson = nlp_gait.load("walk12", quadrature="simpson").with_values(**{"lambda": 1.0})
+    described = identify_problem(by_simpson)
+    assert find_reference({**described, HASH: "of another version of CasADi"}) == find_reference(described) != Reference()
     walk = identify_problem(nlp_gait.load("walk12"))
     described = {**walk, HASH: "of another version of CasADi"}
     assert find_reference(described) == find_reference(walk) != Reference()

@@ -23,6 +23,7 @@ def walker() -> Walker:
     return Walker(cycles=make_nao_cycles(), footsteps=STEPS)
 
 
+@pytest.mark.slow
 def test_preview_control_is_the_least_squares_optimum() -> None:
     """The gains come from a Riccati equation; the same cost over a long horizon is a linear least squares problem."""
     controller = PreviewController(sample_s=0.02, height_m=0.26, gravity=GRAVITY)

@@ -85,6 +85,7 @@ def test_the_zmp_limits_are_constraints_and_the_penalty_is_not(problem: GaitProb
     )
 
 
+@pytest.mark.slow
 def test_joint_torques_and_angles_of_the_same_motion() -> None:
     """Stiff gains give the same motion in all coordinates; there joint torques do the work of the torques on the links."""
     found = {}
