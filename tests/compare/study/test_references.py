@@ -100,7 +100,9 @@ def test_a_problem_with_another_hash_must_have_the_shipped_value_at_the_shipped_
 ) -> None:
     by_simpson = nlp_gait.load("walk12", quadrature="simpson").with_values(**{"lambda": 1.0})
     described = identify_problem(by_simpson)
-    assert find_reference({**described, HASH: "of another version of CasADi"}) == find_reference(described) != Reference()
+    assert (
+        find_reference({**described, HASH: "of another version of CasADi"}) == find_reference(described) != Reference()
+    )
     walk = identify_problem(nlp_gait.load("walk12"))
     described = {**walk, HASH: "of another version of CasADi"}
     assert find_reference(described) == find_reference(walk) != Reference()
