@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +21,8 @@ from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.cycle_motion import STEP
-from nlp_gait.gaits.biped.walk import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED, start_from_cycle
+from nlp_gait.gaits.biped.walk_parts import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED
+from nlp_gait.gaits.biped.walk_start import start_from_cycle
 from nlp_gait.gaits.nao.body import load_nao
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -75,6 +77,7 @@ def plan_walk(
     speed_m_s: float | None = None,
     distance_m: float | None = None,
     slope_deg: float = 0.0,
+    stairs: str = "",
     intervals: int = 10,
     values: dict[str, float] | None = None,
     starts: int = 3,
@@ -88,6 +91,7 @@ def plan_walk(
         speed_m_s: of the inner steps; None for the cheapest.
         distance_m: that the feet advance; None for the cheapest steps.
         slope_deg: by which the ground rises forward; the distance is along it.
+        stairs: ``RISExRUN:N``, a flight of N treads of these sizes [m]; every step climbs one, and the walk ends on the last.
         intervals: of each phase.
         values: parameters and bounds of ``nao-walk`` or ``humanoid-walk``, by name.
         starts: most start points, until one converges.
@@ -100,16 +104,21 @@ def plan_walk(
     for name, value in (("speed_m_s", speed_m_s), ("distance_m", distance_m)):
         if value is not None and not (isinstance(value, (int, float)) and 0.0 < value < math.inf):
             raise InputError(f"{name} must be a finite number > 0, got {value!r}")
-    name = find_walk(robot)
+    name, more = find_walk(robot), {}
+    if stairs:
+        if (steps, distance_m) != (None, None):
+            raise InputError("stairs determine steps and distance; leave out steps and distance_m")
+        name, (rise, run, treads) = "humanoid-walk", _parse_stairs(stairs)
+        steps, more = treads + 1, {"stair_rise_m": rise, "stair_run_m": run}
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
-    problem = load(name, robot=robot, steps=count, intervals=intervals, slope_deg=slope_deg)
+    problem = load(name, robot=robot, steps=count, intervals=intervals, slope_deg=slope_deg, **more)
     if steps is None and distance_m is not None:
         natural = problem.by_name(problem.start_point(np.random.default_rng(0)))[STEP]
         count = max(HALF_STEPS, round(distance_m / natural) + 1)
         problem = load(name, **{**problem.options, "steps": count})
     problem = problem.with_values(**(values or {}))
     if speed_m_s is not None:
-        if LEAST_SPEED not in problem.values:
+        if LEAST_SPEED not in problem.parameter_values:
             raise InputError(
                 f"speed_m_s={speed_m_s:g} is that of the inner steps, and a walk of {HALF_STEPS} half steps has none; "
                 "plan more steps, or leave the speed out"
@@ -118,7 +127,17 @@ def plan_walk(
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
     cycle = None if name == "nao-walk" else load("humanoid-cycle", robot=robot, intervals=intervals)
+    least, most = (problem.value(f"{STEP}.{end}") for end in ("lower", "upper"))
+    if cycle is not None and least == most:
+        cycle = cycle.fix(**{STEP: least})
     return _solve(problem, cycle, starts, progress)
+
+
+def _parse_stairs(text: str) -> tuple[float, float, int]:
+    found = re.fullmatch(r"(\d*\.?\d+)x(\d*\.?\d+):(\d{1,3})", text)
+    if found is None or int(found[3]) < 1:
+        raise InputError(f"stairs must be RISExRUN:N with rise and run in metres, such as 0.03x0.24:3, got {text!r}")
+    return float(found[1]), float(found[2]), int(found[3])
 
 
 def find_walk(robot: str) -> str:
@@ -152,7 +171,7 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progres
         if cycle is not None:
             gait = solve(cycle, seed=k, solver=IpoptSettings(few_rows=False), workers=1)
             progress(f"start {k + 1}, cycle: {gait.status}")
-            x0 = start_from_cycle(problem, x0, gait.x)
+            x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
         found = solve(problem, x0=x0, solver=solver, workers=1)
         progress(f"start {k + 1}: {found.status}")
         if best is None or found.starts[0].rank < best.starts[0].rank:

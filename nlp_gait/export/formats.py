@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.export.keyframes import write_keyframes
 from nlp_gait.export.set_points import COUPLED, SetPoints, make_set_points, to_naoqi
 from nlp_gait.export.webots import write_motion
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
@@ -25,6 +26,7 @@ FORMATS = {
     "csv": ".csv",
     "json": ".signals.json",
     "mjcf": ".xml",
+    "mujoco-keyframes": ".keyframes.xml",
     "naoqi": ".naoqi.json",
     "ros": ".trajectory.json",
 }
@@ -54,6 +56,8 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
         write_json(path, to_naoqi(points))
     elif name == "mjcf":
         write_text(path, make_plan_model(make_plan(result), Drive()))
+    elif name == "mujoco-keyframes":
+        write_text(path, write_keyframes(result, period_ms))
     elif name == "csv":
         write_signals_csv(path, sample_at_period(result, period_ms))
     elif name == "ros":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, find_walk,
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
-from nlp_gait.gaits.biped.walk import start_from_cycle
+from nlp_gait.gaits.biped.walk_start import start_from_cycle
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import Conditions
 from nlp_gait.symbolic.dynamics import tilt_gravity
@@ -65,7 +67,9 @@ def test_a_walk_of_two_half_steps_has_no_inner_step() -> None:
     model = build_exact_model(two)
     found = model.at(x, two.p)
     assert not [row.name for row in model.rows(found) if row.name.startswith(("ssp_", "dsp_", "speed"))]
-    assert not {"greatest_speed_m_s", "least_speed_m_s"} & set(two.values) and "speed_m_s" not in found.indexes
+    assert (
+        not {"greatest_speed_m_s", "least_speed_m_s"} & set(two.parameter_values) and "speed_m_s" not in found.indexes
+    )
     arrays = two.signals(x).arrays
     assert found.indexes["duration_s"] == pytest.approx(arrays["t"][-1])
     assert found.indexes["distance_m"] == pytest.approx(arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0])
@@ -156,7 +160,10 @@ def test_a_violation_names_step_constraint_amount_and_remedy(row: str, sentence:
     ("options", "words"),
     [
         ({"steps": 1}, "steps"),
-        ({"steps": 4, "distance_m": 3.0}, r"needs steps of 1 m; they are .* m long; use 26 to 151 steps"),
+        (
+            {"steps": 4, "distance_m": 3.0, "speed_m_s": 0.05},
+            r"needs steps of 1 m; they are .* m long; use 26 to 151 steps",
+        ),
         ({"steps": 2, "speed_m_s": 0.05}, "a walk of 2 half steps has none; plan more steps"),
         ({"slope_deg": 60.0}, r"slope_deg must be within \+-30, got 60.0"),
         ({"speed_m_s": 0.0}, "speed_m_s must be a finite number > 0, got 0.0"),
@@ -177,3 +184,42 @@ def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
     plan = WalkPlan(problem=problem, solution=solution, steps=STEPS, distance_m=1.0, duration_s=1.0, energy_J=1.0)
     assert not plan.feasible and plan.obstacles
     assert "left leg is too straight or too bent by 0.01 1" in describe_violation(row, STEPS)
+
+
+@pytest.fixture(scope="module")
+def climb(tmp_path_factory: pytest.TempPathFactory) -> GaitProblem:
+    """A walk up two treads, of a NAO whose soles are shorter than its longest step."""
+    data = json.loads((files("nlp_gait.robots") / "data" / "nao-v5.json").read_text(encoding="utf-8"))
+    for foot in data["feet"].values():
+        foot |= {"front_m": 0.045, "back_m": 0.03}
+    path = tmp_path_factory.mktemp("robots") / "short-soles.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    return nlp_gait.load("humanoid-walk", robot=str(path), steps=3, intervals=4, stair_rise_m=0.01, stair_run_m=0.1)
+
+
+def test_every_step_climbs_one_tread_and_clears_its_edge(climb: GaitProblem) -> None:
+    values = climb.by_name(climb.start_point(np.random.default_rng(0)))
+    assert values["step_length_m"] == 0.1 and climb.value("swing_height_m.lower") > 0.01
+    lowest = {name: climb.value(f"{name}.lower") for name in values if name.endswith("swing_height_m")}
+    plan = make_plan(Result(problem=climb, x=np.array(list({**values, **lowest}.values()))))
+    arrays = plan.signals.arrays
+    assert [tread.height_m for tread in plan.ground] == [0.01, 0.02]
+    for side in ("left_foot", "right_foot"):
+        np.testing.assert_allclose(arrays[side][[0, -1]][:, [0, 2]], [[0.0, 0.0], [0.2, 0.02]], atol=1e-12)
+        ends = [arrays[side][:, 0] - 0.03, arrays[side][:, 0] + 0.045]
+        assert all((plan.level(end) < arrays[side][:, 2] + 1e-9).all() for end in ends)
+    landed = plan.stands("left", arrays["t"]) + plan.stands("right", arrays["t"])
+    assert landed.min() >= 1.0
+
+
+@pytest.mark.parametrize(
+    ("stairs", "words"),
+    [
+        ("0.02x0.18:3", "the run of stairs must be at least 0.17 m, .* at most 0.122 m, the longest step"),
+        ("0x0.1:3", "the rise of stairs must be a finite number > 0"),
+        ("0.02:3", "stairs must be RISExRUN:N"),
+    ],
+)
+def test_stairs_that_cannot_be_climbed_are_refused(stairs: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        plan_walk("nao-v5", stairs=stairs)

@@ -14,6 +14,7 @@ from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
 from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, PhaseName, read_duration
+from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.single_support import swing_foot
@@ -110,15 +111,18 @@ def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     return {"ssp": make_planner(body, single), "dsp": make_planner(body, double)}
 
 
-def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion]) -> Planner:
-    """Return the plan of a phase over the left foot, which stands at x = 0."""
+def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight: Flight | None = None) -> Planner:
+    """Return the plan of a phase over the left foot, which stands at x = 0, on the flat or on a flight of stairs."""
     left, right = body.standing_ankle("L"), body.standing_ankle("R")
     right_y, right_z = body.ankle("R")
 
     def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
         leg = read(at)
         if leg.lift is None:
-            foot = right._replace(position=right.position + vertcat(leg.right_to, 0, 0))
+            height = 0 if flight is None else flight.slope * leg.right_to
+            foot = right._replace(position=right.position + vertcat(leg.right_to, 0, height))
+        elif flight is not None:
+            foot = flight.swing(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
         else:
             foot = swing_foot(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
         hip, angles = between(leg.start, leg.end, leg.duration, phase)

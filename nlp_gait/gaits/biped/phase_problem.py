@@ -12,7 +12,18 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Point, SimulationModel, SolverHints, Start
+from nlp_gait.formulation import (
+    Array,
+    Assembly,
+    Display,
+    GaitProblem,
+    NumericPoint,
+    Point,
+    SimulationModel,
+    SolverHints,
+    Start,
+)
+from nlp_gait.formulation.display import Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
@@ -99,10 +110,18 @@ def make_phase_problem(
     return add_robot(problem, body)
 
 
-def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False, steps: int | None = None) -> GaitProblem:
+def add_robot(
+    problem: GaitProblem,
+    body: Body,
+    *,
+    repeats: bool = False,
+    steps: int | None = None,
+    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
+) -> GaitProblem:
     """Return the problem with the robot that its gaits are drawn and simulated with.
 
-    ``repeats`` says that a gait is one step, whose mirror image is the next one; ``steps`` are those of a whole walk.
+    ``repeats`` says that a gait is one step, whose mirror image is the next one; ``steps`` are those of a whole walk, and
+    ``ground`` its stairs.
     """
     simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
     model = SimulationModel(
@@ -112,6 +131,7 @@ def add_robot(problem: GaitProblem, body: Body, *, repeats: bool = False, steps:
         heat_loss=HEAT_LOSS.name,
         repeats=repeats,
         steps=steps,
+        ground=ground,
     )
     display = replace(problem.display, robot=body.full, skeleton=body.skeleton, simulation_model=model)
     return replace(problem, display=display)

@@ -7,13 +7,10 @@ positions and velocities for any x. A walk of two half steps has no inner step, 
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
-from importlib.resources import files
-from typing import NamedTuple
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -21,7 +18,6 @@ from casadi import MX
 
 from nlp_gait.errors import check_count
 from nlp_gait.formulation import (
-    Array,
     Assembly,
     Constraint,
     Display,
@@ -42,7 +38,6 @@ from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import (
     STEP,
     PhaseMotion,
-    make_cycle_variables,
     make_planner,
     make_state_variables,
     read_state,
@@ -52,6 +47,7 @@ from nlp_gait.gaits.biped.double_support import (
     make_double_support_margins,
     make_support_box,
 )
+from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import (
     ENERGY_PER_METRE,
@@ -67,47 +63,25 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples
 from nlp_gait.gaits.biped.single_support import make_single_support_loads
+from nlp_gait.gaits.biped.walk_parts import (
+    CYCLE_END,
+    DURATION,
+    GREATEST_SPEED,
+    HALF_STEPS,
+    LEAST_SPEED,
+    PARTS,
+    RIGHT_FROM,
+    Part,
+    make_phase_variables,
+    make_walk_variables,
+)
+from nlp_gait.gaits.biped.walk_start import start_walk
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-CYCLE_END = "cycle_end"
-HALF_STEPS, MOST_STEPS = 2, 1000  # the first and the last step are half steps
-LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
+MOST_STEPS = 1000
 NO_LIMIT = 100.0  # [m/s]
-START_NOISE = 0.002  # of start points, as a share of the bounds' ranges
 STEPS = "step_count"  # parameter, so that compiled functions suit walks of any length
-# Variables of a phase besides those of its first and last state.
-DURATION, RIGHT_FROM = "duration_s", "right_from_m"
-
-
-class Part(NamedTuple):
-    """A phase of the walk over the left foot, which stands at x = 0."""
-
-    kind: str  # ``ssp``, ``dsp`` with a foot ahead, or ``stand`` with both feet side by side
-    begin: str  # state at its begin
-    end: str
-    feet: tuple[int, int]  # places of the right foot at begin and end, in step lengths
-    duration: str  # variable
-
-    @property
-    def lift(self) -> str:
-        """Variable of single support: height of the swing."""
-        return self.duration.replace(TIMES["ssp"], LIFT)
-
-
-# In the order of time; of the pose in which the robot stands only the limits count.
-PARTS = {
-    STAND: Part(STAND, STAND, STAND, (0, 0), "shift_time_s"),
-    "shift": Part(STAND, STAND, "start_lift_off", (0, 0), "shift_time_s"),
-    "start_ssp": Part("ssp", "start_lift_off", "start_touch_down", (0, 1), f"start_{TIMES['ssp']}"),
-    "start_dsp": Part("dsp", "start_touch_down", CYCLE_END, (1, 1), f"start_{TIMES['dsp']}"),
-    "ssp": Part("ssp", "lift_off", "touch_down", (-1, 1), TIMES["ssp"]),
-    "dsp": Part("dsp", "touch_down", CYCLE_END, (1, 1), TIMES["dsp"]),
-    "stop_ssp": Part("ssp", "lift_off", "stop_touch_down", (-1, 0), f"stop_{TIMES['ssp']}"),
-    "stop_dsp": Part(STAND, "stop_touch_down", STAND, (0, 0), f"stop_{TIMES['dsp']}"),
-}
-# States that are variables in addition to the cycle's, with the switch of the cycle whose bounds they have.
-STATES = {"start_lift_off": "lift_off", "start_touch_down": "touch_down", "stop_touch_down": "touch_down"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,6 +92,12 @@ class WholeWalk:
     steps: int  # swings, the half steps included
     variables: tuple[Variable, ...]
     phases: Mapping[str, Phase]  # by kind
+    flight: Flight | None = None  # of stairs, one tread for each step length
+
+    @property
+    def rise_m(self) -> float:
+        """Height that each step gains."""
+        return 0.0 if self.flight is None else self.flight.rise_m
 
     @property
     def parts(self) -> dict[str, Part]:
@@ -215,7 +195,7 @@ class WholeWalk:
             return [at[name.replace("lift_off", state)] for name in names]
         x, y, z, vx, vy, vz, *angles = (at[name] for name in names)  # the mirror image of lift-off, a step further
         images = [c.image for c in coordinates for _ in range(2)]
-        return [x + at[STEP], -y, z, vx, -vy, vz, *(i * a for i, a in zip(images, angles, strict=True))]
+        return [x + at[STEP], -y, z + self.rise_m, vx, -vy, vz, *(i * a for i, a in zip(images, angles, strict=True))]
 
     @property
     def rows_over_time(self) -> tuple[RowsOverTime, ...]:
@@ -232,10 +212,12 @@ class WholeWalk:
 
         inner = [join("ssp", "dsp")] * (self.steps - HALF_STEPS) if "ssp" in self.parts else []
         steps = [join("shift", "start_ssp", "start_dsp"), *inner, join("stop_ssp", "stop_dsp")]
-        return join_steps(steps, self.body.robot, np.array([float(at[STEP]), 0.0, 0.0]))
+        return join_steps(steps, self.body.robot, np.array([float(at[STEP]), 0.0, self.rise_m]))
 
 
-def make_whole_walk(body: Body, steps: int, sharing: LoadSharing, grid: Grid, goal: Goal) -> WholeWalk:
+def make_whole_walk(
+    body: Body, steps: int, sharing: LoadSharing, grid: Grid, goal: Goal, flight: Flight | None
+) -> WholeWalk:
     """Return the phases of a walk of so many swings, joined."""
     margins = make_cycle_margins(body)
     box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
@@ -250,7 +232,7 @@ def make_whole_walk(body: Body, steps: int, sharing: LoadSharing, grid: Grid, go
             body=body,
             variables=make_phase_variables(body),
             duration=DURATION,
-            plan=make_planner(body, partial(read, swings=kind == "ssp")),
+            plan=make_planner(body, partial(read, swings=kind == "ssp"), flight),
             loads=make_single_support_loads(body) if kind == "ssp" else sharing.loads,
             grid=grid,
             limits=(*make_phase_limits(body, *own), *body.motors.limits),
@@ -258,56 +240,27 @@ def make_whole_walk(body: Body, steps: int, sharing: LoadSharing, grid: Grid, go
         )
         for kind, own in {"ssp": margins["ssp"], "dsp": margins["dsp"], STAND: beside}.items()
     }
-    return WholeWalk(body=body, steps=steps, variables=make_walk_variables(body, steps), phases=phases)
+    variables = make_walk_variables(body, steps)
+    if flight is not None:
+        flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
+        variables = tuple(_raise_lift(variable, body, flight) for variable in variables)
+    return WholeWalk(body=body, steps=steps, variables=variables, phases=phases, flight=flight)
 
 
-def make_phase_variables(body: Body) -> tuple[Variable, ...]:
-    """Return the variables of one phase: states at both ends, height of the swing, duration, places of the right foot."""
-    cycle = make_cycle_variables(body)
-    *_, single, _, step = cycle
-    return (
-        *make_state_variables(body, "begin", "lift_off"),
-        *make_state_variables(body, "end", "touch_down"),
-        body.lift_variable,
-        replace(single, name=DURATION),
-        replace(step, name=RIGHT_FROM),
-        step,
-    )
+def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
+    """Return the height of a swing with the bounds that the stairs' edges need; other variables as they are."""
+    if not variable.name.endswith(LIFT):
+        return variable
+    least = flight.find_least_lift(2 if variable.name == LIFT else 1)
+    return replace(variable, lower=least, upper=round(least + body.lift_variable.upper, 4))
 
 
-def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
-    """Return the variables of the cycle, and those of both ends of the walk after them.
-
-    Without inner steps, only the state between the half steps and the step length remain of the cycle.
-    """
-    cycle = make_cycle_variables(body)
-    own = {variable.name: variable for variable in cycle}
-    inner = {LIFT, *TIMES.values()} | {name for name in own if "touch_down" in name}
-    found = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
-    for name, switch in STATES.items():
-        found += make_state_variables(body, name, switch)
-    # The pose at both ends is symmetric and at rest, so the other coordinates are zero.
-    pose = ["hip_x_{}_m", "hip_z_{}_m", *(f"{c.name}_{{}}_rad" for c in body.coordinates if c.image > 0)]
-    for name in pose:
-        variable = own[name.format("lift_off")]
-        text = variable.description.replace("at lift-off", "standing")
-        found.append(replace(variable, name=name.format(STAND), description=text))
-    for name, part in PARTS.items():
-        if name in (STAND, *TIMES):
-            continue
-        kind = "ssp" if part.kind == "ssp" else "dsp"
-        words = f"duration of the phase {name}"
-        found.append(replace(own[TIMES[kind]], name=part.duration, description=words))  # type: ignore[index]
-        if kind == "ssp":
-            words = f"{body.lift_variable.description}, phase {name}"
-            found.append(replace(body.lift_variable, name=part.lift, description=words))
-    return tuple(found)
-
-
-def plan_whole_walk(body: Body, steps: int, grid: Grid, goal: Goal, sharing: LoadSharing) -> GaitProblem:
+def plan_whole_walk(
+    body: Body, steps: int, grid: Grid, goal: Goal, sharing: LoadSharing, flight: Flight | None = None
+) -> GaitProblem:
     """Return the problem of a whole walk of least energy per metre; for the options see ``gaits.nao``."""
     steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
-    walk = make_whole_walk(body, steps, sharing, grid, goal)
+    walk = make_whole_walk(body, steps, sharing, grid, goal, flight)
     durations = [PARTS[name].duration for name, count in walk.counts.items() for _ in range(count)]
     problem = GaitProblem(
         name=f"{body.family}-walk",
@@ -323,47 +276,7 @@ def plan_whole_walk(body: Body, steps: int, grid: Grid, goal: Goal, sharing: Loa
             start=partial(start_walk, walk.variables, math.tan(body.slope_rad)), starts=3, searchable=False
         ),
     )
-    return add_robot(problem, body, steps=steps)
-
-
-@cache
-def _load_start() -> dict[str, float]:
-    """Shares of the bounds' ranges at a walk of NAO."""
-    shares: dict[str, float] = json.loads(files(__package__).joinpath("walk_start.json").read_text(encoding="utf-8"))
-    return shares
-
-
-def start_walk(
-    variables: Sequence[Variable], rise: float, parameters: Mapping[str, float], rng: np.random.Generator
-) -> Array:
-    """Draw a start point (n,) near a walk of NAO in proportion to the bounds, at the required speed.
-
-    On ground that rises forward, by ``rise`` for each metre, the hip is ahead by that share of its height.
-    """
-    shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
-    x = {
-        variable.name: variable.lower + width * shares.get(variable.name, 0.5)
-        for variable, width in zip(variables, widths, strict=True)
-    }
-    for name in x:
-        if name.startswith("hip_x_"):
-            x[name] += rise * x[f"hip_z_{STAND}_m"]
-    if LEAST_SPEED in parameters:
-        speed = x[STEP] / sum(x[time] for time in TIMES.values())
-        wanted = min(max(speed, parameters[LEAST_SPEED]), parameters[GREATEST_SPEED])
-        x[TIMES["dsp"]] += max(x[STEP] / wanted - x[STEP] / speed, 0.0)
-        x[STEP] *= max(wanted / speed, 1.0)
-    lower, upper = (np.array([parameters[f"{name}.{end}"] for name in x]) for end in ("lower", "upper"))
-    noise = START_NOISE * np.array(widths) * rng.uniform(-1.0, 1.0, len(x))
-    return np.asarray(np.clip(np.array(list(x.values())) + noise, lower, upper))
-
-
-def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float]) -> Array:
-    """Return a start point (n,) with the states and times of a cycle in all phases; ``start`` has what a cycle has not."""
-    found = walk.by_name(start)
-    for name in found:
-        same = name.replace("start_", "").replace("stop_", "").replace(STAND, "lift_off")
-        found[name] = cycle.get(TIMES["dsp"] if name == "shift_time_s" else same, found[name])
-    # A lift-off between both feet is ahead of one side by side.
-    found |= dict.fromkeys((f"hip_x_{STAND}_m", "hip_x_start_lift_off_m"), 0.2 * found[STEP])
-    return np.asarray(np.clip(list(found.values()), walk.lower, walk.upper))
+    if flight is None:
+        return add_robot(problem, body, steps=steps)
+    treads = flight.list_treads(steps - 1)
+    return add_robot(problem, body, steps=steps, ground=lambda at, count: treads).fix(**{STEP: flight.run_m})

@@ -9,6 +9,9 @@ Options that the problems share:
     robot                  file of the robot, URDF, MJCF or JSON; or a name
     intervals              equal parts of a phase over which torques may change by the limit
     step_length_m          from foot to foot; 0 for NAO's 0.06 m times lambda
+    slope_deg              by which the ground of a walk rises forward; all places are in its axes, in which gravity is tilted
+    stair_rise_m           of each tread of a flight of stairs that a walk climbs, one with each step; 0 for no stairs
+    stair_run_m            depth of each tread, which is then the step length
     drive_limits           whether torques and speeds must be within the limits of the robot's file
     trajectory             of hip, swing foot and torso: cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.curves import Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import plan_double_support
+from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
@@ -101,6 +103,8 @@ def humanoid_walk(
     intervals: int = 10,
     samples_per_interval: int = 0,
     slope_deg: float = 0.0,
+    stair_rise_m: float = 0.0,
+    stair_run_m: float = 0.0,
     drive_limits: bool = True,
     motors: str = "",
 ) -> GaitProblem:
@@ -114,7 +118,12 @@ def humanoid_walk(
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
-    return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"))
+    flight = None
+    if stair_rise_m or stair_run_m:
+        flight = Flight(rise_m=stair_rise_m, run_m=stair_run_m, foot=body.robot.feet["left"])
+        if slope_deg:
+            raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")
+    return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"), flight)
 
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:

@@ -1,0 +1,90 @@
+"""The phases of a whole walk, each over the left foot at x = 0, their states, and the variables of both."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from nlp_gait.formulation import Variable
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
+from nlp_gait.gaits.biped.cycle_motion import make_cycle_variables, make_state_variables
+from nlp_gait.gaits.biped.joined_phases import STAND
+
+CYCLE_END = "cycle_end"
+HALF_STEPS = 2  # the first and the last step are half steps
+LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
+# Variables of a phase besides those of its first and last state.
+DURATION, RIGHT_FROM = "duration_s", "right_from_m"
+
+
+class Part(NamedTuple):
+    """A phase of the walk over the left foot, which stands at x = 0."""
+
+    kind: str  # ``ssp``, ``dsp`` with a foot ahead, or ``stand`` with both feet side by side
+    begin: str  # state at its begin
+    end: str
+    feet: tuple[int, int]  # places of the right foot at begin and end, in step lengths
+    duration: str  # variable
+
+    @property
+    def lift(self) -> str:
+        """Variable of single support: height of the swing."""
+        return self.duration.replace(TIMES["ssp"], LIFT)
+
+
+# In the order of time; of the pose in which the robot stands only the limits count.
+PARTS = {
+    STAND: Part(STAND, STAND, STAND, (0, 0), "shift_time_s"),
+    "shift": Part(STAND, STAND, "start_lift_off", (0, 0), "shift_time_s"),
+    "start_ssp": Part("ssp", "start_lift_off", "start_touch_down", (0, 1), f"start_{TIMES['ssp']}"),
+    "start_dsp": Part("dsp", "start_touch_down", CYCLE_END, (1, 1), f"start_{TIMES['dsp']}"),
+    "ssp": Part("ssp", "lift_off", "touch_down", (-1, 1), TIMES["ssp"]),
+    "dsp": Part("dsp", "touch_down", CYCLE_END, (1, 1), TIMES["dsp"]),
+    "stop_ssp": Part("ssp", "lift_off", "stop_touch_down", (-1, 0), f"stop_{TIMES['ssp']}"),
+    "stop_dsp": Part(STAND, "stop_touch_down", STAND, (0, 0), f"stop_{TIMES['dsp']}"),
+}
+# States that are variables in addition to the cycle's, with the switch of the cycle whose bounds they have.
+STATES = {"start_lift_off": "lift_off", "start_touch_down": "touch_down", "stop_touch_down": "touch_down"}
+
+
+def make_phase_variables(body: Body) -> tuple[Variable, ...]:
+    """Return the variables of one phase: states at both ends, height of the swing, duration, places of the right foot."""
+    cycle = make_cycle_variables(body)
+    *_, single, _, step = cycle
+    return (
+        *make_state_variables(body, "begin", "lift_off"),
+        *make_state_variables(body, "end", "touch_down"),
+        body.lift_variable,
+        replace(single, name=DURATION),
+        replace(step, name=RIGHT_FROM),
+        step,
+    )
+
+
+def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
+    """Return the variables of the cycle, and those of both ends of the walk after them.
+
+    Without inner steps, only the state between the half steps and the step length remain of the cycle.
+    """
+    cycle = make_cycle_variables(body)
+    own = {variable.name: variable for variable in cycle}
+    inner = {LIFT, *TIMES.values()} | {name for name in own if "touch_down" in name}
+    found = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
+    for name, switch in STATES.items():
+        found += make_state_variables(body, name, switch)
+    # The pose at both ends is symmetric and at rest, so the other coordinates are zero.
+    pose = ["hip_x_{}_m", "hip_z_{}_m", *(f"{c.name}_{{}}_rad" for c in body.coordinates if c.image > 0)]
+    for name in pose:
+        variable = own[name.format("lift_off")]
+        text = variable.description.replace("at lift-off", "standing")
+        found.append(replace(variable, name=name.format(STAND), description=text))
+    for name, part in PARTS.items():
+        if name in (STAND, *TIMES):
+            continue
+        kind = "ssp" if part.kind == "ssp" else "dsp"
+        words = f"duration of the phase {name}"
+        found.append(replace(own[TIMES[kind]], name=part.duration, description=words))  # type: ignore[index]
+        if kind == "ssp":
+            words = f"{body.lift_variable.description}, phase {name}"
+            found.append(replace(body.lift_variable, name=part.lift, description=words))
+    return tuple(found)
