@@ -159,15 +159,13 @@ def _check_torque_change(phase: PhaseFindings, swarm: str) -> Check:
 
 def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -> Check:
     """Check how much more than its least power the median run of a search needs at a swing height [%]."""
-    ssp, printed = findings.ssp, SWING_POWER_W["ga" if algorithm == "ga" else "pso"]
-    rises = [
-        100 * (ssp.list_swing_powers(algorithm, whole=whole)[PAPER.swing_heights_m.index(height_m)] / least - 1)
-        for whole, least in ((False, np.median(ssp.final_powers(algorithm))), (True, min(ssp.final_powers(algorithm))))
-    ]
+    ssp, at = findings.ssp, PAPER.swing_heights_m.index(height_m)
+    printed = SWING_POWER_W["ga" if algorithm == "ga" else "pso"]
+    middle = ssp.list_swing_powers(algorithm)[at] / ssp.median(algorithm).verdict.objective
+    every = ssp.list_swing_powers(algorithm, whole=True)[at] / min(ssp.final_powers(algorithm))
+    rises = [100 * (power - 1) for power in (printed[height_m] / printed[0.015], middle, every)]
     true = 100 * (findings.swing_power(height_m) / findings.swing_power(0.015) - 1)
-    return _compare_histories(
-        100 * (printed[height_m] / printed[0.015] - 1), *rises, search=NAMES[algorithm], height=height_m, true=true
-    )
+    return _compare_histories(*rises, search=NAMES[algorithm], height=height_m, true=true)
 
 
 def _compare_histories(printed: float, middle: float, every: float, /, **values: Any) -> Check:

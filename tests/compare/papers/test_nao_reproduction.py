@@ -200,6 +200,9 @@ def test_claims_follow_the_numbers(finished: Finished) -> None:
         "does not hold (printed 20, here -830)",
     ]
     assert compare(low, wide, little)[0].startswith("not shown (rank-sum test")
+    medians = [with_powers(ssp, {"pso-constant": high, "pso": low, "ga": ga}) for ga in (low, high)]
+    found = [[verdict(replace(findings, ssp=m), f"median-ssp{end}") for end in ("", "-damped")] for m in medians]
+    assert found == [["does not hold", "not shown"], ["not shown", "holds"]]  # by the left-tailed test
 
     falling, rising = (with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0)))
     assert (verdict(falling, "higher-hip-ssp"), verdict(rising, "higher-hip-ssp")) == ("holds", "does not hold")
