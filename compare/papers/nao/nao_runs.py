@@ -66,9 +66,9 @@ class NaoEffort(Effort):
     @property
     def steps(self) -> int:
         """Runs, two special sweeps and one over each variable, a simulation of each printed solution, and the report."""
-        sweeps = sum(len(p.optima["pso"].x) for p in self.phases) + len(make_special_sweeps(self))
+        sweeps = 2 * (SSP in self.phases) + sum(len(p.optima["pso"].x) for p in self.phases)
         other = sum(self.choose_other(choice).steps - 1 for choice in self.others)
-        return len(make_tasks(self)) + sweeps + len(make_simulations(self)) + 1 + other
+        return len(make_tasks(self)) + sweeps + sum(len(p.optima) for p in self.phases) + 1 + other
 
     @property
     def phases(self) -> tuple[PrintedPhase, ...]:
