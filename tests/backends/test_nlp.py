@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -81,6 +83,13 @@ BAD: dict[str, tuple[Mathematics, str]] = {
     "min minimised": (lambda x, y, limit, ops: (ops.min(x, y), ()), "the objective"),
     "abs bounded from below": (lambda x, y, limit, ops: (x, (row(ops.abs(x), lower=limit),)), "row row gains"),
     "min bounded from above": (lambda x, y, limit, ops: (x, (row(ops.min(x, y), upper=limit),)), "row row gains"),
+    "the first of two": (
+        lambda x, y, limit, ops: (
+            x,
+            (row(ops.abs(x), lower=limit), replace(row(ops.abs(y), lower=limit), name="next")),
+        ),
+        "row row gains",
+    ),
     "abs held at a value": (lambda x, y, limit, ops: (x, (row(ops.abs(x), limit, limit),)), "row row gains"),
     "min of an abs": (lambda x, y, limit, ops: (-ops.min(ops.abs(x), y), ()), "another abs or min gains"),
     "abs of a difference from an abs": (lambda x, y, limit, ops: (ops.abs(ops.abs(x) - 1), ()), "another abs or min"),
@@ -104,6 +113,11 @@ def test_lifting_along_the_sense_is_exact_at_the_optimum(mathematics: Mathematic
 def test_lifting_against_the_sense_is_an_error(mathematics: Mathematics, where: str) -> None:
     with pytest.raises(LiftedSenseError, match=f"toy: .*{where}.*the lifted NLP would be wrong"):
         build_nlp(toy(mathematics))
+
+
+def test_each_row_of_a_lift_belongs_to_its_variable() -> None:
+    """Two rows hold each of two absolute values and a minimum."""
+    np.testing.assert_array_equal(build_nlp(toy(corner)).tie_owner, [0, 0, 1, 1, 2, 2])
 
 
 def test_the_sense_of_the_objective_counts() -> None:

@@ -19,6 +19,7 @@ from metaheuristics.errors import SearchError
 from metaheuristics.settings import check_installed
 from nlp_gait.errors import NoWorkersError, WorkerError
 from nlp_gait.processes import run_in_processes
+from tests.compare.cli.calls import nlp_gait
 from tests.faults.processes import ROOT
 
 
@@ -88,11 +89,14 @@ def test_a_shortage_at_the_start_of_workers_is_one_sentence(
 
 
 @pytest.mark.slow
-def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(tmp_path: Path) -> None:
+def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
+) -> None:
     line = "compare walk12 --algorithms random --starts 0 --evaluations 60 --out study --jobs"
     program = [sys.executable, "-m", "nlp_gait"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run([*program, *line.split(), "1", "--runs", "2"], cwd=tmp_path, env=environment, check=True)
+    monkeypatch.chdir(tmp_path)
+    nlp_gait(*line.split(), "1", "--runs", "2")
     done = subprocess.run(
         ["sh", "-c", 'ulimit -n 24; exec "$@"', "sh", *program, *line.split(), "20", "--runs", "22"],
         cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120,

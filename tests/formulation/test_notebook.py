@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +55,18 @@ def test_without_pandas_the_message_says_how_to_install_it(signals: Signals, mon
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MissingExtraError, match="pip install pandas"):
         signals.to_frame()
+
+
+def test_a_solution_of_many_variables_displays_twenty(solution: nlp_gait.Solution) -> None:
+    long = replace(solution, x={f"first_{i}": 1.0 for i in range(30)}, active_constraints=())
+    shown = long._repr_html_()
+    assert "first_19<" in shown and "first_20<" not in shown
+    assert "; 10 more in .x and .active_constraints" in shown and " more in " not in solution._repr_html_()
+
+
+def test_a_start_without_a_violation_ranks_last(solution: nlp_gait.Solution) -> None:
+    (start,) = solution.starts
+    assert replace(start, violation=0.5).rank == (2.0, 0.5) < replace(start, violation=math.nan).rank == (2.0, math.inf)
 
 
 def test_a_solution_displays_a_table_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:

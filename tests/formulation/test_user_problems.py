@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import pickle
+from dataclasses import replace
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
@@ -34,6 +36,15 @@ def test_a_maker_in_a_file_is_loaded_with_its_options_and_solved() -> None:
     assert solve(problem, starts=2).converged
     with pytest.raises(UnknownNameError, match="did you mean 'intervals'"):
         load(f"{EXAMPLE}:two_link", interval=10)
+
+
+def test_a_pickle_keeps_its_options() -> None:
+    problem = load(f"{EXAMPLE}:two_link", intervals=10, lift_m=1)  # a whole number for a length
+    again = pickle.loads(pickle.dumps(problem))
+    assert again.options == {"intervals": 10, "lift_m": 1} and again.names == problem.names
+    for wrong in (True, "0.05", float("nan")):
+        with pytest.raises(InputError, match="option lift_m must be a finite number, got"):
+            load(f"{EXAMPLE}:two_link", lift_m=wrong)
 
 
 def test_an_edited_file_and_another_folder_are_other_problems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,6 +179,15 @@ def vars_of(problem: GaitProblem) -> dict[str, Any]:
         (lambda x, y, p, ops: (x + MX.sym("mass"), ()), "objective contains 'mass', which is neither a variable nor"),
         (lambda x, y, p, ops: (x, (row(MX.sym("q") * x),)), "constraint 'knee' contains 'q'"),
         (lambda x, y, p, ops: (ca.vertcat(x, y), ()), "must be a scalar"),
+        (
+            lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), lower=MX([0.0, float("nan")])),)),
+            "constraint 'knee': lower is NaN; give a number, or leave it out for no bound",
+        ),
+        (
+            lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), ("left", "a$")),)),
+            "printable text without '\\$', got 'a\\$'",
+        ),
+        (lambda x, y, p, ops: (x, (two_rows(ca.vertcat(x, y), ("left", "a\n")),)), "printable text without"),
     ],
 )
 def test_mathematics_that_backends_cannot_use_is_refused(mathematics: Any, message: str) -> None:
@@ -178,6 +198,10 @@ def test_mathematics_that_backends_cannot_use_is_refused(mathematics: Any, messa
 
 def row(value: MX, lower: MX | None = None) -> Constraint:
     return Constraint(name="knee", unit="m", scale=1.0, value=value, lower=MX(0.0) if lower is None else lower)
+
+
+def two_rows(value: MX, labels: tuple[str, str] = ("left", "right"), lower: MX | None = None) -> Constraint:
+    return replace(row(value[0]), value=value, labels=labels, lower=MX(0.0) if lower is None else lower)
 
 
 def test_a_source_is_the_file_and_the_files_next_to_it_that_it_imports(tmp_path: Path) -> None:

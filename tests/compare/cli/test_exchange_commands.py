@@ -49,7 +49,7 @@ class Walk:
 
 
 def annealing(f, lower, upper, evaluations, seed):
-    dual_annealing(f, list(zip(lower, upper)), maxfun=evaluations, rng=seed, no_local_search=True)
+    dual_annealing(f, list(zip(lower, upper)), maxfun=min(evaluations, 300), rng=seed, no_local_search=True)
 '''
 
 

@@ -49,7 +49,7 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Path:
+def report(tmp_path_factory: pytest.TempPathFactory, browser: Any, coarse_pages: None) -> Path:
     folder = tmp_path_factory.mktemp("interactive")
     write_report(folder, [*study(), *gaits()], Manifest(settings=None, sessions=()))
     return folder / "report.html"
