@@ -18,7 +18,8 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion, stack
 # Shares of a swing's path over time: forward at rest and unaccelerated at both ends, upward at rest, and its bow.
 FORWARD, UPWARD = Polynomial([0, 0, 0, 10, -15, 6]), Polynomial([0, 0, 3, -2])
 BOW = Polynomial([0, 0, 16, -32, 16])
-GAP = 0.005  # [m] between a swinging sole and the edges, along and above
+CLEARANCE_M = 0.005  # of a swinging sole above the edges, of NAO's size
+LEAST_RUN = 1.1  # of a tread, in lengths of the sole
 FINE = 1001  # instants at which a swing is compared with the stairs
 
 
@@ -29,6 +30,7 @@ class Flight:
     rise_m: float  # of each tread
     run_m: float  # depth of each tread, which is also the step length
     foot: Foot
+    clearance_m: float = CLEARANCE_M  # least height of a swinging sole above the edges
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rise_m < math.inf:
@@ -36,10 +38,10 @@ class Flight:
 
     def check_run(self, longest_m: float) -> None:
         """Raise InputError if the sole does not fit on a tread, or the robot's longest step is shorter than one."""
-        least = self.foot.back_m + self.foot.front_m + 4 * GAP
+        least = LEAST_RUN * (self.foot.back_m + self.foot.front_m)
         if not least <= self.run_m <= longest_m:
             raise InputError(
-                f"the run of stairs must be at least {least:.3g} m, the sole and {4 * GAP:g} m, "
+                f"the run of stairs must be at least {least:.3g} m, {LEAST_RUN:g} lengths of the sole, "
                 f"and at most {longest_m:.3g} m, the longest step of this robot; got {self.run_m!r} m"
             )
 
@@ -67,13 +69,16 @@ class Flight:
         return stack(along(FORWARD, start_x, end_x - start_x), constant_motion(y), height)
 
     def find_least_lift(self, treads: int) -> float:
-        """Return the least bow of a swing by so many treads, of two if it passes the standing foot, over all edges [m]."""
+        """Return the least bow of a swing by so many treads, of two if it passes the standing foot, over all edges [m].
+
+        The sole is high enough before its toe has come halfway to an edge.
+        """
         s = np.linspace(0.0, 1.0, FINE)[1:-1]
         from_tread = 1 - treads
-        toe = (from_tread + treads * FORWARD(s)) * self.run_m + self.foot.front_m + GAP
+        toe = (from_tread + treads * FORWARD(s)) * self.run_m + self.foot.front_m + self._free / 4
         below = np.floor((toe + self._setback) / self.run_m) * self.rise_m
         above = (from_tread + treads * UPWARD(s)) * self.rise_m
-        return float(np.ceil(1e3 * (np.max((below - above) / BOW(s)) + GAP)) / 1e3)
+        return float(np.ceil(1e3 * (np.max((below - above) / BOW(s)) + self.clearance_m)) / 1e3)
 
     def list_treads(self, count: int) -> tuple[Tread, ...]:
         """Return so many treads, for a robot whose feet begin at x = 0."""
@@ -84,4 +89,9 @@ class Flight:
     @property
     def _setback(self) -> float:
         """From an edge to the ankle above its tread [m]."""
-        return self.foot.back_m + (self.run_m - self.foot.back_m - self.foot.front_m) / 2
+        return self.foot.back_m + self._free / 2
+
+    @property
+    def _free(self) -> float:
+        """Depth of a tread that the sole does not cover [m]."""
+        return self.run_m - self.foot.back_m - self.foot.front_m

@@ -9,7 +9,7 @@ from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.curves import Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import plan_double_support
-from nlp_gait.gaits.biped.flight import Flight
+from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
@@ -120,7 +120,12 @@ def humanoid_walk(
     grid = make_grid("cubic", intervals, samples_per_interval)
     flight = None
     if stair_rise_m or stair_run_m:
-        flight = Flight(rise_m=stair_rise_m, run_m=stair_run_m, foot=body.robot.feet["left"])
+        flight = Flight(
+            rise_m=stair_rise_m,
+            run_m=stair_run_m,
+            foot=body.robot.feet["left"],
+            clearance_m=body.scale_length(CLEARANCE_M),
+        )
         if slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")
     return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"), flight)
