@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, wraps
 from typing import Any
 
@@ -66,22 +67,41 @@ def pytest_fixture_setup() -> Iterator[Any]:
         raise
 
 
+@contextmanager
+def _replace_pictures(name: str) -> Iterator[None]:
+    from tests.compare import pictures  # Matplotlib takes half of the time of an empty run
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("compare.report.writing.save", getattr(pictures, name))
+        yield
+
+
 @pytest.fixture(scope="module")
 def coarse_pages() -> Iterator[None]:
     """Draw each picture of a page once and small, for files whose tests do not measure the pictures of their pages."""
-    from tests.compare.pictures import save_coarsely  # Matplotlib takes half of the time of an empty run
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("compare.report.writing.save", save_coarsely)
+    with _replace_pictures("save_coarsely"):
         yield
 
 
 @pytest.fixture
-def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def coarse_pictures() -> Iterator[None]:
     """Do so for a test."""
-    from tests.compare.pictures import save_coarsely
+    with _replace_pictures("save_coarsely"):
+        yield
 
-    monkeypatch.setattr("compare.report.writing.save", save_coarsely)
+
+@pytest.fixture(scope="module")
+def undrawn_pages() -> Iterator[None]:
+    """Draw none, for files about commands and records, whose pictures are drawn by the tests of reports and questions."""
+    with _replace_pictures("save_undrawn"):
+        yield
+
+
+@pytest.fixture
+def undrawn_pictures() -> Iterator[None]:
+    """Do so for a test."""
+    with _replace_pictures("save_undrawn"):
+        yield
 
 
 @pytest.fixture

@@ -10,17 +10,27 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
+from nlp_gait.formulation import Array
+
 
 def save_coarsely(figure: Figure, stem: Path, drawn: Collection[str] = ()) -> tuple[Path, Path]:
     """Write a picture of few pixels and an empty drawing; if ``drawn`` names any, others are not drawn."""
-    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
+    if drawn and stem.name not in drawn:
+        return save_undrawn(figure, stem)
     figure.set_layout_engine("none")
     figure.set_dpi(20)
     canvas = FigureCanvasAgg(figure)
-    if not drawn or stem.name in drawn:
-        canvas.draw()  # once; ``savefig`` draws twice
-        imsave(png, np.asarray(canvas.buffer_rgba()))
-    else:
-        imsave(png, np.random.default_rng(0).random((20, 20, 3)))  # a file of the usual size
+    canvas.draw()  # once; ``savefig`` draws twice
+    return _write(stem, np.asarray(canvas.buffer_rgba()))
+
+
+def save_undrawn(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    """Write a picture of the usual size that shows nothing."""
+    return _write(stem, np.random.default_rng(0).random((20, 20, 3)))
+
+
+def _write(stem: Path, pixels: Array) -> tuple[Path, Path]:
+    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
+    imsave(png, pixels)
     svg.write_text("<svg>" + 1000 * " " + "</svg>", encoding="utf-8")
     return png, svg

@@ -90,7 +90,7 @@ def test_a_shortage_at_the_start_of_workers_is_one_sentence(
 
 @pytest.mark.slow
 def test_a_limit_of_open_files_is_one_sentence_and_keeps_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn_pictures: None
 ) -> None:
     line = "compare walk12 --algorithms random --starts 0 --evaluations 60 --out study --jobs"
     program = [sys.executable, "-m", "nlp_gait"]

@@ -18,7 +18,7 @@ from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_f
 from tests.faults.processes import ROOT, quick_compiler
 
 RUN = CliRunner()
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
+pytestmark = pytest.mark.usefixtures("undrawn_pictures")
 STUDY = (
     "compare",
     "walk12",

@@ -31,7 +31,7 @@ def limited_files(kilobytes: int) -> Iterator[None]:
 
 @pytest.mark.slow
 def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(
-    tmp_path: Path, coarse_pictures: None
+    tmp_path: Path, undrawn_pictures: None
 ) -> None:
     study = "walk12 --algorithms pso --runs 30 --evaluations 500 --starts 0 --jobs 1"
     script = (

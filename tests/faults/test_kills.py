@@ -60,7 +60,7 @@ def test_a_reproduction_killed_and_continued_ends_as_undisturbed(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path, coarse_pictures: None) -> None:
+def test_a_sweep_killed_and_interrupted_ends_as_undisturbed(tmp_path: Path, undrawn_pictures: None) -> None:
     command = ("sweep", "walk12", "--over", "step_length_m=0.06:0.12:4", "--starts", "1")
     RUN.invoke(app, [*command, "--out", str(tmp_path / "undisturbed")])
     killed, steps = tmp_path / "killed", tmp_path / "killed" / "store"

@@ -11,7 +11,7 @@ from compare.bench.baseline import BASELINE
 from nlp_gait import gaitbench
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
+pytestmark = pytest.mark.usefixtures("undrawn_pictures")
 
 ID = "walk12-w015"
 # What a user brings: an algorithm with ask and tell, and a plain function around a library's optimiser.

@@ -13,7 +13,7 @@ from compare.cli.compare import choose_solvers
 from compare.cli.options import SearchOptions
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
-pytestmark = pytest.mark.usefixtures("coarse_pages")
+pytestmark = pytest.mark.usefixtures("undrawn_pages")
 
 STUDY = """
 runs = 1
@@ -31,7 +31,7 @@ settings = {population = 20}
 
 
 @pytest.fixture(scope="module")
-def folder(coarse_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(undrawn_pages: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("study")
     (out / "study.toml").write_text(STUDY)
     done = as_json("compare", "--config", out / "study.toml", "--out", out / "out", "--jobs", "1")

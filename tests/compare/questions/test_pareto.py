@@ -70,6 +70,7 @@ def test_dominated_points_go() -> None:
     assert [(p.value, p.power_W) for p in kept] == [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]
 
 
+@pytest.mark.usefixtures("without_compiler")
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_criteria_are_the_judges_numbers(name: str) -> None:
     problem = nlp_gait.load(name, intervals=4)

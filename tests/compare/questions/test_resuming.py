@@ -24,7 +24,7 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import Best, Evaluations, Guess, Outcome
 from tests.compare.cli.test_question_commands import PARETO
 
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
+pytestmark = pytest.mark.usefixtures("undrawn_pictures")
 
 RUN = CliRunner()
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
