@@ -42,6 +42,7 @@ class Choice:
     text: str
     plan: str = "plan"
     plans: tuple[str, ...] = ("jerk", "plan")  # of a reading of the planner: least jerk, least energy
+    relaxes: bool = False  # whether it only relaxes limits of the planner, so that our plans keep them
     contains: tuple[
         str, ...
     ] = ()  # of the tracked step: readings with the same objective and narrower bounds or more limits

@@ -35,17 +35,30 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield plans under every choice, and in each case the paper's hip height, an upright torso, a reverse double support."""
     effort = findings.effort
     for name in effort.plan_choices:
-        choice = PLAN_CHOICES[name]
         for what in list_choice_plans(name):
-            spec = make_plan_spec(effort, DRAWN_CASE, what)
-            spec = replace(spec, options={**spec.options, **choice.options}, values={**spec.values, **choice.values})
-            best, spec = findings.best(what, DRAWN_CASE), replace(spec, label=f"{what}-{DRAWN_CASE}-{name}")
+            spec, best = _make_choice_spec(findings, what, name), findings.best(what, DRAWN_CASE)
             yield _make_task(spec, best, effort.plan_settings)
     for case in findings.cases:
         settings = effort.plan_settings
         yield from make_start_tasks(make_plan_spec(effort, case, "hip"), effort.hip_starts, settings=settings)
         yield _make_task(make_plan_spec(effort, case, "landing"), findings.best("jerk", case), settings)
         yield _make_task(make_plan_spec(effort, case, "upright"), findings.best("plan", case), settings)
+
+
+def make_energy_tasks(findings: StairsFindings) -> Iterator[Task]:
+    """Yield searches for plans of least energy under every choice that start from those of least jerk under it."""
+    for name in findings.effort.plan_choices:
+        if "plan" in list_choice_plans(name):
+            best = choose_best(findings.runs[f"jerk-{DRAWN_CASE}-{name}", IPOPT])
+            yield replace(
+                _make_task(_make_choice_spec(findings, "plan", name), best, findings.effort.plan_settings), run=1
+            )
+
+
+def _make_choice_spec(findings: StairsFindings, what: str, name: str) -> ProblemSpec:
+    spec, choice = make_plan_spec(findings.effort, DRAWN_CASE, what), PLAN_CHOICES[name]
+    options, values = {**spec.options, **choice.options}, {**spec.values, **choice.values}
+    return replace(spec, options=options, values=values, label=f"{what}-{DRAWN_CASE}-{name}")
 
 
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
@@ -150,9 +163,14 @@ def make_planning_tables(findings: StairsFindings) -> dict[str, Rows]:
 
 
 def get_choice(findings: StairsFindings, what: str, name: str) -> RunRecord:
-    """Return the plan under a choice, or the best one without a name."""
-    title = f"{what}-{DRAWN_CASE}" + (f"-{name}" if name else "")
-    return choose_best(findings.runs[title, IPOPT])
+    """Return the best known plan under a choice, of either goal, and ours if it only relaxes limits; ours without a name."""
+    if not name:
+        return findings.best(what, DRAWN_CASE)
+    titles = [f"{other}-{DRAWN_CASE}-{name}" for other in list_choice_plans(name)]
+    titles += [f"{other}-{DRAWN_CASE}" for other in PLANS if PLAN_CHOICES[name].relaxes]
+    known = [run for title in titles for run in findings.runs[title, IPOPT] if run.verdict.feasible]
+    own = choose_best(findings.runs[f"{what}-{DRAWN_CASE}-{name}", IPOPT])
+    return min(known, key=lambda run: run.verdict.indexes[INDEXES[what]], default=own)
 
 
 def _list_choice(findings: StairsFindings, name: str) -> list[Value]:

@@ -31,6 +31,9 @@ def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     """Run plans and ideals, then track the best plans, then compute what follows from them."""
     findings = StairsFindings(effort=effort, runs=runner.run_tasks(runs.make_first_tasks(effort)))
     findings.runs.update(runner.run_tasks(planning.make_choice_tasks(findings)))
+    if effort.from_jerk:
+        for key, found in runner.run_tasks(planning.make_energy_tasks(findings)).items():
+            findings.runs[key].extend(found)
     findings.runs.update(runner.run_tasks(planning.make_first_step_tasks(findings)))
     findings.runs.update(runner.run_tasks([*runs.make_track_tasks(findings), *tracking.make_tracking_tasks(findings)]))
     computations = [

@@ -71,6 +71,7 @@ class StairsEffort(paper_runs.Effort):
     track_evaluations: int = ANTS * ITERATIONS  # as in the paper
     instant_evaluations: int = ANTS * ITERATIONS  # of each search of Algorithm 4
     plan_choices: tuple[str, ...] = tuple(PLAN_CHOICES)  # of the planner
+    from_jerk: bool = True  # whether plans of least energy are searched from those of least jerk under a choice, too
     choices: tuple[str, ...] = tuple(CHOICES)  # readings of the tracked step
     instants: tuple[str, ...] = stairs_paper.INSTANTS  # readings of Algorithm 4
     plan_settings: Mapping[str, Any] = field(default_factory=dict)  # of IPOPT on plans
@@ -103,8 +104,8 @@ class StairsEffort(paper_runs.Effort):
     @property
     def plan_steps(self) -> int:
         """Plans under every choice and other plans of each case, first steps and simulations."""
-        chosen = sum(len(PLAN_CHOICES[name].plans) for name in self.plan_choices)
-        return chosen + len(self.cases) * (2 + self.first_starts + 1 + 3)
+        plans = [what for name in self.plan_choices for what in PLAN_CHOICES[name].plans]
+        return len(plans) + self.from_jerk * plans.count("plan") + len(self.cases) * (2 + self.first_starts + 1 + 3)
 
     @property
     def steps(self) -> int:
@@ -255,7 +256,7 @@ def make_computations(findings: StairsFindings) -> Iterator[Computation]:
 def train_network(case: int, plan: Mapping[str, float], poses: int, printed_poses: int) -> dict[str, Any]:
     """Train the network on the first poses of a plan's swing leg: convergence, time and error against the closed form."""
     desired = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
-    all_poses = np.cumsum(desired[:poses, :2], axis=1)  # the knee is measured from the thigh
+    all_poses = np.cumsum(desired[:poses, :2], axis=1) - plan["torso_pitch_rad"]  # thigh from torso, knee from thigh
     robot = toe_foot_biped()
     lengths = np.array([robot.link(name).length_m for name in LEGS[0]])
     legs = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in all_poses]).T

@@ -44,7 +44,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
 
 
 def test_the_full_effort_counts_all_its_steps() -> None:
-    plans = 2 * 25 - 1 + 7 + 3 * (2 + 5 + 1 + 3)
+    plans = 2 * 25 - 1 + 7 + 24 + 3 * (2 + 5 + 1 + 3)
     assert REPRODUCTION.full.steps == 3 * (20 + 20 + 6 + 3 + 1 + (3 * 5 + 28) * 3 + 4 + 3 + 6) + 4 * 8 + 3 + 2 + plans
 
 
