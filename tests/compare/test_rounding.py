@@ -22,6 +22,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("printed", CASES)
 def test_random_points_of_the_box_agree(printed: str) -> None:
     found = evaluate_rounded(WALK, printed.split(","))

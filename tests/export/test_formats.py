@@ -86,6 +86,7 @@ def test_ros_trajectory_is_exactly_periodic_and_agrees_with_the_csv(result, tmp_
     np.testing.assert_allclose(points[20]["effort"], signals.arrays["tau"][3], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_both_phases_of_a_cycle_have_rows_exactly_a_millisecond_apart():
     problem = nlp_gait.load("nao-cycle")
     middle = (problem.lower + problem.upper) / 2

@@ -140,6 +140,7 @@ def test_bounds_that_are_nan_are_rejected_or_never_satisfied(end: str, bound: Ca
     assert not found.feasible and math.isnan(found.violation)
 
 
+@pytest.mark.slow
 def test_long_histories_keep_their_changes_and_their_end() -> None:
     assert _choose_entries([1.0] * MOST_HISTORY) == list(range(MOST_HISTORY))
     flat: list[float | None] = [None] * 700_000 + [3.0] * 500_000 + [2.0] * 100_000

@@ -139,6 +139,7 @@ def test_pycma(instance: gaitbench.Instance) -> None:
     assert best is not None and instance(np.array(best)[None])[1][0] == 0.0
 
 
+@pytest.mark.slow
 def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
     """Parameters by name, one constraint, and a sampler that knows it."""
     package("optunahub")
@@ -157,6 +158,7 @@ def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
         assert trial.value == instance(x)[0][0]
 
 
+@pytest.mark.slow
 def test_nevergrad(instance: gaitbench.Instance, X: Array) -> None:
     package("nevergrad")
     import nevergrad as ng
@@ -185,6 +187,7 @@ def test_an_unknown_adapter_is_refused(instance: gaitbench.Instance) -> None:
         instance.to("pymo")
 
 
+@pytest.mark.slow
 def test_loading_an_instance_imports_none_of_them() -> None:
     import subprocess
 

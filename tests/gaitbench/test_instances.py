@@ -185,6 +185,7 @@ def test_the_one_equation_of_splines_is_a_band() -> None:
     np.testing.assert_allclose(G.sum(axis=1), -2 * 1e-2, rtol=1e-9)  # of the scale, a centimetre
 
 
+@pytest.mark.slow
 def test_threads_and_processes_find_the_same_values() -> None:
     instance = gaitbench.load("ssp-v5")
     X = points(instance, 400)

@@ -46,6 +46,7 @@ def test_a_walk_begins_and_ends_at_rest_in_the_same_pose(problem: GaitProblem, x
     assert arrays["left_foot"][-1, 0] - arrays["left_foot"][0, 0] == pytest.approx((STEPS - 1) * step)
 
 
+@pytest.mark.slow
 def test_neighbouring_phases_share_angles_and_rates(problem: GaitProblem, x: np.ndarray) -> None:
     """On samples close to each other no angle and no rate of any joint jumps, though accelerations do."""
     dense = problem.dense(40)

@@ -38,6 +38,7 @@ def power_form(name: str) -> PowerForm:
     return problem.power_form(problem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-dsp", "nao-ssp"])
 def test_gaits_are_enclosed_at_sampled_points_of_boxes_around_the_best(name: str) -> None:
     form, rng = power_form(name), np.random.default_rng(SEED)

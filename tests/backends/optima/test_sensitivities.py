@@ -138,6 +138,7 @@ def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...
         )
 
 
+@pytest.mark.slow
 def test_casadis_own_sensitivities_agree() -> None:
     """Of its SQP method with an active-set QP solver, where no active rows depend on each other."""
     problem = load("walk12")

@@ -86,6 +86,7 @@ def test_every_damage_is_named(files: Files, tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("outside*")) and not (tmp_path.parent / "outside.txt").exists()
 
 
+@pytest.mark.slow
 def test_every_forgery_with_a_fitting_manifest_is_named(files: Files, tmp_path: Path) -> None:
     for k, (name, content, word) in enumerate(forge(files, RECORD)):
         wrong = [finding.sentence for finding in verify(content, tmp_path / str(k)) if not finding.holds]

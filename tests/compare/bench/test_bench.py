@@ -68,6 +68,7 @@ def test_everything_of_the_small_suite_is_shipped() -> None:
         assert {r.definition["stop"]["evaluations"] for r in records if "handling" in r.definition} == {10_000}
 
 
+@pytest.mark.slow
 def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
     board = rank_solvers(["walk12-w015", "ssp-v5"])
     duels = {
@@ -81,6 +82,7 @@ def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
     assert duels["pso"]["random"].wins == 2 and duels["random"]["pso"].losses == 2
 
 
+@pytest.mark.slow
 def test_no_shipped_run_is_better_than_the_best_known() -> None:
     """By more than a judge's tolerance of 1e-6 can buy."""
     for id in list_instances():

@@ -146,6 +146,7 @@ def test_power_of_the_signals_is_the_objective(name: str) -> None:
         assert cost == pytest.approx(power, rel=1e-12)  # the same sums in another order
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp"])
 def test_separate_arms_load_no_leg_and_move_on_a_torso_at_rest(name: str, tmp_path: Path) -> None:
     """The legs' torques are those of a robot with arms of a milligram; the arms' are those of arms that a still torso carries."""

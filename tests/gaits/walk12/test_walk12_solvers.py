@@ -35,6 +35,7 @@ def test_ipopt_from_random_starts(row: tuple[float, ...]) -> None:
     assert np.median([start.iterations for start in solution.starts]) < START_ITERATIONS
 
 
+@pytest.mark.slow
 def test_between_the_plateaus() -> None:
     solution = solve(PROBLEM.with_values(**{"lambda": 0.7}), starts=3)
     assert solution.objective == pytest.approx(0.8686, abs=OPTIMUM_TOLERANCE)
