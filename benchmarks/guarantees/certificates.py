@@ -3,7 +3,8 @@
 ``python -m benchmarks.guarantees.certificates OUT [NAME ...] [--tolerance TOLERANCE] [--hours HOURS] [--part PART]`` proves one
 after the other, by default all that OUT lacks, and writes them as NAME.json, where NAME is that of an instance or
 ``walk12-lambda-LAMBDA``. A killed proof continues. If the time is not enough, the open part stays in OUT and its bound is
-printed. With a part, the bounds of the variables are this part of their ranges around the best known gait.
+printed. With a part, the bounds of the variables are this part of their ranges around the best known gait. After certificates
+in ``nlp_gait/proofs/certificates`` have changed, ``python -m benchmarks.best_known`` writes their bounds to the shipped values.
 """
 
 from __future__ import annotations
