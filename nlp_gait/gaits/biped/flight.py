@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from nlp_gait.errors import InputError
 from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Foot
-from nlp_gait.symbolic.trajectories import Motion, constant_motion, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
 
 # Shares of a swing's path over time: forward at rest and unaccelerated at both ends, upward at rest, and its bow.
 FORWARD, UPWARD = Polynomial([0, 0, 0, 10, -15, 6]), Polynomial([0, 0, 3, -2])
@@ -61,12 +61,9 @@ class Flight:
             position, *rates = (way * part for part in orders)
             return Motion(start + position, *rates)
 
-        up, bow = (
-            along(UPWARD, ankle_height + self.slope * start_x, self.slope * (end_x - start_x)),
-            along(BOW, 0.0, lift),
-        )
-        height = Motion(*(a + b for a, b in zip(up, bow, strict=True)))
-        return stack(along(FORWARD, start_x, end_x - start_x), constant_motion(y), height)
+        way = end_x - start_x
+        up = along(UPWARD, ankle_height + self.slope * start_x, self.slope * way)
+        return stack(along(FORWARD, start_x, way), constant_motion(y), add_motions(up, along(BOW, 0.0, lift)))
 
     def find_least_lift(self, treads: int) -> float:
         """Return the least bow of a swing by so many treads, of two if it passes the standing foot, over all edges [m].
