@@ -50,7 +50,7 @@ def write_public_pages(
         key = (records[0].definition["stop"]["evaluations"], tuple(sorted({r.problem for r in records})))
         for record in records:
             if not isinstance(record.definition["solver"], str):  # user code
-                record = replace(record, solver=f"{record.solver} ({_make_folder_name(path.stem)})")
+                record = replace(record, solver=f"{record.solver} ({_make_file_name(path.stem)})")
             boards.setdefault(key, {}).setdefault((record.solver, record.problem, record.run), record)
     pages, lines = list[Path](), list[str]()
     for (evaluations, instances), runs in sorted(boards.items()):
@@ -82,13 +82,13 @@ def _write_board(
     """Write a ranking and the page of each of its algorithms; also return its line of the index."""
     board = rank_solvers(instances, records, shipped=False)
     runs = max(record.run for record in records) + 1
-    place = out / _make_folder_name(f"{evaluations}-{name}-{hash_json(list(instances))[:8]}")
+    place = out / _make_file_name(f"{evaluations} {name} {hash_json(list(instances))[:8]}")
     make_folder(place)
     suite = f"{name}, {evaluations} evaluations"
     pages = write_document(place, make_leaderboard_page(board, None, suite, runs, evaluations), "ranking")
     links = []
     for number, standing in enumerate(board.standings, start=1):
-        page = _make_folder_name(standing.solver)
+        page = _make_file_name(standing.solver)
         if len(board.standings) > 1:
             pages += write_document(
                 place, make_leaderboard_page(board, standing.solver, suite, runs, evaluations), page
@@ -98,5 +98,10 @@ def _write_board(
     return pages, f"- [{title}]({place.name}/ranking.html): {', '.join(links)}"
 
 
-def _make_folder_name(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9]+", "-", text).strip("-")
+def _make_file_name(text: str) -> str:
+    """Return the text if it is made of small letters, digits and single hyphens, otherwise what is left of it and its hash.
+
+    So two texts have two names, on file systems that ignore case, too.
+    """
+    name = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+    return name if name == text else f"{name}-{hash_json(text)[:8]}".lstrip("-")

@@ -14,6 +14,8 @@ import pytest
 
 from compare.archive.pack import write_archive
 from compare.archive.unpack import MANIFEST
+from compare.archive.verify import Finding
+from compare.bench import public_pages
 from compare.bench.baseline import make_bench_study, parse_seeds
 from compare.bench.public_pages import filter_instances, write_public_pages
 from compare.bench.submission import check_rules, pack_submission, verify_submission
@@ -118,6 +120,26 @@ def test_pages_rank_what_holds_and_name_what_does_not(submission: Path, tmp_path
     assert "100 evaluations, 2 runs" in index and "bad.zip" in index
     ranking = next(path for path in written if path.name == "ranking.html")
     assert f'href="{ranking.parent.name}/ranking.html"' in index and "pso" in ranking.read_text(encoding="utf-8")
+
+
+def test_searches_with_similar_names_have_pages_of_their_own(
+    submission: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Names that differ in punctuation or case only; user code of submissions whose files are named so is not mixed, either."""
+    _, records = verify_submission(submission, share=0.0)
+    names = {"a b.zip": "pso a", "a-b.zip": "pso-a", "A-b.zip": "PSO-a"}
+
+    def verify(path: Path, *, share: float) -> tuple[list[Finding], list[RunRecord]]:
+        user = [replace(record, solver="mine", definition={**record.definition, "solver": {}}) for record in records]
+        return [], [*(replace(record, solver=names[path.name]) for record in records), *user]
+
+    monkeypatch.setattr(public_pages, "verify_submission", verify)
+    (tmp_path / "in").mkdir()
+    for name in names:
+        (tmp_path / "in" / name).touch()
+    written, _ = write_public_pages(tmp_path / "in", tmp_path / "out")
+    pages = [str(path).lower() for path in written if path.suffix == ".html"]
+    assert len(pages) == len(set(pages)) == 1 + 1 + 6, pages
 
 
 def test_filters_are_parts_of_the_instances() -> None:
