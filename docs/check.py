@@ -1,21 +1,21 @@
 """Check a site that was built: ``python -m docs.check SITE``.
 
-Every link within the site leads to a page and an anchor that are there, nothing is loaded from elsewhere, no page is empty; and,
-where there is a Chromium, no page is wider than a screen of 1,280 or of 400 pixels.
+Every link within the site leads to a page and an anchor that are there, nothing is loaded from elsewhere, no page is empty. Where
+Chromium, Playwright and axe are installed, each page is opened at 1,280 pixels, light, and at 400, dark: no message on the console,
+no request outside the site, nothing wider than the screen, no serious fault of accessibility.
 """
 
 from __future__ import annotations
 
-import json
 import re
-import shutil
-import subprocess
 import sys
-import tempfile
-from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urldefrag
+
+import pytest
+
+from tests.browser import SCREENS, list_accessibility_faults, list_wide_parts, start_browser, visit
 
 LOADING = {
     "script": "src",
@@ -27,41 +27,6 @@ LOADING = {
     "object": "data",
 }
 FEWEST_LETTERS = 200  # of a page's main part
-WIDTHS = (1280, 400)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-QUIET = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-quic",
-)
-PROBE = """<!DOCTYPE html><title></title><body style="margin: 0"><script>
-const pages = %s, width = %d, found = {};
-const next = () => {
-  const page = pages.shift();
-  if (!page) { document.title = JSON.stringify(found); return; }
-  const frame = document.createElement("iframe");
-  frame.style = `border: 0; width: ${width}px; height: 900px`;
-  frame.onload = () => {
-    const shown = frame.contentDocument.documentElement;
-    const wide = [...frame.contentDocument.querySelectorAll("main *, article *")].filter((part) => {
-      const box = part.getBoundingClientRect();
-      if (box.right <= width + 1 || box.width === 0) return false;
-      for (let up = part.parentElement; up; up = up.parentElement)
-        if (["auto", "scroll", "hidden"].includes(frame.contentWindow.getComputedStyle(up).overflowX)) return false;
-      return true;
-    });
-    found[page] = [shown.scrollWidth, wide.slice(0, 3).map((part) => part.outerHTML.slice(0, 120))];
-    frame.remove();
-    next();
-  };
-  frame.src = page;
-  document.body.append(frame);
-};
-next();
-</script>"""
 
 
 class Page(HTMLParser):
@@ -133,53 +98,33 @@ def _faults_of_link(link: str, path: Path, name: Path, pages: dict[Path, Page]) 
     )
 
 
-def wide_pages(site: Path, browser: str, width: int, *, dark: bool) -> list[str]:
-    """Pages that are wider than a screen, as a browser lays them out."""
-    pages = sorted(path.relative_to(site).as_posix() for path in site.rglob("*.html"))
-    with tempfile.TemporaryDirectory() as folder:
-        probe = site / "_probe.html"
-        probe.write_text(PROBE % (json.dumps(pages), width), encoding="utf-8")
-        try:
-            colours = [f"--blink-settings=preferredColorScheme={0 if dark else 1}"]
-            options = [
-                "--allow-file-access-from-files",
-                f"--window-size={width + 20},1000",
-                f"--user-data-dir={folder}",
-            ]
-            command = [
-                browser,
-                *QUIET,
-                *colours,
-                *options,
-                "--virtual-time-budget=600000",
-                "--dump-dom",
-                probe.as_uri(),
-            ]
-            done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-        finally:
-            probe.unlink()
-    title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
-    found = json.loads(unescape(title[1])) if title and title[1] else {}
-    missing = [f"{page} could not be shown" for page in pages if page not in found]
-    return missing + [
-        f"{page} is {total} pixels wide on a screen of {width}: {parts}"
-        for page, (total, parts) in found.items()
-        if total > width or parts
-    ]
+def list_shown_faults(site: Path) -> list[str]:
+    """What a browser finds on every page: messages, requests, parts that are too wide, and serious faults of accessibility."""
+    pages = sorted(path for path in site.rglob("*.html"))
+    faults = []
+    with start_browser() as browser:
+        for screen in SCREENS:
+            for path in pages:
+                with visit(browser, path, screen) as opened:
+                    opened.page.wait_for_load_state("load")
+                    found = [f"says {message!r}" for message in opened.messages]
+                    found += [f"requests {url}" for url in opened.requests if not url.startswith(site.as_uri())]
+                    found += [f"has a part that is too wide: {part}" for part in list_wide_parts(opened.page)]
+                    found += [f"is hard to access: {fault}" for fault in list_accessibility_faults(opened.page)]
+                    faults += [f"{path.relative_to(site)}, {screen}: {fault}" for fault in found]
+    return faults
 
 
 def main() -> None:
     """Print what is wrong and end with status 1, or say what was checked."""
     site = Path(sys.argv[1]).resolve()
-    faults = faults_of(site)
-    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if browser is not None:
-        faults += [fault for width in WIDTHS for fault in wide_pages(site, browser, width, dark=width == WIDTHS[1])]
+    faults, shown = faults_of(site), f"opened at {' and '.join(SCREENS)}"
+    try:
+        faults += list_shown_faults(site)
+    except pytest.skip.Exception as reason:
+        shown = f"not opened: {reason}"
     for fault in faults:
         print(fault)
-    shown = (
-        f"laid out at {' and '.join(map(str, WIDTHS))} pixels" if browser else "not laid out: there is no Chromium here"
-    )
     print(f"{len(list(site.rglob('*.html')))} pages, {len(faults)} faults; {shown}")
     sys.exit(1 if faults else 0)
 

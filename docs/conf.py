@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from docs.pages import algorithms, api, commands, gallery, model, papers, playground, problems  # noqa: E402
+from docs.pages import algorithms, api, commands, front, gallery, gradient, model, papers, playground, problems  # noqa: E402
 from docs.pages.api import linked  # noqa: E402
 
 project = "nlp-gait"
@@ -27,6 +27,7 @@ exclude_patterns = [
     "generated/papers",
     "generated/examples",
     "generated/model",
+    "generated/gradient",
     "generated/gallery/*.ipynb",
     "generated/gallery/*.py",
     "**/sg_execution_times.*",
@@ -74,5 +75,5 @@ def setup(app):
 def write_pages(app):
     """Pages of problems, papers, algorithms, commands and names, and the playground."""
     folder = Path(app.srcdir) / "generated"
-    for part in (problems, papers, algorithms, commands, api, model, playground):
+    for part in (problems, papers, algorithms, commands, api, model, gradient, playground, front):
         part.write(folder)

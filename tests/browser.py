@@ -56,7 +56,9 @@ def visit(browser: Any, file: Path, screen: str = "1280 light") -> Iterator[Visi
     opened.page.on("pageerror", lambda error: opened.messages.append(str(error)))
     opened.page.on("request", lambda request: opened.requests.append(request.url))
     opened.page.goto(file.as_uri())
-    opened.requests = [url for url in opened.requests if url != file.as_uri() and not url.startswith("data:")]
+    opened.requests = [
+        url for url in opened.requests if url != file.as_uri() and not url.startswith(("data:", "blob:"))
+    ]
     yield opened
     context.close()
 
@@ -73,7 +75,7 @@ def wait_for_motion(page: Any) -> None:
 def list_wide_parts(page: Any) -> list[str]:
     """Return the parts of a page that are wider than the screen and do not scroll within themselves."""
     found: list[str] = page.evaluate(
-        """() => [...document.querySelectorAll("main *")].filter((part) => {
+        """() => [...document.querySelectorAll("main *, article *")].filter((part) => {
           const box = part.getBoundingClientRect();
           if (box.right <= innerWidth + 1 || box.width === 0) return false;
           for (let up = part.parentElement; up; up = up.parentElement)

@@ -45,6 +45,7 @@ DOORS = {
     "compare.archive": (),
     "compare.logs": (),
 }
+ORDER = ("function", "class", "exception", "data")  # on a page; within each as the module lists them
 CODE = re.compile(r"(``.+?``)")
 SPECIAL = re.compile(r"([*|`]|(?<=\w)_(?!\w))")
 
@@ -59,10 +60,11 @@ def write(folder: Path) -> None:
     pages: dict[str, str] = {}
     described: dict[int, str] = {}
     for door in DOORS:
-        blocks = [_heading(door, "="), inspect.getdoc(importlib.import_module(door)) or ""]
+        module = importlib.import_module(door)
+        blocks = [_heading(door, "="), inspect.getdoc(module) or ""]
         blocks[1] = "\n".join(_escaped(blocks[1].splitlines()))
-        for name in names_of(door):
-            value = getattr(importlib.import_module(door), name)
+        for name in sorted(names_of(door), key=lambda name: ORDER.index(_kind(getattr(module, name)))):
+            value = getattr(module, name)
             key, full = id(value), f"{door}.{name}"
             blocks.append(_heading(name, "-"))
             if key in described and _kind(value) != "data":

@@ -25,6 +25,7 @@ from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Exact
 
+GAITS = "gaits"  # folder at the root of the site, see ``front``
 LEFT_OUT = ("gaitbench",)  # a suite, with a page of its own
 SHOWN = 24  # variables, and binding rows, on a page
 SAME = 1e-6  # relative; another processor rounds otherwise
@@ -136,7 +137,17 @@ def _picture(problem: GaitProblem, best: Best | None, folder: Path) -> str:
     if best is None or problem.display.motion is None:
         return ""
     plot_gait(problem, best.x, problem.name).savefig(folder / f"{problem.name}.png", dpi=150)
-    return f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
+    words = f"![{PICTURE}]({problem.name}.png)\n\n*{PICTURE}*"
+    return words if problem.display.skeleton is None else f"{words}\n\n{frame_gait(problem.name)}"
+
+
+def frame_gait(name: str) -> str:
+    """Return the frame of the page that plays a gait, which is loaded when it is scrolled into view."""
+    address = f"../../{GAITS}/{name}.html"
+    return (
+        f'<iframe class="gait" src="{address}" loading="lazy" title="The best known gait of {name} in 3-D"></iframe>\n\n'
+        f'Play, drag to turn; <a href="{address}">on a page of its own</a>.'
+    )
 
 
 def best_section(problem: GaitProblem, found: Difficulty | None) -> str:

@@ -1,0 +1,31 @@
+"""What visitors open first: a real report to explore, and a page in 3-D of the best known gait of each problem."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from benchmarks.difficulty import difficulties
+from compare.report.gait_page import animate_gait
+from docs.pages.playground import FOLDER
+from docs.pages.problems import GAITS, names
+from nlp_gait.formulation import load
+
+STUDY = ("nao-ssp", "--algorithms", "pso,ga,aco,cma", "--runs", "5", "--starts", "5")
+REPORT = "report.html"  # at the root of the site
+
+
+def write(folder: Path) -> None:
+    """Run a small study, and write its report and the gaits where the site takes them from."""
+    site, study = folder / FOLDER, folder / "study"
+    command = [sys.executable, "-m", "compare", "compare", *STUDY, "--out", str(study)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=Path(__file__).parents[2])
+    (site / GAITS).mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(study / REPORT, site / REPORT)
+    measured = difficulties()
+    for name in names():
+        problem, found = load(name), measured.get(name)
+        if found is not None and found.best is not None and problem.display.skeleton is not None:
+            animate_gait(problem, found.best.x, "best known").write(site / GAITS / f"{name}.html")
