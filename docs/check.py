@@ -1,8 +1,8 @@
 """Check a site that was built: ``python -m docs.check SITE``.
 
 Every link within the site leads to a page and an anchor that are there, nothing is loaded from elsewhere, no page is empty. Where
-Chromium, Playwright and axe are installed, each page is opened at 1,280 pixels, light, and at 400, dark: no message on the console,
-no request outside the site, nothing wider than the screen, no serious fault of accessibility.
+Chromium, Playwright and axe are installed, each page is opened at 1,280 pixels, light, and at 400, dark: no message on the
+console, no request outside the site, nothing wider than the screen, no serious fault of accessibility.
 """
 
 from __future__ import annotations
