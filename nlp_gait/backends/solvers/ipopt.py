@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import logging
+import math
 import re
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NLP_VALUES, CompiledNlp
-from nlp_gait.backends.nlp import WIDTHS, build_nlp
+from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solvers.solver import REASONS, IterationWatch, Solver, count_evaluations, judge_point
 from nlp_gait.backends.solvers.working_set import LEAST_ROWS, WorkingSet
 from nlp_gait.errors import CompilerError, InputError
@@ -77,6 +79,8 @@ class IpoptSettings(Solver):
         linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never
             replaced by another one.
         few_rows: begin with the rows that matter, see ``working_set``; False begins with all rows.
+        widths: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those
+            of the NLP. Narrower ones follow if the exact functions refuse the last stage's point.
     """
 
     name: ClassVar[str] = "ipopt"
@@ -88,6 +92,7 @@ class IpoptSettings(Solver):
     compiled: bool | None = None
     linear_solver: str | None = None
     few_rows: bool = True
+    widths: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 1.0:
@@ -96,6 +101,8 @@ class IpoptSettings(Solver):
             raise InputError(
                 f"iterations and time_limit_s must be positive, got {self.iterations}, {self.time_limit_s}"
             )
+        if not all(before > after > 0.0 for before, after in pairwise((math.inf, *self.widths))):
+            raise InputError(f"widths must be positive and narrow from stage to stage, got {self.widths}")
         if self.hessian not in (None, "exact", "limited-memory"):
             raise InputError(f"hessian must be 'exact', 'limited-memory' or None, got {self.hessian!r}")
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
@@ -142,6 +149,7 @@ class Ipopt(Solver):
         started = time.perf_counter()
         self.linear_solver = find_linear_solver(settings.linear_solver)
         self.time_limit_s = settings.time_limit_s
+        self.widths = settings.widths if settings.widths and model.smoothed else model.widths
         self.watch = IterationWatch(model.nlp)
         general: dict[str, Any] = {
             **QUIET,
@@ -158,7 +166,7 @@ class Ipopt(Solver):
         self.compiled = bool(settings.compiled)
         nlp = model.nlp
         if self.compiled:
-            native = CompiledNlp(nlp, np.append(problem.p, model.widths[0]), second=settings.hessian == "exact")
+            native = CompiledNlp(nlp, np.append(problem.p, self.widths[0]), second=settings.hessian == "exact")
             nlp, options = native.nlp, options | native.options
         all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
         names = (*NLP_VALUES, *DERIVATIVES.values())
@@ -193,7 +201,7 @@ class Ipopt(Solver):
         """
         model = self.model
         usual = problem.with_values(**{parameter.name: parameter.default for parameter in problem.parameters})
-        bounds, width = model.bounds(usual), model.widths[0]
+        bounds, width = model.bounds(usual), self.widths[0]
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
         cold = WorkingSet(model.nlp, functions, options, all_rows, self.watch, always)
@@ -208,8 +216,8 @@ class Ipopt(Solver):
     @lock_casadi
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         """Run all stages from a start point (n,), each of which starts from the last one; see ``Solver``."""
-        start = {"x0": self.model.start(problem, x0, self.model.widths[0])}
-        return self._run_stages(problem, x0, start, self.model.widths, stop, cold=True)
+        start = {"x0": self.model.start(problem, x0, self.widths[0])}
+        return self._run_stages(problem, x0, start, self.widths, stop, cold=True)
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
         """Run the last stage alone from the outcome of a neighbouring problem; None if that has no multipliers."""
@@ -218,7 +226,7 @@ class Ipopt(Solver):
             return None
         x0 = np.clip(near.x, problem.lower, problem.upper)
         start = {"x0": guess.primal, "lam_x0": guess.bounds, "lam_g0": guess.rows}
-        return self._run_stages(problem, x0, start, WIDTHS[-1:], stop, cold=False)
+        return self._run_stages(problem, x0, start, self.widths[-1:], stop, cold=False)
 
     @lock_casadi
     def _run_stages(
@@ -237,7 +245,8 @@ class Ipopt(Solver):
         started = time.perf_counter()
         with defer_interrupts() if stop is never else nullcontext(stop) as pressed:
             self.watch.begin(pressed, started + self.time_limit_s)
-            for stage, width in enumerate((*widths, *(NARROWER_WIDTHS if model.smoothed else ()))):
+            narrower = (width for width in NARROWER_WIDTHS if model.smoothed and width < widths[-1])
+            for stage, width in enumerate((*widths, *narrower)):
                 method = self.cold if cold and stage == 0 else self.warm
                 result = method(p=np.append(p, width), **start, **bounds)
                 stats = method.stats()

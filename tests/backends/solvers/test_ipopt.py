@@ -229,3 +229,15 @@ def test_a_start_outside_the_bounds_is_refused_and_one_on_them_but_for_rounding_
     assert solve(problem, x0=[2.0 + 1e-9, 0.0]).starts[0].x0.tolist() == [2.0, 0.0]
     # A variable that is fixed is where it is fixed.
     assert solve(problem, x0=[9.0, 0.0], fix={"x": 1.0}).starts[0].x0.tolist() == [1.0, 0.0]
+
+
+def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
+    problem = load("nao-ssp", intervals=3)
+    usual, narrower = (
+        solve(problem, starts=1, solver=IpoptSettings(widths=widths)) for widths in ((), (1e-2, 1e-3, 1e-4))
+    )
+    assert narrower.converged and narrower.iterations > usual.iterations  # one stage more
+    assert narrower.objective == pytest.approx(usual.objective, rel=1e-6)
+    for widths in ((1e-3, 1e-2), (1e-2, 0.0)):
+        with pytest.raises(InputError, match=r"widths must be positive and narrow from stage to stage, got \(0\.0"):
+            IpoptSettings(widths=widths)
