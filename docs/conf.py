@@ -28,6 +28,7 @@ exclude_patterns = [
     "generated/examples",
     "generated/model",
     "generated/gradient",
+    "generated/study",
     "generated/gallery/*.ipynb",
     "generated/gallery/*.py",
     "**/sg_execution_times.*",
@@ -54,6 +55,7 @@ html_theme = "furo"
 html_title = f"nlp-gait {release}"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_extra_path = [f"generated/{playground.FOLDER}"]
 (ROOT / "docs" / html_extra_path[0]).mkdir(parents=True, exist_ok=True)
 html_show_sourcelink = False
