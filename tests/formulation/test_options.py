@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -18,6 +19,7 @@ from nlp_gait.formulation import load
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.providers import PROBLEMS
 from tests.evaluation import evaluated
+from tests.robots.crooked import crooked
 
 # Another value for each option that is no choice among some; a grid with free joints needs a sample in its middle.
 OTHER: dict[str, Any] = {
@@ -41,6 +43,9 @@ OTHER: dict[str, Any] = {
 }
 
 
+STAIRS = {"stair_rise_m": 0.02, "stair_run_m": 0.2}  # both or none, and on the level: tested by themselves
+
+
 def defaults(name: str) -> dict[str, Any]:
     return {option: parameter.default for option, parameter in inspect.signature(find_maker(name)).parameters.items()}
 
@@ -49,12 +54,25 @@ def others(name: str) -> dict[str, Any]:
     """A value that is not its default for every option; of a choice, the one after the default."""
     hints, found = get_type_hints(find_maker(name)), {}
     for option, default in defaults(name).items():
+        if option in STAIRS:
+            continue
         choices = get_args(hints[option]) if get_origin(hints[option]) is Literal else ()
         found[option] = (
             choices[(choices.index(default) + 1) % len(choices)] if choices and option not in OTHER else OTHER[option]
         )
         assert found[option] != default
     return found
+
+
+@pytest.mark.slow
+def test_stairs_are_recorded(tmp_path: Path) -> None:
+    pytest.importorskip("urdf_parser_py")
+    problem = load("humanoid-walk", robot=crooked(tmp_path), intervals=2, **STAIRS)
+    again = load("humanoid-walk", **problem.options)
+    assert STAIRS.items() <= problem.options.items()
+    assert (again.options, again.names, again.parameters) == (problem.options, problem.names, problem.parameters)
+    with pytest.raises(InputError, match=r"stairs are level, but slope_deg is 3"):
+        load("humanoid-walk", robot=problem.options["robot"], **STAIRS, slope_deg=3.0)
 
 
 def make_task(name: str, options: Mapping[str, Any]) -> Task:

@@ -67,7 +67,7 @@ def double_support(name: str, x: Array) -> Signals:
     body = make_nao("nao-v5")
     assert problem.grid is not None
     cycle = make_walking_cycle(body, share_load(body, "free"), problem.grid, Goal(), at_given_speed=True)
-    return cycle.signals(problem.at(x))["dsp"]
+    return cycle.phases["dsp"].signals(cycle.add_step(problem.at(x)))
 
 
 @pytest.mark.slow
