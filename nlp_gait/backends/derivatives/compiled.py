@@ -65,7 +65,6 @@ def write_nlp_source(found: NlpPlan) -> str:
             *(f"ONE_ARGUMENT({name})" for name in UNARY),
             *(f"TWO_ARGUMENTS({name})" for name in BINARY),
             *(f"enum {{ {name} = {size} }};" for name, size in sizes.items()),
-            f"#define HAS_SECOND {int(bool(plan.steps[SECOND]))}",
             *(write_function(f"function_{i}", function) for i, function in enumerate(plan.functions)),
             write_array("int", "initial_place", plan.initial),
             write_array("double", "initial_value", map(format_number, plan.initial.values())),

@@ -16,7 +16,7 @@ import numpy as np
 
 from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, column, find_optimum, solve_kkt
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import write_text
+from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import Solution
@@ -67,10 +67,10 @@ class SensitivityTable:
             *(f"{name} [{u}]" for name, u in self.quantities),
         ]
         rows = [
-            [name, unit, *map(repr, [*self.reach[:, k].tolist(), *self.values[:, k].tolist()])]
+            [name, unit, *self.reach[:, k].tolist(), *self.values[:, k].tolist()]
             for k, (name, unit) in enumerate(self.parameters)
         ]
-        write_text(path, "".join(f"{','.join(row)}\n" for row in [header, *rows]))
+        write_text(path, format_csv([header, *rows]))
 
 
 class _Change(NamedTuple):

@@ -83,6 +83,13 @@ def test_a_solver_of_compiled_functions_takes_the_same_path() -> None:
     assert interpreted.stats()["iter_count"] == compiled.stats()["iter_count"] > 3
 
 
+def test_a_hessian_of_zero_is_compiled_too() -> None:
+    x, p = MX.sym("x", 2), MX.sym("p", 1)
+    nlp = {"x": x, "p": p, "f": 2 * x[0] - p * x[1], "g": x[0] + 3 * x[1]}
+    assert compared(nlp, np.array([1.5]), np.array([[0.3, 0.4], [2.0, -1.0]])) < TOLERANCE
+    assert CompiledNlp(nlp, np.array([1.5])).functions["nlp_hess_l"].nnz_out() == 0
+
+
 def test_runs_extend_while_both_lists_increase_by_one() -> None:
     targets, sources = np.array([4, 5, 6, 9, 10]), np.array([1, 2, 3, 4, 6])
     assert plan.find_runs(targets, sources) == [(4, 1, 3), (9, 4, 1), (10, 6, 1)]

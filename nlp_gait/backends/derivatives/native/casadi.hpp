@@ -48,7 +48,5 @@ FUNCTION(nlp_grad_f, 2, 2, LIST(variables, parameters), LIST(number, variables),
 FUNCTION(nlp_jac_g, 2, 2, LIST(variables, parameters), LIST(rows, jacobian_sparsity),
          nlp_gait_values(memory, arg[0], arg[1], nullptr, res[0]);
          if (res[1]) nlp_gait_first(memory, arg[0], arg[1], nullptr, res[1]);)
-#if HAS_SECOND
 FUNCTION(nlp_hess_l, 4, 1, LIST(variables, parameters, number, rows), LIST(hessian_sparsity),
          if (res[0]) nlp_gait_second(memory, arg[0], arg[1], arg[2] ? *arg[2] : 0.0, arg[3], res[0]);)
-#endif
