@@ -6,6 +6,7 @@ The runs of a study are distributed to the workers of a Dask scheduler; records 
 study continues. Here two workers on this machine replace a cluster. Needs the extra `cluster`. From the command line:
 `nlp-gait compare nao-ssp --scheduler tcp://HOST:8786 --out study`.
 """
+# sphinx_gallery_thumbnail_path = "images/budgets.png"
 
 from pathlib import Path
 

@@ -5,6 +5,7 @@ In a notebook
 Results are displayed: the last value of a cell is a table, time histories and runs become data frames, gaits become figures.
 This page can be downloaded as a notebook.
 """
+# sphinx_gallery_thumbnail_path = "images/nao-ssp-convergence.png"
 
 import nlp_gait
 from compare.study.record import make_frame
