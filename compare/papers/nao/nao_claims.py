@@ -46,6 +46,7 @@ def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
     values: dict[str, Any] = {"swarm": NAMES[swarm], "test": test, "p": test.p_two_sided, "effect": a12(pso, ga)}
     values |= {"pso": of_pso, "ga": of_ga, "best": phase.best, "best_run": min(pso + ga), "pairs": len(pso)}
     values |= {"printed_lead": printed_lead, "lead": 1000 * (of_ga - of_pso), "share": 100 * (of_ga / of_pso - 1)}
+    values["printed_share"] = 100 * (phase.paper.optima["ga"].power_W / phase.paper.optima["pso"].power_W - 1)
     values["generational"] = phase.test(swarm, "ga-generational").p_two_sided
     for name in ("penalty", "more"):
         values[name] = phase.test(f"{swarm}-{name}", f"ga-{name}").p_two_sided
@@ -165,13 +166,15 @@ def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -
     every = ssp.list_swing_powers(algorithm, whole=True)[at] / min(ssp.final_powers(algorithm))
     rises = [100 * (power - 1) for power in (printed[height_m] / printed[0.015], middle, every)]
     true = 100 * (findings.swing_power(height_m) / findings.swing_power(0.015) - 1)
-    return _compare_histories(*rises, search=NAMES[algorithm], height=height_m, true=true)
+    return _compare_histories(compare_levels, *rises, search=NAMES[algorithm], height=height_m, true=true)
 
 
-def _compare_histories(printed: float, middle: float, every: float, /, **values: Any) -> Check:
+def _compare_histories(
+    compare: Callable[..., Check], printed: float, middle: float, every: float, /, **values: Any
+) -> Check:
     """Compare a change [%] with that in the median run's history, or runs' histories; NaN where it holds no solution."""
     values |= {"printed": printed, "middle": _describe_change(middle), "every": _describe_change(every)}
-    return decide(Verdict.UNTESTABLE, **values) if math.isnan(middle) else compare_changes(printed, middle, **values)
+    return decide(Verdict.UNTESTABLE, **values) if math.isnan(middle) else compare(printed, middle, **values)
 
 
 def _describe_change(change: float) -> str:
@@ -212,7 +215,7 @@ def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
     )
     pso, ga = (f"{phase.list_swing_powers(name)[at]:.4f} W" for name in (swarm, "ga"))
     middle, every = (float(leads[at]) for leads in _compute_swing_leads(phase, swarm))
-    return _compare_histories(printed, middle, every, swarm=NAMES[swarm], pso=pso, ga=ga)
+    return _compare_histories(compare_changes, printed, middle, every, swarm=NAMES[swarm], pso=pso, ga=ga)
 
 
 def _compute_swing_range(phase: PhaseFindings, algorithm: str) -> float:
@@ -296,7 +299,8 @@ def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
         float(np.median(np.exp(np.abs(np.log(np.abs(ends[name][:, 5] / ends[name][:, 6])))))) for name in (swarm, "ga")
     )
     printed = {name: max(map(abs, o.x[5:7])) / min(map(abs, o.x[5:7])) for name, o in phase.paper.optima.items()}
-    return compare_levels(printed["pso"], pso, swarm=NAMES[swarm], printed=printed, pso=pso, ga=ga)
+    values = {"printed": printed, "pso": pso, "ga": ga, "most": 1.25 * printed["pso"]}
+    return compare_levels(printed["pso"], pso, swarm=NAMES[swarm], **values)
 
 
 def _check_wider(findings: NaoFindings, position: int, ranges: Sequence[str] = ()) -> Check:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from compare.papers.claims import (
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import SWING_HEIGHT
 from compare.papers.nao.nao_runs import ALGORITHMS, WEBOTS_DRIVE
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.robots import load_robot
@@ -27,6 +30,7 @@ from nlp_gait.robots import load_robot
 MARGINS = tuple(f"dbm_{axis}_{kind}_m" for kind in ("min", "mean") for axis in "xy")
 STRAIGHT = {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}  # variables of a hip without vertical motion
 TORQUE_LIMIT = "torque_change_limit_Nm"
+NEAR_ZERO_M_S = (0.0, -0.01, -0.02)  # values of x6 near zero; printed are -0.0367 and -0.0384
 PACES = 9  # durations at which a printed gait is evaluated
 KINDS = {"HipYawPitch": "hip yaw-pitch", "Hip": "hip roll and pitch", "Knee": "knees", "Ankle": "ankles"}
 
@@ -90,9 +94,10 @@ def _check_lead(
     printed, ours = ([100 * (a / b - 1) if share else 1000 * sign * (a - b) for a, b in rows] for rows in pairs)
     if not share:
         printed_mm, ours = np.round(printed, 1).tolist(), np.round(ours, 1).tolist()
-    velocities = [(optima[name].x[3], optima[name].x[5]) for name in ALGORITHMS]
+    values: dict[str, Any] = {"velocities": [(optima[name].x[3], optima[name].x[5]) for name in ALGORITHMS]}
+    values |= {"printed": printed, "ours": ours, "apart": abs(ours[0] - printed[0])}
     compare = compare_levels if level else compare_changes
-    return compare(printed if share else printed_mm, ours, printed=printed, ours=ours, velocities=velocities)
+    return compare(printed if share else printed_mm, ours, **values)
 
 
 def _check_more_stable(findings: NaoFindings) -> Check:
@@ -142,11 +147,26 @@ def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, floa
     return {at: phase.evaluate_printed(**{time: at}, **{v: x[v] * x[time] / at for v in rates}) for at in times}
 
 
-def _check_straight(findings: NaoFindings) -> Check:
-    """Check how much larger the least margins are without vertical motion of the hip [mm]."""
-    pairs = [(phase.evaluate_printed(**STRAIGHT), phase.printed_here["pso"]) for phase in findings.phases]
-    ours = [1000 * (straight[index] - here[index]) for straight, here in pairs for index in MARGINS[:2]]
-    return require_change(ours, ours=ours)
+def _check_straight(findings: NaoFindings, low: bool = False) -> Check:
+    """Check how much larger the least margins are without vertical motion of the hip [mm], or with the lowest hip, too."""
+    ours, lowest = [], [phase.lowest_hip_m for phase in findings.phases]
+    for phase, height in zip(findings.phases, lowest, strict=True):
+        straight = phase.evaluate_printed(**STRAIGHT, **({"hip_height_m": height} if low else {}))
+        ours += [1000 * (straight[index] - phase.printed_here["pso"][index]) for index in MARGINS[:2]]
+    return require_change(ours, ours=ours, lowest=lowest)
+
+
+def _check_near_zero_reason(phase: PhaseFindings) -> Check:
+    """Check that balance margins fail, and nothing else, in the printed solutions if they start without lateral velocity."""
+    exact, texts, holds = build_exact_model(phase.problem), [], []
+    for velocity, (name, optimum) in product(NEAR_ZERO_M_S, phase.paper.optima.items()):
+        x = [*optimum.x[:5], velocity, *optimum.x[6:]]
+        violated = exact.find_violated(exact.at(phase.problem.check_x(x), phase.problem.p))
+        if velocity == 0.0:
+            holds.append(bool(violated) and all(row.name.startswith("dbm") for row in violated))
+        rows = ", ".join(f"{row.name} by {1000 * row.violation:.2f} mm" for row in violated)
+        texts.append(f"{name.upper()} at {velocity:.2f} m/s {rows or 'none'}")
+    return decide(all(holds), found=", ".join(texts))
 
 
 def _check_oscillation(findings: NaoFindings) -> Check:

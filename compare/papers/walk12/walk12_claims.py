@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from dataclasses import replace
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -53,10 +54,9 @@ def _check_f(findings: Walk12Findings, zmp: Zmp) -> Check:
 def _check_f1max(findings: Walk12Findings, zmp: Zmp = "exact", solver: str = IPOPT) -> Check:
     """Check IPOPT's largest f1 by a reading of the ZMP, or the median of a search's runs."""
     f = [findings.list_optima(zmp)[-1]] if solver == IPOPT else list_objectives(findings.records(PAPER, 1.0, solver))
-    ours = F1MAX * float(np.median(f))
-    return compare_levels(
-        F1MAX, ours, own=ours, ends=[F1MAX * end for end in compute_range(f)], share=100 * (F1MAX / ours - 1)
-    )
+    ours, ends = F1MAX * float(np.median(f)), [F1MAX * end for end in compute_range(f)]
+    is_among = "is" if ends[0] <= F1MAX <= ends[1] else "is not"
+    return compare_levels(F1MAX, ours, own=ours, ends=ends, share=100 * (F1MAX / ours - 1), is_among=is_among)
 
 
 def _check_fitness(findings: Walk12Findings) -> Check:
@@ -136,7 +136,21 @@ def _check_fastest(findings: Walk12Findings) -> Check:
     longest = max(point.step_length_m for point in others)
     tie = max(point.at for point in findings.weighted if point.step_length_m > first.step_length_m - DIGIT_M)
     lead = 1e3 * (first.step_length_m - longest)
-    return require_change(round(lead, 3), s=1e3 * first.step_length_m, weight=first.at, others=1e3 * longest, tie=tie)
+    values = {"s": 1e3 * first.step_length_m, "weight": first.at, "others": 1e3 * longest, "tie": tie}
+    return require_change(round(lead, 3), **values, inside=_describe_inside(findings))
+
+
+def _describe_inside(findings: Walk12Findings) -> str:
+    """Return between which lambda the optimal step length is inside its range, and how it changes there, as words."""
+    path = sorted(findings.weighted, key=lambda point: point.at)
+    ends = path[0].step_length_m, path[-1].step_length_m
+    inside = [p for p in path if min(ends) + DIGIT_M < p.step_length_m < max(ends) - DIGIT_M]
+    if not inside:
+        return "for no λ solved is the optimal step between both ends"
+    weights, steps = zip(
+        *((f"{p.at:.4g}", f"{1e3 * p.step_length_m:.0f}") for p in (inside[0], inside[-1])), strict=True
+    )
+    return f"from λ = {' to '.join(weights)} the optimal step is between both ends, {' to '.join(steps)} mm"
 
 
 def _check_ends(findings: Walk12Findings) -> Check:
@@ -165,7 +179,8 @@ def _check_time_steps(_: Walk12Findings) -> Check:
 def _check_margin(findings: Walk12Findings) -> Check:
     f1 = [(findings.optimum(PAPER, row.weight).verdict.dense or {})["f1_per_m2s"] for row in TABLE_3]
     falls = any(after < (1 - 1e-3) * before for before, after in pairwise(f1))
-    return require_change(-math.inf if falls else 100 * (f1[-1] / f1[0] - 1), found=", ".join(f"{v:.0f}" for v in f1))
+    texts = {"found": ", ".join(f"{v:.0f}" for v in f1), "inside": _describe_inside(findings)}
+    return require_change(-math.inf if falls else 100 * (f1[-1] / f1[0] - 1), **texts)
 
 
 def _check_margin_of_table_3(findings: Walk12Findings, rows: int) -> Check:
@@ -173,6 +188,21 @@ def _check_margin_of_table_3(findings: Walk12Findings, rows: int) -> Check:
     f1, shares = findings.f1_of_table_3[:rows], [stable.share for stable in findings.stable]
     changes = [100 * (after / before - 1) for before, after in pairwise(f1)]
     return require_change(changes, found=", ".join(f"{v:.1f}" for v in f1), low=min(changes), shares=shares)
+
+
+def _check_steps(findings: Walk12Findings) -> Check:
+    check = _check_x(findings, IPOPT, "s")
+    return replace(check, values={**check.values, "inside": _describe_inside(findings)})
+
+
+def _check_margin_by_print(_: Walk12Findings) -> Check:
+    """Check whether f1 / f1max by (11), from the printed f and s, rises over Table III: as printed, and within rounding."""
+    shares = [row.implied_f1 / row.f1max for row in TABLE_3]
+    reach = [(DIGIT_F + (1 - row.weight) * DIGIT_M / F2MAX) / row.weight for row in TABLE_3]
+    highest = list(accumulate((a - r for a, r in zip(shares, reach, strict=True)), max))  # that a share has to exceed
+    possible = [a + r > high for a, r, high in zip(shares[1:], reach[1:], highest, strict=False)]
+    texts = [", ".join(f"{value:.3f}" for value in values) for values in (shares, reach)]
+    return decide([all(b > a for a, b in pairwise(shares)), all(possible)], found=texts[0], reach=texts[1])
 
 
 def _check_static_stability(findings: Walk12Findings) -> Check:
@@ -199,12 +229,10 @@ def _check_stable(findings: Walk12Findings, weights: Sequence[float], throughout
     return decide(holds, shares=chosen, optimum=optimum, all=compute_range(shares))
 
 
-def _check_contrast(findings: Walk12Findings) -> Check:
-    """Check whether a common window exists in which lambda = 1 satisfies (8) throughout and the two least lambda do not."""
-    *others, last = findings.stable[0], findings.stable[1], findings.stable[-1]
-    return decide(
-        all(last.first_s < other.first_s or last.last_s > other.last_s for other in others), others=others, last=last
-    )
+def _check_contrast(findings: Walk12Findings, weight: float) -> Check:
+    """Check whether a common window exists in which lambda = 1 satisfies (8) throughout and another lambda does not."""
+    other, last = findings.stable[TABLE_3.index(find_row(weight))], findings.stable[-1]
+    return decide(last.first_s < other.first_s or last.last_s > other.last_s, weight=weight, other=other, last=last)
 
 
 def _check_speed(_: Walk12Findings, weight: float, printed_m_s: float, share: float, times_s: Sequence[float]) -> Check:

@@ -41,6 +41,15 @@ def _check_trend(findings: Walk12Findings, horizon: Horizon) -> Check:
     return compare_changes(100 * (slow.f1max / fast.f1max - 1), ours, **times, found=ours)
 
 
+def _check_slows(findings: Walk12Findings) -> Check:
+    """Check how much slower each T of Table IV walks than the next lower one [%]: by the printed steps, and by the optima."""
+    times, printed = np.array([[row.step_time_s, row.x[0]] for row in TABLE_4]).T
+    speeds = [printed / times, 1e-3 * list_x(findings, IPOPT, "step")[:, 0] / times]
+    changes = [[100 * (1 - slow / fast) for slow, fast in pairwise(row)] for row in speeds]
+    texts = [", ".join(f"{speed:.3f}" for speed in row) for row in speeds]
+    return require_change(changes, printed=texts[0], optima=texts[1], times=times)
+
+
 def _check_f1_over_time(_: Walk12Findings, horizon: Horizon) -> Check:
     """Check whether f1 of the printed gaits rises with T, also for the gaits that round to the printed digits."""
     f1 = [compute_f1(row, horizon=horizon) for row in TABLE_4]
