@@ -11,6 +11,7 @@ from compare.analysis.solver_table import count
 from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard
 from compare.drawing.comparison_figures import plot_suite_ecdf
+from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Section, Table, text_table
 from compare.report.provenance import TERMS
 from nlp_gait import gaitbench
@@ -36,6 +37,7 @@ def make_leaderboard_page(
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 drawing=plot_suite_ecdf(board.comparisons),
             ),
+            *((make_anytime_section(board.comparisons),) if count_of > 1 else ()),
             *(() if solver is None else (_make_scores(board, solver),)),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(

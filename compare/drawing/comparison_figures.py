@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
+from compare.analysis.overview import Ranking
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, ecdf, performance_profile
 from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array
@@ -159,6 +160,39 @@ def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
         axes.set_xlabel("factor of the cheapest solver's expected evaluations")
         axes.set_ylabel("share of problems and targets")
         add_legend_below(figure)
+    return figure
+
+
+def plot_critical_difference(ranking: Ranking) -> Figure:
+    """Plot mean ranks on a line; a bar joins those that differ by less than the critical difference.
+
+    Source:
+        Demsar (2006), Statistical comparisons of classifiers over multiple data sets, section 3.2.4.
+    """
+    names, ranks = list(ranking.mean_ranks), np.array([*ranking.mean_ranks.values()])
+    width = ranking.critical_difference or 0.0
+    ends = [int(np.searchsorted(ranks, rank + width, side="left")) - 1 for rank in ranks]
+    bars = [(first, last) for first, last in enumerate(ends) if last > first and last not in ends[:first]]
+    half = (len(names) + 1) // 2  # names to the left; the others are to the right, from below
+    with style():
+        figure = new_figure(7.4, 0.9 + 0.14 * len(bars) + 0.2 * half)
+        axes = figure.subplots()
+        for height, (first, last) in enumerate(bars, start=1):
+            axes.plot(ranks[[first, last]] + [-0.03, 0.03], [-0.5 * height] * 2, color="black", linewidth=3.0)
+        for place, (name, look) in enumerate(assign_looks(names).items()):
+            is_left = place < half
+            low = -0.5 * len(bars) - (place + 1 if is_left else len(names) - place)
+            edge = ranks[0] - 0.3 if is_left else ranks[-1] + 0.3
+            axes.plot([ranks[place], ranks[place], edge], [0.0, low, low], color=look.colour, linewidth=1.0)
+            axes.text(edge, low, f" {name} {ranks[place]:.2f} ", ha="right" if is_left else "left", va="center")
+        axes.xaxis.set_ticks_position("top")
+        axes.xaxis.set_label_position("top")
+        axes.set_xlabel(f"mean rank, critical difference {width:.2f}")
+        axes.set_ylim(-0.5 * len(bars) - half - 0.6, 0.0)
+        axes.set_xlim(ranks[0] - 0.25, ranks[-1] + 0.25)
+        axes.yaxis.set_visible(False)
+        axes.spines[["left", "right", "bottom"]].set_visible(False)
+        axes.grid(visible=False)
     return figure
 
 

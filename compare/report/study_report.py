@@ -20,6 +20,7 @@ from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.verdict import find_leaders, write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
+from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Part, Section, Table, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
@@ -49,6 +50,8 @@ def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Sectio
                 drawing=plot_performance_profile(comparisons),
             )
         )
+    if ranking.mean_ranks:
+        parts.append(make_anytime_section(comparisons))
     return Section(title="All problems", parts=parts)
 
 

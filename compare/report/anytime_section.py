@@ -1,0 +1,56 @@
+"""Section on solvers over many problems at all budgets, next to the ranks by their medians."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from compare.analysis.anytime import EQUIVALENT, SHARES, AnytimeScore, score_anytime
+from compare.analysis.comparison import Comparison
+from compare.analysis.overview import describe_tests, rank_over_problems
+from compare.analysis.record_statistics import TARGETS
+from compare.analysis.solver_table import count
+from compare.analysis.units import percent
+from compare.drawing.comparison_figures import plot_critical_difference
+from compare.report.document import Figure, Part, Section, text_table
+
+
+def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
+    """Return the table of anytime scores and the critical-difference diagram, of solvers that ran on all problems."""
+    scores, ranking = score_anytime(comparisons), rank_over_problems(comparisons)
+    pairs = len(comparisons) * (len(scores) - 1)
+    header = ("solver", "best", "95 %", "area", "dominates", "dominated")
+    parts: list[Part] = [
+        "Best: probability of being the best of these solvers on another problem like these, from a Bayesian Plackett-Luce model "
+        "of the ranks of the final median gaps, with its 95 % interval; gaps that differ by at most "
+        f"{100 * EQUIVALENT:g} % of the best known are equivalent. Area: over the convergence curve (AOCC), mean over runs and "
+        "evaluations of the gap's logarithm, 1 at 1e-6 and 0 from 100 % on. Dominates: "
+        f"pairs of problem and other solver, of {pairs}, on which the median gap is nowhere higher over the whole budget and "
+        "somewhere lower. A gradient method has no result before its end.",
+        text_table(header, [_format_score(score) for score in scores], "Solvers at all budgets"),
+        text_table(
+            ("solver", *(f"after {100 * share:g} %" for share in SHARES), *(f"to {100 * t:g} %" for t in TARGETS)),
+            [_format_fixed(score) for score in scores],
+            "Medians over the problems: gap after a share of the budget, and expected evaluations to a gap",
+        ),
+    ]
+    if ranking.critical_difference is not None:
+        parts.append(
+            Figure(
+                name="critical-difference",
+                caption=f"Mean ranks of the medians; a bar joins solvers that do not differ. {describe_tests(ranking)}",
+                drawing=plot_critical_difference(ranking),
+            )
+        )
+    return Section(title="At all budgets", parts=parts)
+
+
+def _format_score(score: AnytimeScore) -> tuple[str, ...]:
+    low, high = score.interval
+    ends = (f"{score.area:.3f}", str(score.dominates), str(score.dominated))
+    return score.solver, f"{100 * score.best:.0f} %", f"{100 * low:.0f} to {100 * high:.0f} %", *ends
+
+
+def _format_fixed(score: AnytimeScore) -> tuple[str, ...]:
+    gaps = (percent(gap) if math.isfinite(gap) else "infeasible" for gap in score.gaps)
+    return score.solver, *gaps, *(count(cost) for cost in score.costs)
