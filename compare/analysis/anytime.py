@@ -102,7 +102,7 @@ def compute_area(curve: Curve, budget: float) -> float:
 def sample_best(gaps: Array) -> Array:
     """Return (draws, K) probabilities of being best: draws of Plackett-Luce weights, by gaps (problems, K) of K solvers.
 
-    Gaps that differ by at most ``EQUIVALENT`` from the least of their group are equal; their order is drawn anew in each sweep.
+    Gaps that differ by at most ``EQUIVALENT`` from the least of their group are equal; their order is drawn again in each sweep.
     The weights have gamma priors of shape and rate 1, so that two solvers have the prior of a uniform probability.
 
     Source:
