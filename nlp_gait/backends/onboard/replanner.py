@@ -204,7 +204,7 @@ class _Run:
             size = max(abs(cost), LEAST_COST)
             at.differentiate(self._multipliers)
             z_lower, z_upper = np.maximum(self._z_lower - w[:n], -longest), np.minimum(self._z_upper - w[:n], longest)
-            step = self._steps.solve(self._lower - at.g, self._upper - at.g, z_lower, z_upper)
+            step = self._steps.solve(self._ties, self._lower - at.g, self._upper - at.g, z_lower, z_upper)
             self.iterations += 1
             if step is None and longest > SHORTEST:
                 longest /= SHORTEN
@@ -222,9 +222,14 @@ class _Run:
             self._keep_best()
             error = abs(at.cost[0] - cost + step.decrease)
             length = float(np.abs(step.w[:n]).max(initial=0.0))
+            accurate = share == 1.0 and error <= COST_ERROR * size and length <= SHORT and length < longest
+            self.converged = (
+                bool(accurate)
+                and self._violation <= VIOLATION
+                and not step.relaxed
+                and step.estimate_rest() <= COST_ERROR * size
+            )
             longest = min(2.0 * longest, LONGEST) if share == 1.0 else share * length
-            accurate = error <= COST_ERROR * size and length <= SHORT
-            self.converged = bool(share == 1.0 and accurate) and self._violation <= VIOLATION and not step.relaxed
 
     def result(self) -> Replan:
         """Return the optimum, else the best feasible point, else the last one with its violated rows."""
@@ -253,7 +258,8 @@ class _Run:
         w[:n] = np.clip(w[:n], self._z_lower, self._z_upper)
         at.evaluate(w)
         for _ in range(3):  # a lift may contain others
-            change = at.model.lift_sense * at.g[self._steps.choose_ties(at.g)]
+            self._ties = self._steps.choose_ties(at.g)
+            change = at.model.lift_sense * at.g[self._ties]
             if not np.abs(change).max(initial=0.0) > 1e-13:
                 break
             w[n:] -= change
