@@ -16,6 +16,7 @@ from metaheuristics.interface import Algorithm, BatchObjective, History, Interru
 from metaheuristics.minimize import minimize
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, installed_algorithms
+from metaheuristics.settings import tunable
 from metaheuristics.user_algorithm import PlainFunction, as_algorithm
 
 __all__ = [
@@ -51,4 +52,5 @@ __all__ = [
     "handling",
     "installed_algorithms",
     "minimize",
+    "tunable",
 ]

@@ -99,6 +99,11 @@ class PlainFunction:
                 + f"; it takes {inspect.signature(self.function)}"
             )
 
+    @property
+    def ranges(self) -> Mapping[str, Any]:
+        """What a tuner may choose, see ``metaheuristics.settings.list_ranges``: the function's own attribute."""
+        return getattr(self.function, "ranges", {})
+
     def start(self, start: Start) -> FunctionSearch:
         """Begin a run; see `Algorithm.start`."""
         return FunctionSearch(self, start)

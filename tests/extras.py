@@ -15,6 +15,7 @@ PACKAGES = {
     "qp": ("clarabel", "daqp"),
     "sim": ("mujoco",),
     "suites": ("pymoo", "cma", "ioh", "optuna", "optunahub", "nevergrad", "pygmo"),
+    "tune": ("optuna",),
     "urdf": ("urdf_parser_py", "lxml"),
     "video": ("imageio_ffmpeg",),
 }

@@ -14,6 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from compare.analysis.tuning import FILE as TUNING
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
 from compare.study.record import RunRecord, format_now, hash_installed_code
 from compare.study.record_files import RECORDS
@@ -29,7 +30,7 @@ from nlp_gait.user_code import Kind, hash_source, list_source_files, resolve_cod
 
 README, LOCK, CRATE = "README.md", "requirements.txt", "ro-crate-metadata.json"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
-PARTS = (FILE, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
+PARTS = (FILE, TUNING, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # time of all entries, so that equal studies give equal archives
 
 

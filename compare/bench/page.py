@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
+from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS, RUNS
 from compare.bench.leaderboard import Leaderboard
 from compare.drawing.comparison_figures import plot_suite_ecdf
 from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Section, Table, text_table
 from compare.report.provenance import TERMS
+from compare.report.tuning_section import make_tuning_section
 from nlp_gait import gaitbench
 
 PER_INSTANCE_TARGET = 1e-3
 
 
 def make_leaderboard_page(
-    board: Leaderboard, solver: str | None, suite: str, own_runs: int = RUNS, evaluations: int = EVALUATIONS
+    board: Leaderboard,
+    solver: str | None,
+    suite: str,
+    own_runs: int = RUNS,
+    evaluations: int = EVALUATIONS,
+    tunings: Sequence[Tuning] = (),
 ) -> Document:
     """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
     count_of = len(board.comparisons)
@@ -39,6 +47,7 @@ def make_leaderboard_page(
             ),
             *((make_anytime_section(board.comparisons),) if count_of > 1 else ()),
             *(() if solver is None else (_make_scores(board, solver),)),
+            *make_tuning_section(tunings),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
                 title="How it was measured",

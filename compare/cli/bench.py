@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +20,7 @@ from compare.cli.common import (
     stdout,
     until_interrupted,
 )
+from compare.cli.compare import tune_first
 from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import output_file
@@ -39,6 +40,7 @@ def bench(
     families: str | None = None,
     seeds: str = "0:5",
     against: str = RIVALS,
+    tune: int = 0,
     audit: bool = False,
     submit: Path | None = None,
     verify: Path | None = None,
@@ -62,6 +64,7 @@ def bench(
     `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`,
     `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
     """
+    from compare.analysis.tuning import read_tunings
     from compare.bench.baseline import list_instances
     from compare.bench.leaderboard import rank_solvers
     from compare.bench.page import make_leaderboard_page, make_verdict
@@ -99,6 +102,9 @@ def bench(
         settings = make_bench_study(chosen, *specs, runs=runs, evaluations=evaluations)
         study = Study(tasks=settings.tasks(), folder=out, jobs=jobs or available_cores(), scheduler=scheduler)
         name = study.tasks[-1].title if algorithm is not None else None
+        if tune:
+            settings = tune_first(study, settings, tune)
+            study = replace(study, tasks=settings.tasks())
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         check_study(study)
@@ -112,7 +118,7 @@ def bench(
     board = rank_solvers(chosen, records, shipped=shipped)
     suite_name = "chosen instances" if instances or families else f"suite {suite}"
     page = add_session(
-        make_leaderboard_page(board, name, suite_name, runs, evaluations),
+        make_leaderboard_page(board, name, suite_name, runs, evaluations, read_tunings(out)),
         describe_command(),
         [{"name": "gaitbench", "options": {"instance": id}} for id in chosen],
         scheduler or str(jobs or available_cores()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -36,6 +36,8 @@ from nlp_gait.interrupts import Interrupted
 
 if TYPE_CHECKING:
     from compare.study.record import RunRecord
+    from compare.study.run_study import Study
+    from compare.study.settings import StudySettings
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
@@ -61,6 +63,7 @@ def compare(
     starts: int = 20,
     searches: SearchOptions,
     options: ProblemOptions,
+    tune: int = 0,
     config: Path | None = None,
     out: Path = RESULTS,
     resume: bool = False,
@@ -109,6 +112,9 @@ def compare(
         tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
     check_study(study)  # before the manifest names it
+    if tune:
+        settings = tune_first(study, settings, tune)
+        study = replace(study, tasks=settings.tasks())
     if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):
         raise InputError(f"no gait of {', '.join(p.title for p in settings.problems)} can be simulated; omit --engine")
     write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
@@ -141,6 +147,19 @@ def compare(
     print_result(as_json, data, written, tables)
     end_if_excluded(imported.excluded)
     end_if_none_left(records)
+
+
+def tune_first(study: Study, settings: StudySettings, trials: int) -> StudySettings:
+    """Return the settings of a study with tuned solvers beside those that can be tuned, and store how they were tuned."""
+    from compare.analysis.tuning import tune_solvers, write_tunings
+
+    try:
+        settings, tunings = tune_solvers(study, settings, trials, say)
+    except Interrupted:
+        end_interrupted("interrupted while tuning; finished runs are stored; rerun the command to continue")
+    if study.folder is not None:
+        write_tunings(study.folder, tunings)
+    return settings
 
 
 def end_if_none_left(records: Sequence[RunRecord]) -> None:

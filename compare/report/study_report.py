@@ -18,6 +18,7 @@ from compare.analysis.overview import (
 from compare.analysis.published import write_better_points
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
+from compare.analysis.tuning import Tuning, read_tunings
 from compare.analysis.verdict import find_leaders, write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
 from compare.report.anytime_section import make_anytime_section
@@ -25,6 +26,7 @@ from compare.report.document import Document, Figure, Part, Section, Table, text
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.study_files import FurtherFiles
+from compare.report.tuning_section import make_tuning_section
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence
 from compare.study.record import RunRecord
@@ -102,7 +104,8 @@ def write_report(
     """Write the report with stored simulations, the figures as PNG and SVG, and further files; return all paths."""
     comparisons = compare_problems(records, weighting)
     simulated = load_simulations(folder, select_best_gaits(comparisons))
-    written = write_document(folder, make_study_document(comparisons, manifest, simulated, excluded))
+    document = make_study_document(comparisons, manifest, simulated, excluded, read_tunings(folder))
+    written = write_document(folder, document)
     return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons)]
 
 
@@ -111,8 +114,9 @@ def make_study_document(
     manifest: Manifest,
     simulated: Sequence[SimulatedGait] = (),
     excluded: Sequence[Exclusion] = (),
+    tunings: Sequence[Tuning] = (),
 ) -> Document:
-    """Return the document of a study, of its best gaits simulated in the engine, and of excluded records."""
+    """Return the document of a study, of its best gaits simulated in the engine, of excluded records, and of tuned searches."""
     sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
     ranking = rank_over_problems(comparisons) if len(comparisons) > 1 else None
     return Document(
@@ -122,6 +126,7 @@ def make_study_document(
             *_list_excluded(excluded),
             TERMS,
             *((make_overview(comparisons, ranking),) if ranking else ()),
+            *make_tuning_section(tunings),
             *sections,
             *(() if simulated else (HOW,)),
             _make_method_section(comparisons, manifest),

@@ -12,7 +12,7 @@ from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.preparation import UnitCube
-from metaheuristics.settings import check_count, check_number
+from metaheuristics.settings import check_count, check_number, tunable
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -33,9 +33,9 @@ class CmaEs:
         A restart CMA evolution strategy with increasing population size.
     """
 
-    population: int = 10
-    sigma: float = 0.3
-    growth: float = 2.0
+    population: int = tunable(10, 6, 60, "log")
+    sigma: float = tunable(0.3, 0.05, 0.6, "log")
+    growth: float = tunable(2.0, 1.0, 3.0)
     name: ClassVar[str] = "cma"
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import PopulationSearch, Start
 from metaheuristics.preparation import fill_fixed
-from metaheuristics.settings import bad_setting, check_count, check_installed
+from metaheuristics.settings import bad_setting, check_count, check_installed, tunable
 
 MODULES: Mapping[str, str] = {
     "DE": "soo.nonconvex.de",
@@ -49,7 +49,7 @@ class PymooSettings:
     """
 
     algorithm: str
-    population: int = 50
+    population: int = tunable(50, 20, 200, "log")
     settings: Mapping[str, Any] = field(default_factory=dict)
     modules: ClassVar[Mapping[str, str]]
 

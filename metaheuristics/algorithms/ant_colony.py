@@ -12,7 +12,7 @@ from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.settings import check_count, check_number
+from metaheuristics.settings import check_count, check_number, tunable
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -36,10 +36,10 @@ class AntColony:
         Socha, Dorigo (2008), Ant colony optimization for continuous domains, section 3.
     """
 
-    population: int = 30
-    archive: int = 50
-    locality: float = 0.1
-    spread: float = 0.85
+    population: int = tunable(30, 10, 100, "log")
+    archive: int = tunable(50, 10, 200, "log")
+    locality: float = tunable(0.1, 0.01, 0.5, "log")
+    spread: float = tunable(0.85, 0.3, 1.2)
     name: ClassVar[str] = "aco"
 
     def __post_init__(self) -> None:
@@ -117,11 +117,11 @@ class AntColonyGrid:
         The hyper-cube framework (scaling); Stuetzle, Hoos (2000), MAX-MIN ant system (lower bound).
     """
 
-    population: int = 30
-    levels: int = 101
-    evaporation: float = 0.7
-    depositors: int = 6
-    exploration: float = 0.1
+    population: int = tunable(30, 10, 100, "log")
+    levels: int = tunable(101, 21, 501, "log")
+    evaporation: float = tunable(0.7, 0.1, 0.95)
+    depositors: int = tunable(6, 1, 10)
+    exploration: float = tunable(0.1, 0.0, 0.3)
     name: ClassVar[str] = "aco-grid"
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.settings import bad_setting, check_count, check_number
+from metaheuristics.settings import bad_setting, check_count, check_number, tunable
 
 # Mutants (P, n) of the members x (P, n), the best member (n,), others drawn for each member r (5, P, n), and the weight F.
 MUTATIONS: Mapping[str, Callable[[Array, Array, Array, float], Array]] = {
@@ -47,11 +47,11 @@ class DifferentialEvolution:
         Storn, Price (1997), Differential evolution; SciPy's `differential_evolution`.
     """
 
-    population: int = 50
-    strategy: str = "best1bin"
-    mutation_low: float = 0.5
-    mutation_high: float = 1.0
-    recombination: float = 0.7
+    population: int = tunable(50, 10, 200, "log")
+    strategy: str = tunable("best1bin", *STRATEGIES)
+    mutation_low: float = tunable(0.5, 0.1, 0.7)
+    mutation_high: float = tunable(1.0, 0.7, 1.2)
+    recombination: float = tunable(0.7, 0.1, 1.0)
     name: ClassVar[str] = "de"
 
     def __post_init__(self) -> None:
@@ -151,10 +151,10 @@ class LShade:
         by how much the violation fell, and each kind of improved has the weight of its largest.
     """
 
-    population: int = 162
-    archive: float = 2.6
-    best: float = 0.11
-    memory: int = 6
+    population: int = tunable(162, 20, 400, "log")
+    archive: float = tunable(2.6, 0.0, 4.0)
+    best: float = tunable(0.11, 0.05, 0.3)
+    memory: int = tunable(6, 2, 20)
     name: ClassVar[str] = "lshade"
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.settings import bad_setting, check_count, check_number
+from metaheuristics.settings import bad_setting, check_count, check_number, tunable
 
 _CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code
 
@@ -188,12 +188,12 @@ class GeneticAlgorithm:
         as in Gupta, Pratihar, Deb (2023), section 5; the paper is silent on survival and probabilities.
     """
 
-    population: int = 50
-    tournament: int = 2
+    population: int = tunable(50, 20, 200, "log")
+    tournament: int = tunable(2, 2, 10)
     crossover: Crossover = field(default=SimulatedBinary())
     mutation: Mutation = field(default=Polynomial())
-    survival: Literal["plus", "generational"] = "plus"
-    elites: int = 1
+    survival: Literal["plus", "generational"] = tunable("plus", "plus", "generational")
+    elites: int = tunable(1, 0, 5)
     name: ClassVar[str] = "ga"
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ from metaheuristics.algorithms.points import Points
 from metaheuristics.array import Array
 from metaheuristics.constraint_handling import Rule
 from metaheuristics.interface import PopulationSearch, Start
-from metaheuristics.settings import check_count, check_number
+from metaheuristics.settings import check_count, check_number, tunable
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -39,12 +39,12 @@ class ParticleSwarm:
         Gupta, Pratihar, Deb (2023), section 5.
     """
 
-    population: int = 50
-    inertia: float = 1.0
-    inertia_damping: float = 0.99
-    cognitive: float = 1.5
-    social: float = 2.0
-    velocity_limit: float = 0.1
+    population: int = tunable(50, 10, 200, "log")
+    inertia: float = tunable(1.0, 0.4, 1.0)
+    inertia_damping: float = tunable(0.99, 0.95, 1.0)
+    cognitive: float = tunable(1.5, 0.5, 2.5)
+    social: float = tunable(2.0, 0.5, 2.5)
+    velocity_limit: float = tunable(0.1, 0.02, 0.5, "log")
     name: ClassVar[str] = "pso"
 
     def __post_init__(self) -> None:

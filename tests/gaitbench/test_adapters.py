@@ -6,6 +6,7 @@ import copy
 import pickle
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -143,9 +144,15 @@ def test_pycma(instance: gaitbench.Instance) -> None:
 def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
     """Parameters by name, one constraint, and a sampler that knows it."""
     package("optunahub")
+    import optunahub
+
     optuna = package("optuna")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     problem = instance.to("optuna")
+    root = Path(__file__).parents[2] / "examples" / "optunahub"
+    registered = optunahub.load_local_module("benchmarks/gaitbench", registry_root=str(root))
+    assert registered.Problem(instance.id).search_space == problem.search_space
+    assert set(registered.Problem.available_problem_names) == set(gaitbench.names())
     params = dict(zip(instance.names, X[0].tolist(), strict=True))
     f, violation = instance(X[:1])
     assert problem.evaluate(params) == f[0]

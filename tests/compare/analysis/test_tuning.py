@@ -1,0 +1,91 @@
+"""Settings of searches tuned on training problems, on problems with known optima."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.analysis.tuning import choose_training, read_tunings, tune_solvers, write_tunings
+from compare.study.run_study import Study
+from compare.study.settings import SolverSpec, StudySettings
+from compare.study.task import ProblemSpec, Stop
+from metaheuristics import SearchError, algorithm
+from metaheuristics.settings import list_ranges
+from nlp_gait.errors import InputError
+from tests.backends.toys import corner, toy
+
+pytest.importorskip("optuna", reason="optuna is not installed: pip install 'nlp-gait[tune]'")
+
+OWN = """
+import numpy as np
+
+def steps(f, lower, upper, evaluations, seed, *, length=1e-6):
+    x, rng = (lower + upper) / 2, np.random.default_rng(seed)
+    for k in range(evaluations):
+        y = x + length * (upper - lower) * rng.normal(size=len(x))
+        x = y if f(y) < f(x) else x
+
+steps.ranges = {"length": (1e-3, 0.3, "log")}
+"""
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory: pytest.TempPathFactory) -> StudySettings:
+    file = tmp_path_factory.mktemp("own") / "own.py"
+    file.write_text(OWN)
+    return StudySettings(
+        problems=(ProblemSpec(name=toy(corner)),),
+        solvers=(SolverSpec(name="random"), SolverSpec(name="de"), SolverSpec(name=f"{file}:steps")),
+        stop=Stop(evaluations=200),
+    )
+
+
+def test_a_tuned_search_is_better_and_the_same_again(settings: StudySettings, tmp_path: Path) -> None:
+    said: list[str] = []
+    study = Study(tasks=settings.tasks(), folder=tmp_path)
+    tuned, tunings = tune_solvers(study, settings, 7, said.append)
+    assert [solver.label or solver.name for solver in tuned.solvers][:3] == ["random", "de", "de-tuned"]
+    assert [tuning.trials for tuning in tunings] == [7, 7] and said[0] == "random has no settings to tune"
+    for tuning, solver in zip(tunings, tuned.solvers[2::2], strict=True):
+        assert tuning.area[1] > tuning.area[0] and solver.settings == tuning.settings
+    assert 7 * 190 <= tunings[0].evaluations <= 7 * 200
+    again = tune_solvers(replace(study, folder=None), settings, 7, said.append)[1]
+    assert [(t.settings, t.area) for t in again] == [(t.settings, t.area) for t in tunings]
+    write_tunings(tmp_path, tunings)
+    assert read_tunings(tmp_path) == tuple(tunings) and read_tunings(tmp_path / "other") == ()
+
+
+def test_training_instances_are_of_the_same_family_with_other_seeds() -> None:
+    names = ["gb2:ssp:0", "ssp-v5-time10", "walk12"]
+    training = choose_training([ProblemSpec(name=name) for name in names])
+    assert [spec.title for spec in training] == [
+        *(f"gb2:{family}:9000000" for family in ("ssp", "ssp-timed", "walk12-long")),
+        "gb2:ssp:9000001",
+    ]
+
+
+def test_without_ranges_there_is_nothing_to_tune(settings: StudySettings) -> None:
+    alone = replace(settings, solvers=settings.solvers[:1])
+    with pytest.raises(InputError, match="no solver of this study has settings with ranges"):
+        tune_solvers(Study(tasks=alone.tasks()), alone, 3, lambda text: None)
+
+
+@pytest.mark.parametrize("within", [(1.0,), (2.0, 1.0), (0.0, 1.0, "log"), (1.0, 2.0, "linear"), (np.nan, 1.0)])
+def test_a_wrong_range_is_one_sentence(within: tuple[float, ...]) -> None:
+    def minimise() -> None: ...
+
+    minimise.ranges = {"step": within}  # type: ignore[attr-defined]
+    with pytest.raises(SearchError, match="the range of 'step'"):
+        list_ranges(minimise)
+
+
+def test_ranges_contain_the_defaults_and_their_ends_are_allowed() -> None:
+    for name in ("pso", "ga", "aco", "aco-grid", "de", "lshade"):
+        for setting, (low, high, *_) in list_ranges(algorithm(name)).items():
+            default = getattr(algorithm(name), setting)
+            assert default in (low, high) or isinstance(low, str) or low < default < high
+            for end in (low, high):
+                algorithm(name, **{setting: end})
