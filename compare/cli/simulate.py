@@ -286,7 +286,8 @@ def _print_course(walk: Walk) -> None:
         return
     stdout.print(
         f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "
-        f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:z.1f} degrees to the left; "
+        f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:z.1f} degrees to the left "
+        f"(planned {walk.planned_heading_deg:z.1f}); "
         f"{with_unit(walk.engine_J_per_planned_m, 'J', '.1f')} per planned metre (model: {walk.model_J_per_m:.1f} J), "
         f"{with_unit(walk.engine_J_per_m, 'J', '.1f')} per walked metre"
     )

@@ -214,6 +214,8 @@ def plan(
     distance: float | None = None,
     slope_deg: float = 0.0,
     stairs: str = "",
+    turn_deg: float = 0.0,
+    footholds: Path | None = None,
     intervals: int = 10,
     values: list[str] | None = None,
     starts: int = 3,
@@ -236,6 +238,8 @@ def plan(
         distance_m=distance,
         slope_deg=slope_deg,
         stairs=stairs,
+        turn_deg=turn_deg,
+        footholds=footholds,
         intervals=intervals,
         values=parse_values(values, "--set"),
         starts=starts,
@@ -246,9 +250,10 @@ def plan(
     if as_json:
         print_json(replace_nan(found.to_json()))
     else:
+        step = found.solution.x.get("step_length_m")
         stdout.print(
             f"{found.steps} steps, {found.distance_m:.3f} m in {found.duration_s:.2f} s: {found.energy_J:.2f} J, "
-            f"{found.energy_J / found.distance_m:.2f} J/m; steps of {found.solution.x['step_length_m']:.4f} m"
+            f"{found.energy_J / found.distance_m:.2f} J/m" + ("" if step is None else f"; steps of {step:.4f} m")
         )
         if target is not None:
             print_written(target)

@@ -21,8 +21,11 @@ from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
 from nlp_gait.gaits.biped.cycle_motion import STEP
+from nlp_gait.gaits.biped.footholds import list_swings, parse_footholds, read_footholds
 from nlp_gait.gaits.biped.walk_parts import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED
 from nlp_gait.gaits.biped.walk_start import start_from_cycle
+from nlp_gait.gaits.humanoid.body import make_humanoid
+from nlp_gait.gaits.humanoid.turning import list_turn
 from nlp_gait.gaits.nao.body import load_nao
 from nlp_gait.progress import Progress, ignore_progress
 
@@ -78,6 +81,8 @@ def plan_walk(
     distance_m: float | None = None,
     slope_deg: float = 0.0,
     stairs: str = "",
+    turn_deg: float = 0.0,
+    footholds: str | Path | None = None,
     intervals: int = 10,
     values: dict[str, float] | None = None,
     starts: int = 3,
@@ -92,6 +97,9 @@ def plan_walk(
         distance_m: that the feet advance; None for the cheapest steps.
         slope_deg: by which the ground rises forward; the distance is along it.
         stairs: ``RISExRUN:N``, a flight of N treads of these sizes [m]; every step climbs one, and the walk ends on the last.
+        turn_deg: by which the walk turns to the left, along an arc; without steps, by 15 degrees each, and without a distance
+            by two thirds of the robot's usual step length each.
+        footholds: CSV file with columns ``x_m,y_m,z_m,yaw_deg``, where the right foot, the left foot and so on land.
         intervals: of each phase.
         values: parameters and bounds of ``nao-walk`` or ``humanoid-walk``, by name.
         starts: most start points, until one converges.
@@ -104,12 +112,30 @@ def plan_walk(
     for name, value in (("speed_m_s", speed_m_s), ("distance_m", distance_m)):
         if value is not None and not (isinstance(value, (int, float)) and 0.0 < value < math.inf):
             raise InputError(f"{name} must be a finite number > 0, got {value!r}")
-    name, more = find_walk(robot), {}
+    name, ahead = find_walk(robot), None
+    more: dict[str, str | float] = {}
     if stairs:
         if (steps, distance_m) != (None, None):
             raise InputError("stairs determine steps and distance; leave out steps and distance_m")
         name, (rise, run, treads) = "humanoid-walk", _parse_stairs(stairs)
         steps, more = treads + 1, {"stair_rise_m": rise, "stair_run_m": run}
+    if turn_deg or footholds is not None:
+        if (speed_m_s, stairs, slope_deg) != (None, "", 0.0):
+            raise InputError(
+                "a walk that turns is on a level floor and has no given speed; leave out speed, slope and stairs"
+            )
+        if name == "nao-walk":
+            raise InputError(
+                f"robot {robot!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns alone; "
+                "turns are planned for legs whose hip joints turn one by one"
+            )
+        if footholds is not None and (turn_deg, steps, distance_m) != (0.0, None, None):
+            raise InputError("footholds determine steps, distance and turn; leave out steps, distance and turn")
+        body = make_humanoid(robot)
+        text = read_footholds(footholds) if footholds else list_turn(body, turn_deg, steps, distance_m)
+        swings = list_swings(parse_footholds(text), body.feet_y)
+        ahead = sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)
+        steps, distance_m, more = text.count(";") + 1, None, {"footholds": text}
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
     problem = load(name, robot=robot, steps=count, intervals=intervals, slope_deg=slope_deg, **more)
     if steps is None and distance_m is not None:
@@ -127,9 +153,11 @@ def plan_walk(
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
     cycle = None if name == "nao-walk" else load("humanoid-cycle", robot=robot, intervals=intervals)
-    least, most = (problem.value(f"{STEP}.{end}") for end in ("lower", "upper"))
-    if cycle is not None and least == most:
-        cycle = cycle.fix(**{STEP: least})
+    if ahead is None and problem.value(f"{STEP}.lower") == problem.value(f"{STEP}.upper"):
+        ahead = problem.value(f"{STEP}.lower")
+    if cycle is not None and ahead is not None:
+        least, most = (cycle.value(f"{STEP}.{end}") for end in ("lower", "upper"))
+        cycle = cycle.fix(**{STEP: min(max(ahead, least), most)})
     return _solve(problem, cycle, starts, progress)
 
 
@@ -187,8 +215,12 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progres
 def describe_violation(row: ConstraintValue, steps: int) -> str:
     """Return a sentence about a violated row of a walk: step, constraint, amount and remedy."""
     begins = SENTENCES["places"]
-    prefix = next(begin for begin in begins if row.name.startswith(begin))
-    where = begins[prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")
+    if found := re.match(r"step(\d+)_", row.name):  # of a walk whose steps differ
+        kind = row.name.removeprefix(found[0]).partition("_")[0]
+        prefix, where = f"{found[0]}{kind}_", f"step {found[1]}, {'single' if kind == 'ssp' else 'double'} support"
+    else:
+        prefix = next(begin for begin in begins if row.name.startswith(begin))
+        where = begins[prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")
     stem, _, label = row.name.removeprefix(prefix).partition("[")
     words, remedy = next(found for begin, found in SENTENCES["constraints"].items() if stem.startswith(begin))
     owner = label.rstrip("]").split(",")[0].strip()

@@ -23,6 +23,7 @@ SIMULATED = {
     "attitude": Columns(unit="1", labels=("w", "x", "y", "z")),  # of the root, a quaternion; upright if missing
     "left_foot": vector_columns("m"),  # the sole under the ankle
     "right_foot": vector_columns("m"),
+    "feet_yaw": Columns(unit="rad", labels=("left", "right")),  # direction of the soles; forward if missing
     # 1 where any part of the foot is on the ground, else 0; if missing, a foot is on the ground when its sole is.
     "left_bears": Columns(unit="1"),
     "right_bears": Columns(unit="1"),
@@ -88,7 +89,7 @@ class Skeleton:
     def support(self, k: int) -> Array | None:
         """Return the support polygon (M, 2) at a sample, the hull of the loaded soles from above [m]; None without one."""
         loaded = [sole.corners[k, :, :2] for sole in self.soles if sole.supports[k]]
-        return _hull(np.concatenate(loaded)) if loaded else None
+        return find_hull(np.concatenate(loaded)) if loaded else None
 
     def margin(self) -> Array:
         """Return the distance (T,) of the zero-moment point from the nearest edge of the support polygon [m], negative outside.
@@ -106,7 +107,7 @@ class Skeleton:
         loaded = [sole.corners[k] for sole in self.soles if sole.supports[bearing]]
         if not loaded:
             return math.nan
-        corners = _hull(np.concatenate(loaded)[:, :2])
+        corners = find_hull(np.concatenate(loaded)[:, :2])
         if corners is None:  # a planar model: only its length counts
             x = np.concatenate(loaded)[:, 0]
             return float(min(zmp[0] - x.min(), x.max() - zmp[0]))
@@ -137,7 +138,7 @@ class Display:
     durations: tuple[str, ...] = ()  #: variables with the duration of each phase, in order
 
 
-def _hull(points: Array) -> Array | None:
+def find_hull(points: Array) -> Array | None:
     """Return corners (M, 2) of the convex hull of points (N, 2), counter-clockwise; None for points on a line."""
     from scipy.spatial import ConvexHull, QhullError  # costs 0.1 s to import
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -18,12 +19,10 @@ SIDES_SWAPPED = {
     for side, other in (("left", "right"), ("right", "left"))
     for what in ("foot", "bears", "force", "moment")
 }
+YAW = "feet_yaw"
+TURNED_ONLY = tuple(f"{side}_{half}" for side in ("left", "right") for half in ("force", "moment"))
 # Arrays that do not move along with the walk; a reflection at the plane y = 0 of a quaternion (w, x, y, z).
-UNMOVED = (
-    *JOINT_ARRAYS,
-    "attitude",
-    *(f"{side}_{what}" for side in ("left", "right") for what in ("bears", "force", "moment")),
-)
+UNMOVED = (*JOINT_ARRAYS, "left_bears", "right_bears")
 MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
@@ -34,20 +33,21 @@ def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.
     """
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
-    return join_steps([cycle] * steps, robot, np.array([step_length(cycle), 0.0, rise_m]))
+    return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [step_length(cycle), 0.0, rise_m, 0.0]))
 
 
-def join_steps(steps: Sequence[Signals], robot: Robot, advance: Array) -> Signals:
+def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals:
     """Return one walk of steps that all start on the left foot at x = 0: every second one is mirrored.
 
-    Each begins ``advance`` (x, y, z) [m] from the previous one, in the mirror image of the state in which that ended.
+    Places (K, 4) are where each step's origin is (x, y, z) [m] and its yaw [rad]; each begins in the state in which the previous
+    one ended.
     """
     arrays: dict[str, list[Array]] = {name: [] for name in steps[0].arrays}
     images: dict[int, Signals] = {}
     begin = 0.0
     for k, step in enumerate(steps):
         side = step if k % 2 == 0 else images.setdefault(id(step), mirror(step, robot))
-        for name, values in _move(side, k * advance, begin).items():
+        for name, values in _move(side, places[k, :3], places[k, 3], begin).items():
             arrays[name].append(values if k == 0 else values[1:])
         begin += float(step.arrays["t"][-1])
     return replace(steps[0], arrays={name: np.concatenate(parts) for name, parts in arrays.items()})
@@ -72,6 +72,8 @@ def mirror(signals: Signals, robot: Robot) -> Signals:
             arrays[name] = array
         elif name == "attitude":
             arrays[name] = array * MIRRORED_ATTITUDE
+        elif name == YAW:
+            arrays[name] = -array[:, ::-1]
         else:
             # A reflection changes the sign of a moment relative to a force (pseudovector).
             reflected = np.array([1.0, -1.0, 1.0]) * (-1.0 if signals.columns[name].unit == "Nm" else 1.0)
@@ -79,12 +81,23 @@ def mirror(signals: Signals, robot: Robot) -> Signals:
     return replace(signals, arrays=arrays)
 
 
-def _move(signals: Signals, distance: Array, delay: float) -> dict[str, Array]:
-    """Return arrays with all positions moved by (x, y, z) [m] and all times delayed [s]."""
-    arrays = {}
+def _move(signals: Signals, distance: Array, yaw: float, delay: float) -> dict[str, Array]:
+    """Return arrays turned about the vertical through the origin [rad], moved by (x, y, z) [m] and delayed [s]."""
+    arrays, turn = {}, np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
     for name, array in signals.arrays.items():
+        width = array.shape[-1]
         if name in UNMOVED:
             arrays[name] = array
+        elif name == "t":
+            arrays[name] = array + delay
+        elif name == YAW:
+            arrays[name] = array + yaw
+        elif name == "attitude":
+            (w, x, y, z), cos, sin = array.T, math.cos(yaw / 2), math.sin(yaw / 2)
+            arrays[name] = np.stack(
+                [cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w], axis=1
+            )
         else:
-            arrays[name] = array + (delay if name == "t" else distance[: array.shape[1]])
+            turned = array @ turn[:width, :width].T if yaw else array
+            arrays[name] = turned if name in TURNED_ONLY else turned + distance[:width]
     return arrays

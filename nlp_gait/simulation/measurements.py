@@ -12,7 +12,7 @@ import numpy as np
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import TIME_STEP
-from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.plan import ON_GROUND, SIDES, Plan
 from nlp_gait.simulation.simulate import LEAST_LOAD, Simulation
 
 AT_LIMIT = 1.0 - 1e-9  # share of a torque limit from which a drive counts as saturated
@@ -221,7 +221,10 @@ def _if_any(statistic: Any, values: Array) -> float | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walk:
-    """A walk in numbers; distances are of the point halfway between the feet, from start to rest."""
+    """A walk in numbers; distances are of the point halfway between the feet, from start to rest.
+
+    Forward is from the planned start straight to the planned end.
+    """
 
     steps: int
     steps_done: int  # whole steps before a fall; all if it fell later or not at all
@@ -229,7 +232,10 @@ class Walk:
     walked_m: float | None  # distance forward; None after a fall
     drift_m: float | None  # distance to the left; None after a fall
     heading_deg: float | None  # direction of the torso at the end, positive to the left; None after a fall
-    model_J_per_m: float  # energy by the model, mechanical and heat, per planned metre
+    planned_heading_deg: float
+    model_J_per_m: (
+        float  # energy by the model, mechanical and heat, per planned metre; infinite for a turn in one place
+    )
     engine_J_per_planned_m: float | None  # energy of the drives; None after a fall
     engine_J: float | None  # energy of the drives; None after a fall
     engine_J_per_m: float | None  # per metre walked; None after a fall or without progress
@@ -243,7 +249,7 @@ class Walk:
 def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -> Walk:
     """Compute the numbers of a simulated walk."""
     measurements = measure(plan, simulation, drive)
-    planned, (walked, drift) = planned_distance(plan), walked_distance(simulation)
+    planned, (walked, drift) = planned_distance(plan), walked_distance(simulation, plan_way(plan))
     energy = measurements.measured.total_W * plan.duration_s
     fell = simulation.fell_at_s
     return Walk(
@@ -252,9 +258,10 @@ def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -
         planned_m=planned,
         walked_m=walked if fell is None else None,
         drift_m=drift if fell is None else None,
-        heading_deg=math.degrees(float(simulation.heading[-1])) if fell is None else None,
-        model_J_per_m=measurements.predicted.total_W * plan.duration_s / planned,
-        engine_J_per_planned_m=energy / planned if fell is None else None,
+        heading_deg=math.degrees(float(np.unwrap(simulation.heading)[-1])) if fell is None else None,
+        planned_heading_deg=math.degrees(float(plan.heading(simulation.t)[-1])),
+        model_J_per_m=measurements.predicted.total_W * plan.duration_s / planned if planned > 0.0 else math.inf,
+        engine_J_per_planned_m=energy / planned if fell is None and planned > 0.0 else None,
         engine_J=energy if fell is None else None,
         engine_J_per_m=energy / walked if fell is None and walked > 0.0 else None,
         measurements=measurements,
@@ -262,13 +269,20 @@ def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -
 
 
 def planned_distance(plan: Plan) -> float:
-    """Return the planned distance forward of the point halfway between the feet [m]."""
+    """Return the planned distance of the point halfway between the feet, from its start straight to its end [m]."""
+    return math.hypot(*plan_way(plan))
+
+
+def plan_way(plan: Plan) -> tuple[float, float]:
+    """Return the planned way (x, y) of the point halfway between the feet [m]; zero if it is shorter than a micrometre."""
     feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
-    return float(feet[-1, 0] - feet[0, 0]) / 2
+    x, y = ((feet[-1] - feet[0])[:2] / 2).tolist()
+    return (x, y) if math.hypot(x, y) > ON_GROUND else (0.0, 0.0)
 
 
-def walked_distance(simulation: Simulation) -> tuple[float, float]:
-    """Return the distances forward and to the left of the point halfway between the feet, from start to rest [m]."""
+def walked_distance(simulation: Simulation, way: tuple[float, float] = (1.0, 0.0)) -> tuple[float, float]:
+    """Return the distances of the point halfway between the feet along a way (x, y) and to its left, from start to rest [m]."""
     middle = simulation.feet.mean(axis=1)
-    forward, left = (middle[-1] - middle[0])[:2].tolist()
-    return forward, left
+    x, y = (middle[-1] - middle[0])[:2].tolist()
+    cos, sin = (part / math.hypot(*way) for part in way) if any(way) else (1.0, 0.0)
+    return cos * x + sin * y, cos * y - sin * x

@@ -84,6 +84,11 @@ class Plan:
         w, x, y, z = self.attitude(times).T
         return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
 
+    def heading(self, times: Array) -> Array:
+        """Return the planned direction (T,) of the root's forward axis, positive to the left, continuous over time [rad]."""
+        w, x, y, z = self.attitude(times).T
+        return np.asarray(np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
+
     @property
     def spin_at_start(self) -> Array:
         """(3,) planned angular velocity of the root at time zero, in its own axes [rad/s]."""

@@ -17,9 +17,9 @@ from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
-from nlp_gait.symbolic.kinematics import rotation_matrix
+from nlp_gait.symbolic.kinematics import UP, axis_rotation, rotation_matrix
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
-from nlp_gait.symbolic.trajectories import Motion
+from nlp_gait.symbolic.trajectories import Motion, map_motion, stack
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -48,6 +48,22 @@ class TorsoMotion(NamedTuple):
     spin_rate: SX  #: (3,) [rad/s^2]
     point_m: Array  #: (3,) a point of the torso from its origin, in its axes [m]
     place: Motion  #: (3,) position of that point from the origin of the foot's link [m]
+
+
+def turn_torso(torso: TorsoMotion, yaw: Motion, foot_yaw: Motion) -> TorsoMotion:
+    """Return the motion, in a foot's own axes, of a torso that yaws after it rolled and pitched, over a foot that yaws, too.
+
+    The given motion has the rotation without yaw, and its place in the world's axes; yaws are in the world [rad].
+    """
+    heading = Motion(*(a - b for a, b in zip(yaw, foot_yaw, strict=True)))
+    turn, up = axis_rotation(UP, heading.position), SX(DM(UP))
+    spin, rate = turn @ torso.spin, turn @ torso.spin_rate
+    return torso._replace(
+        rotation=turn @ torso.rotation,
+        spin=spin + up * heading.velocity,
+        spin_rate=rate + up * heading.acceleration + heading.velocity * ca.cross(up, spin),
+        place=map_motion(lambda at: axis_rotation(UP, -at[0]) @ at[1:], stack(foot_yaw, torso.place)),
+    )
 
 
 class LegMotion(NamedTuple):

@@ -21,9 +21,18 @@ class Pose(NamedTuple):
     com: SX  #: (3,) centre of mass [m]
 
 
+UP = (0.0, 0.0, 1.0)
+
+
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
     """Return the rotation (3, 3) about a fixed unit axis by an angle [rad]."""
     return rotation_matrix(DM(axis), ca.cos(angle), ca.sin(angle))
+
+
+def turn_quaternion(attitude: SX, yaw: SX) -> SX:
+    """Return an attitude (4,), a quaternion (w, x, y, z), after a rotation about the vertical by an angle [rad]."""
+    (w, x, y, z), cos, sin = ca.vertsplit(attitude), ca.cos(yaw / 2), ca.sin(yaw / 2)
+    return ca.vertcat(cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w)
 
 
 def rotation_matrix(k: DM, cos: SX, sin: SX) -> SX:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import casadi as ca
@@ -83,9 +84,9 @@ class Nonsmooth:
         """Return |v| elementwise."""
         return ca.fabs(v)
 
-    def min(self, a: MX, b: MX) -> MX:
-        """Return the minimum elementwise."""
-        return ca.fmin(a, b)
+    def min(self, *values: MX) -> MX:
+        """Return the minimum of several values elementwise."""
+        return reduce(ca.fmin, values)
 
     def largest(self, v: MX) -> MX:
         """Return the largest |v_i| of a vector (m, 1): it is halved repeatedly, by elementwise operations only."""
@@ -175,9 +176,9 @@ class Lifted(Nonsmooth):
         """Return a variable s with s >= v and s >= -v."""
         return self._lift("abs", ca.fabs(v), lambda s: ca.vertcat(s - v, s + v))
 
-    def min(self, a: MX, b: MX) -> MX:
-        """Return a variable d with d <= a and d <= b."""
-        return self._lift("min", ca.fmin(a, b), lambda d: ca.vertcat(a - d, b - d), from_above=False)
+    def min(self, *values: MX) -> MX:
+        """Return a variable d with d <= v for each value v."""
+        return self._lift("min", super().min(*values), lambda d: ca.vertcat(*(v - d for v in values)), from_above=False)
 
     def largest(self, v: MX) -> MX:
         """Return a variable s with s >= v_i and s >= -v_i for all i."""

@@ -38,8 +38,10 @@ def read_duration(at: InstantPoint, phase: PhaseName) -> SX:
     return fmax(at[TIMES[phase]], LEAST_DURATION)
 
 
-# Angles that are planned besides the hip, by name [rad]: of swinging arms, or of a leaning torso.
+# Angles that are planned besides the hip, by name [rad]: of swinging arms, or of a leaning torso; in a turn also the yaw of the
+# torso and of the right foot, from the left one's.
 Angles: TypeAlias = Mapping[str, Motion]
+TORSO_YAW, RIGHT_YAW = "torso_yaw", "right_yaw"
 # What is planned of an instant, and what the joints follow from: motions of the hip, of these angles, and of both ankles by side.
 State: TypeAlias = tuple[Motion, Angles, Mapping[str, Motion]]
 

@@ -35,6 +35,7 @@ from nlp_gait.symbolic.balance import (
     zmp_of_wrench,
 )
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
+from nlp_gait.symbolic.kinematics import UP, axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 COMPONENTS = {f"{half}_{axis}": unit for half, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"}
@@ -53,7 +54,9 @@ TorsoShare = Literal["printed", "lever", "free"]
 LOAD_DEGREE = 4
 
 
-def torso_shares(hip_y: SX, rule: Division, feet_y: tuple[float, float] = (0.05, -0.05)) -> dict[str, SX]:
+def torso_shares(
+    hip_y: SX, rule: Division, feet_y: tuple[float, float] | tuple[SX, SX] = (0.05, -0.05)
+) -> dict[str, SX]:
     """Compute the share of the torso's mass that each leg carries from the hip's distances to the feet; both add up to 1.
 
     The hip's place and the feet's, by default NAO's, are across the walking direction [m]. Distances are signed, so that a hip
@@ -198,12 +201,18 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
 
     def loads(now: Instant) -> Instant:
         shares = torso_shares(now.hip[1], rule, body.feet_y)
+        if now.yaw.shape[0]:  # across the mean of both feet's directions
+            mean = axis_rotation(UP, -now.yaw / 2)
+            hip_y, *feet_y = ((mean @ place)[1] for place in (now.hip, *now.ankles.values()))
+            shares = torso_shares(hip_y, rule, (feet_y[0], feet_y[1]))
         torques: dict[str, SX] = {}
         zmps, ground_loads, wrenches = [], [], {}
         for side, name in BOTH_FEET.items():
             foot = robot.feet[name]
             own, wrench = body.compute_torques(foot.link, body.leg_joints[side], now.joints, {robot.root: shares[side]})
             height = foot.ankle_height_m
+            if side == "R" and now.yaw.shape[0]:  # from the axes of its foot
+                wrench = Wrench(*(axis_rotation(UP, now.yaw) @ part for part in wrench))
             offset = zmp_of_wrench(wrench, height, weight)
             wrenches[side] = shift_down(wrench, height)
             torques |= own

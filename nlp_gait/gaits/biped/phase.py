@@ -191,10 +191,13 @@ class Phase:
             "right_foot": right,
             **dict(zip(WRENCHES, halves, strict=True)),
         }
-        if not attitude.shape[0]:
-            return Signals(joints=self.body.joints, arrays=arrays, columns=COLUMNS)
-        arrays["attitude"] = _numbers(attitude)
-        return Signals(joints=self.body.joints, arrays=arrays, columns={**COLUMNS, "attitude": SIMULATED["attitude"]})
+        if attitude.shape[0]:
+            arrays["attitude"] = _numbers(attitude)
+        if self._exact_plan[1].yaw.shape[0]:
+            yaw = _numbers(world)[:, -1]
+            arrays["feet_yaw"] = np.stack([np.zeros(n), yaw], axis=1)
+        columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
+        return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -268,7 +271,7 @@ class Phase:
     ) -> ca.Function:
         """One sample: moving angles and both derivatives, hip, planned angles, reach, world, attitude, and traces.
 
-        ``world`` is the centre of mass, both feet and the planned wrench in one column.
+        ``world`` is the centre of mass, both feet, the planned wrench and the right foot's yaw in one column.
         """
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
         tree = tree_from(self.body.robot, self.body.robot.feet["left"].link)
@@ -278,7 +281,7 @@ class Phase:
             plan.ankles[side] - SX([0, 0, self.body.robot.feet[foot].ankle_height_m])
             for side, foot in BOTH_FEET.items()
         ]
-        world = ca.vertcat(com, *soles, plan.wrench)
+        world = ca.vertcat(com, *soles, plan.wrench, plan.yaw)
         seen = [trace(at, inputs[2]) for trace in traces.values()]
         known = [plan.hip, planned, plan.reach, world, plan.attitude]
         return ca.Function("kinematics", inputs, [*self._motion(plan), *known, *seen])
@@ -306,14 +309,16 @@ class Phase:
         """Return angles, both derivatives, hip and world (see ``_kinematics``), and the loads as functions of these."""
         plan = self._exact_plan[1]
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
-        hip, world = SX.sym("hip", 3), SX.sym("world", 9 + plan.wrench.shape[0])
-        _, left, right, *wrench = ca.vertsplit(world, 3)
+        sizes = (3, 3, 3, plan.wrench.shape[0], plan.yaw.shape[0])
+        hip, world = SX.sym("hip", 3), SX.sym("world", sum(sizes))
+        _, left, right, wrench, yaw = ca.vertsplit(world, np.cumsum([0, *sizes]).tolist())
         moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
         now = Instant(
             joints={**plan.joints, **moved},
             hip=hip,
             ankles={"L": left, "R": right},
-            wrench=ca.vertcat(*wrench) if wrench else SX(0, 1),
+            wrench=wrench,
+            yaw=yaw,
         )
         return [*parts, hip, world], self.loads(now)
 

@@ -27,6 +27,8 @@ class Instant(NamedTuple):
     reach: SX = SX(0, 1)  # (2,) cosines of the left and the right knee
     # (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty unless planned
     wrench: SX = SX(0, 1)
+    # (1,) yaw of the right foot, from the left one's [rad]; empty where both point forward
+    yaw: SX = SX(0, 1)
     miss: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
     attitude: SX = SX(0, 1)  # (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright
     torques: Mapping[str, SX] = {}  # by joint name [Nm]; this and the rest are computed from the motion by a ``Loader``

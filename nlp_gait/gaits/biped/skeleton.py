@@ -29,7 +29,8 @@ def _draw(robot: Robot, signals: Signals) -> Skeleton:
     for side in (LEFT, RIGHT):
         leg = [at[link] for link in _chain(robot, robot.feet[side].link)]
         limbs.append(Limb(side=side, points=np.stack([*leg, arrays[f"{side}_foot"]], axis=1)))
-        soles.append(make_level_sole(robot, side, arrays[f"{side}_foot"]))
+        yaw = arrays["feet_yaw"][:, (LEFT, RIGHT).index(side)] if "feet_yaw" in arrays else None
+        soles.append(make_level_sole(robot, side, arrays[f"{side}_foot"], yaw))
     feet = {link for side in (LEFT, RIGHT) for link in _chain(robot, robot.feet[side].link)[1:]}
     height = -min(float(_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
     for tip in _tips(robot):
@@ -44,10 +45,12 @@ def _draw(robot: Robot, signals: Signals) -> Skeleton:
     return make_flat_skeleton(signals, limbs, soles)
 
 
-def make_level_sole(robot: Robot, side: str, centre: Array) -> Sole:
-    """Return the sole of a foot that stays level, from the point under its ankle (T, 3) [m]."""
+def make_level_sole(robot: Robot, side: str, centre: Array, yaw: Array | None = None) -> Sole:
+    """Return the sole of a foot that stays level, from the point under its ankle (T, 3) [m] and its yaw (T,) [rad]."""
     foot = robot.feet[side]
     outline = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)
+    if yaw is not None:
+        outline = turn_about_vertical(outline, yaw[:, None])
     return Sole(side=side, corners=centre[:, None, :] + outline, supports=centre[:, 2] <= ON_GROUND)
 
 
@@ -90,4 +93,15 @@ def locate_links(robot: Robot, signals: Signals) -> dict[str, Array]:
     function = ca.Function("places", [q, base], list(places.values()))
     standing = signals.arrays["left_foot"] + np.array([0.0, 0.0, robot.feet[LEFT].ankle_height_m])
     values = function.map(len(signals.arrays["t"]))(signals.arrays["q"].T, standing.T)
-    return {name: np.array(value.full().T) for name, value in zip(places, values, strict=True)}
+    found = {name: np.array(value.full().T) for name, value in zip(places, values, strict=True)}
+    if "feet_yaw" not in signals.arrays:
+        return found
+    yaw = signals.arrays["feet_yaw"][:, 0]
+    return {name: standing + turn_about_vertical(place - standing, yaw) for name, place in found.items()}
+
+
+def turn_about_vertical(points: Array, yaw: Array) -> Array:
+    """Return points (..., 3) turned about the vertical through the origin by angles [rad] of the leading shape."""
+    x, y, z = (points[..., i] for i in range(3))
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.stack(np.broadcast_arrays(cos * x - sin * y, sin * x + cos * y, z), axis=-1)

@@ -212,7 +212,7 @@ class WholeWalk:
 
         inner = [join("ssp", "dsp")] * (self.steps - HALF_STEPS) if "ssp" in self.parts else []
         steps = [join("shift", "start_ssp", "start_dsp"), *inner, join("stop_ssp", "stop_dsp")]
-        return join_steps(steps, self.body.robot, np.array([float(at[STEP]), 0.0, self.rise_m]))
+        return join_steps(steps, self.body.robot, np.outer(range(self.steps), [float(at[STEP]), 0.0, self.rise_m, 0.0]))
 
 
 def make_whole_walk(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
@@ -15,6 +16,7 @@ from nlp_gait.gaits.biped.cycle_motion import STEP
 from nlp_gait.gaits.biped.joined_phases import STAND
 from nlp_gait.gaits.biped.walk_parts import GREATEST_SPEED, LEAST_SPEED
 
+EACH_STEP = re.compile(r"(start|stop|step\d+)_")  # in names of variables that a cycle has once
 START_NOISE = 0.002  # of start points, as a share of the bounds' ranges
 
 
@@ -34,7 +36,7 @@ def start_walk(
     """
     shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
     x = {
-        variable.name: variable.lower + width * shares.get(variable.name, 0.5)
+        variable.name: variable.lower + width * shares.get(EACH_STEP.sub("", variable.name), 0.5)
         for variable, width in zip(variables, widths, strict=True)
     }
     for name in x:
@@ -57,10 +59,11 @@ def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float]
     """
     found = walk.by_name(start)
     for name in found:
-        same = name.replace("start_", "").replace("stop_", "").replace(STAND, "lift_off")
+        same = EACH_STEP.sub("", name).replace(STAND, "lift_off")
         found[name] = cycle.get(TIMES["dsp"] if name == "shift_time_s" else same, found[name])
     # A lift-off between both feet is ahead of one side by side.
-    found |= dict.fromkeys((f"hip_x_{STAND}_m", "hip_x_start_lift_off_m"), 0.2 * found[STEP])
+    first = next(name for name in found if name in ("hip_x_start_lift_off_m", "hip_x_step1_lift_off_m"))
+    found |= dict.fromkeys((f"hip_x_{STAND}_m", first), 0.2 * (found | dict(cycle))[STEP])
     for state, share in {"lift_off": -0.5, "touch_down": 0.5, "start_touch_down": 0.5}.items():
         if (name := f"hip_z_{state}_m") in found:
             found[name] += share * rise_m

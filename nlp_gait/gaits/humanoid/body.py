@@ -13,7 +13,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
-from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName
+from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors
@@ -29,8 +29,9 @@ from nlp_gait.symbolic.general_leg import (
     leg_motion,
     make_leg_root,
     sample_flat_foot_poses,
+    turn_torso,
 )
-from nlp_gait.symbolic.kinematics import axis_rotation
+from nlp_gait.symbolic.kinematics import UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
@@ -103,7 +104,7 @@ class Humanoid(Body):
         return reach.map(q.shape[1])(q)
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
-        """Return the motion of the whole robot; the torso rolls about its own x axis, and pitches before that."""
+        """Return the motion of the whole robot; the torso rolls about its own x axis, pitches before that and yaws first."""
         middle = np.array(self.hip_m)
         roll, pitch = (angles.get(name, constant_motion(0.0)) for name in LEAN)
         pitched, side = axis_rotation(TO_THE_LEFT, pitch.position), SX(DM(TO_THE_LEFT))
@@ -118,23 +119,31 @@ class Humanoid(Body):
             leg = self.biped.legs[name]
             place = Motion(*(a - b for a, b in zip(hip, ankles[letter], strict=True)))
             torso = TorsoMotion(rotation, spin, rate, middle, place)
+            if TORSO_YAW in angles:
+                foot = angles[RIGHT_YAW] if letter == "R" else constant_motion(0.0)
+                torso = turn_torso(torso, angles[TORSO_YAW], foot)
             found = leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
             joints |= {joint: Motion(*(part[i] for part in found.joints)) for i, joint in enumerate(leg.joints)}
             reach.append(found.reach)
             miss.append(found.miss)
         half_roll, half_pitch = roll.position / 2, pitch.position / 2
+        attitude = ca.vertcat(
+            ca.cos(half_pitch) * ca.cos(half_roll),
+            ca.cos(half_pitch) * ca.sin(half_roll),
+            ca.sin(half_pitch) * ca.cos(half_roll),
+            -ca.sin(half_pitch) * ca.sin(half_roll),
+        )
+        if TORSO_YAW in angles:
+            rotation = axis_rotation(UP, angles[TORSO_YAW].position) @ rotation
+            attitude = turn_quaternion(attitude, angles[TORSO_YAW].position)
         return Instant(
             joints=joints,
             hip=hip.position - rotation @ DM(middle),
             ankles={letter: ankle.position for letter, ankle in ankles.items()},
             reach=ca.vertcat(*reach),
             miss=ca.vertcat(*miss) if ops.exact else SX(0, 1),
-            attitude=ca.vertcat(
-                ca.cos(half_pitch) * ca.cos(half_roll),
-                ca.cos(half_pitch) * ca.sin(half_roll),
-                ca.sin(half_pitch) * ca.cos(half_roll),
-                -ca.sin(half_pitch) * ca.sin(half_roll),
-            ),
+            attitude=attitude,
+            yaw=angles[RIGHT_YAW].position if TORSO_YAW in angles else SX(0, 1),
         )
 
 

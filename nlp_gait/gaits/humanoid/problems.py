@@ -10,12 +10,15 @@ from nlp_gait.gaits.biped.curves import Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import plan_double_support
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
+from nlp_gait.gaits.biped.footholds import parse_footholds
+from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.single_support import plan_single_support
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.humanoid.body import make_humanoid
+from nlp_gait.gaits.humanoid.turning import check_turns
 
 Share = Literal["lever", "free"]
 
@@ -105,6 +108,7 @@ def humanoid_walk(
     slope_deg: float = 0.0,
     stair_rise_m: float = 0.0,
     stair_run_m: float = 0.0,
+    footholds: str = "",
     drive_limits: bool = True,
     motors: str = "",
 ) -> GaitProblem:
@@ -113,11 +117,23 @@ def humanoid_walk(
     All inner steps are one cycle, as in ``humanoid-cycle``; its speed may have limits, which are parameters. The feet advance by
     one step length less than there are steps, because the first and the last one are half steps.
 
+    ``footholds``, rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, are where the right foot, the left foot and so on land
+    instead; then every step has its own states.
+
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
+    goal, sharing = make_goal(body, "power"), share_load(body, "lever")
+    if footholds:
+        if slope_deg or stair_rise_m or stair_run_m:
+            raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")
+        places = parse_footholds(footholds)
+        if len(places) != steps:
+            raise InputError(f"steps must be the number of footholds, {len(places)}, got {steps}")
+        check_turns(body, places)
+        return plan_footstep_walk(body, places, grid, goal, sharing)
     flight = None
     if stair_rise_m or stair_run_m:
         flight = Flight(
@@ -128,7 +144,7 @@ def humanoid_walk(
         )
         if slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")
-    return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"), flight)
+    return plan_whole_walk(body, steps, grid, goal, sharing, flight)
 
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:

@@ -1,0 +1,135 @@
+"""Places of both feet along a walk: read from a file or along an arc, seen from the standing foot, and their soles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from nlp_gait.errors import InputError
+from nlp_gait.files import read_text
+from nlp_gait.formulation import Array
+from nlp_gait.formulation.display import find_hull, make_rectangle
+from nlp_gait.robots import Foot
+
+COLUMNS = "x_m,y_m,z_m,yaw_deg"
+MOST_FOOTHOLDS = 100
+SWING_SAMPLES = 41  # of a swing, at which both soles are compared
+
+
+class Foothold(NamedTuple):
+    """Place of a foot on a level floor: the point below its ankle [m], and the direction of its toes, to the left [rad]."""
+
+    x: float
+    y: float
+    yaw: float
+
+    def seen_from(self, stance: Foothold, left: bool, stance_y: float) -> Foothold:
+        """Return it from a standing foot at (0, ``stance_y``) that points forward; mirrored unless that is the left one."""
+        x, y, yaw = self.x - stance.x, self.y - stance.y, self.yaw - stance.yaw
+        cos, sin, sign = math.cos(stance.yaw), math.sin(stance.yaw), 1.0 if left else -1.0
+        return Foothold(cos * x + sin * y, sign * (cos * y - sin * x) + stance_y, sign * yaw)
+
+    def outline(self, foot: Foot) -> Array:
+        """Return the corners (4, 2) of a sole on it [m]."""
+        corners = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)[:, :2]
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return np.array([self.x, self.y]) + corners @ np.array([[cos, sin], [-sin, cos]])
+
+
+def parse_footholds(text: str) -> tuple[Foothold, ...]:
+    """Return footholds from rows ``x,y,z,yaw`` [m, degrees], separated by semicolons.
+
+    Raises:
+        InputError: another form, another number of rows, or a height other than zero.
+    """
+    found = []
+    for k, row in enumerate(text.split(";"), 1):
+        try:
+            x, y, z, yaw = (float(part) for part in row.split(","))
+        except ValueError:
+            raise InputError(f"foothold {k} must be four numbers {COLUMNS}, got {row.strip()!r}") from None
+        if not all(math.isfinite(value) for value in (x, y, z, yaw)):
+            raise InputError(f"foothold {k} must have finite numbers, got {row.strip()!r}")
+        if z:
+            raise InputError(
+                f"foothold {k} is {z:g} m high, but footholds are planned on a level floor; write 0, or climb with stairs"
+            )
+        found.append(Foothold(x, y, math.radians(yaw)))
+    if not 1 <= len(found) <= MOST_FOOTHOLDS:
+        raise InputError(f"a walk has 1 to {MOST_FOOTHOLDS} footholds, got {len(found)}")
+    return tuple(found)
+
+
+def read_footholds(path: str | Path) -> str:
+    """Return the footholds of a CSV file with the header ``x_m,y_m,z_m,yaw_deg`` in the form of ``parse_footholds``.
+
+    Raises:
+        InputError: it cannot be read, or has another header.
+    """
+    header, *rows = (line.strip() for line in read_text(Path(path), "footholds").splitlines() if line.strip()) or ("",)
+    if header.replace(" ", "") != COLUMNS:
+        raise InputError(f"{path}: the first line must be {COLUMNS}, got {header!r}")
+    return ";".join(rows)
+
+
+def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float, float]) -> str:
+    """Return the footholds of a turn to the left along an arc, of which the last foot closes beside the other one.
+
+    All steps but the last advance equally, by a length of the arc and an angle; the right foot steps first.
+    """
+    found, turn = [], math.radians(turn_deg)
+    for k in range(1, steps + 1):
+        share = min(k / (steps - 1), 1.0)
+        yaw, side = share * turn, feet_y[k % 2]
+        radius = distance_m / turn
+        x, y = radius * math.sin(yaw) - side * math.sin(yaw), radius * (1 - math.cos(yaw)) + side * math.cos(yaw)
+        found.append(",".join(f"{value:.9g}" for value in (x, y, 0.0, math.degrees(yaw))))
+    return ";".join(found)
+
+
+def list_swings(footholds: Sequence[Foothold], feet_y: tuple[float, float]) -> list[tuple[Foothold, Foothold]]:
+    """Return where the foot of each step lifts and lands, as a right foot seen from a standing left one.
+
+    The walk begins with both feet side by side at x = 0, and the right one steps first.
+    """
+    feet = list_feet(footholds, feet_y)
+    views = ((feet[k - 1], feet[k], feet[k + 1], k % 2 == 1) for k in range(1, len(feet) - 1))
+    return [
+        (a.seen_from(stance, left, feet_y[0]), b.seen_from(stance, left, feet_y[0])) for a, stance, b, left in views
+    ]
+
+
+def list_feet(footholds: Sequence[Foothold], feet_y: tuple[float, float]) -> tuple[Foothold, ...]:
+    """Return the right and the left foot at the start, and the footholds."""
+    return Foothold(0.0, feet_y[1], 0.0), Foothold(0.0, feet_y[0], 0.0), *footholds
+
+
+def meets(standing: Array, foot: Foot, lifted: Foothold, landed: Foothold) -> bool:
+    """Return whether a foot that swings straight from foothold to foothold passes over a standing sole (4, 2)."""
+    shares = np.linspace(0.0, 1.0, SWING_SAMPLES)[:, None]
+    path = np.array(lifted) + shares * (np.array(landed) - np.array(lifted))
+    return not all(_separate(standing, Foothold(*place).outline(foot)) for place in path.tolist())
+
+
+def _separate(first: Array, second: Array) -> bool:
+    """Return whether a side of one of two rectangles (4, 2) separates them."""
+    for corners in (first, second):
+        for a, b in pairwise(corners[:3]):
+            one, other = ((outline @ (b - a)) for outline in (first, second))
+            if one.max() <= other.min() or other.max() <= one.min():
+                return True
+    return False
+
+
+def find_support_sides(soles: Sequence[Array]) -> Array:
+    """Return the sides (n, 3) of the hull of soles: outward unit normal, and its product with the points of the side [m]."""
+    corners = find_hull(np.concatenate(soles))
+    assert corners is not None  # soles have an area
+    along = np.roll(corners, -1, axis=0) - corners  # counter-clockwise
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+    return np.column_stack([normals, (normals * corners).sum(axis=1)])
