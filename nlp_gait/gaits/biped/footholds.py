@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,15 +30,19 @@ class Foothold(NamedTuple):
 
     def seen_from(self, stance: Foothold, left: bool, stance_y: float) -> Foothold:
         """Return it from a standing foot at (0, ``stance_y``) that points forward; mirrored unless that is the left one."""
-        x, y, yaw = self.x - stance.x, self.y - stance.y, self.yaw - stance.yaw
-        cos, sin, sign = math.cos(stance.yaw), math.sin(stance.yaw), 1.0 if left else -1.0
-        return Foothold(cos * x + sin * y, sign * (cos * y - sin * x) + stance_y, sign * yaw)
+        x, y = stance._replace(yaw=-stance.yaw).turn(self.x - stance.x, self.y - stance.y)
+        sign = 1.0 if left else -1.0
+        return Foothold(x, sign * y + stance_y, sign * (self.yaw - stance.yaw))
+
+    def turn(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return a vector (x, y) in the axes of the floor from one in its own axes; numbers or expressions."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return cos * x - sin * y, sin * x + cos * y
 
     def outline(self, foot: Foot) -> Array:
         """Return the corners (4, 2) of a sole on it [m]."""
-        corners = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m)[:, :2]
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        return np.array([self.x, self.y]) + corners @ np.array([[cos, sin], [-sin, cos]])
+        x, y, _ = make_rectangle(-foot.back_m, foot.front_m, -foot.right_m, foot.left_m).T
+        return np.array([self.x, self.y]) + np.stack(self.turn(x, y), axis=1)
 
 
 def parse_footholds(text: str) -> tuple[Foothold, ...]:
@@ -84,11 +88,9 @@ def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float
     """
     found, turn = [], math.radians(turn_deg)
     for k in range(1, steps + 1):
-        share = min(k / (steps - 1), 1.0)
-        yaw, side = share * turn, feet_y[k % 2]
-        radius = distance_m / turn
-        x, y = radius * math.sin(yaw) - side * math.sin(yaw), radius * (1 - math.cos(yaw)) + side * math.cos(yaw)
-        found.append(",".join(f"{value:.9g}" for value in (x, y, 0.0, math.degrees(yaw))))
+        yaw = min(k / (steps - 1), 1.0) * turn
+        x, y = Foothold(0.0, 0.0, yaw).turn(0.0, feet_y[k % 2] - distance_m / turn)
+        found.append(",".join(f"{value:.9g}" for value in (x, y + distance_m / turn, 0.0, math.degrees(yaw))))
     return ";".join(found)
 
 

@@ -9,61 +9,34 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
-from casadi import MX, SX
+from casadi import MX, SX, fmax
 
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Display,
-    GaitProblem,
-    Grid,
-    InstantPoint,
-    NumericPoint,
-    Parameter,
-    Point,
-    Signals,
-    SolverHints,
-    Variable,
-)
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Point, Signals, Variable
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
 from nlp_gait.gaits.biped.cycle_motion import between, make_cycle_variables, make_state_variables, read_state
-from nlp_gait.gaits.biped.double_support import (
-    compute_double_support_mean_margins,
-    make_double_support_margins,
-    make_support_box,
-)
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.joined_phases import (
-    ENERGY_PER_METRE,
-    STAND,
-    assemble_part,
-    collect_parameters,
-    join_phases,
-)
+from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner, Samples
-from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
-from nlp_gait.gaits.biped.walk_parts import DURATION
-from nlp_gait.gaits.biped.walk_start import start_walk
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
+from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins
+from nlp_gait.gaits.biped.walk import WholeWalk, make_walk_phases, make_walk_problem
+from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, make_phase_variables, make_pose_variables
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
 
 SHIFT = "shift_time_s"
-# Variables of a phase besides those of its first and last state, its swing and its duration: the right foot's foothold at both
-# ends, seen from the left foot.
+# Last variables of a phase: the right foot's foothold at both ends, seen from the left foot.
 RIGHT = tuple(f"right_{end}_{what}" for end in ("from", "to") for what in ("x_m", "y_m", "yaw_rad"))
 BESIDE = 1e-6  # [m, rad]; feet this close to their places at the start stand side by side
-FAR = 100.0  # bound of these, which are given
 LEAST_SLANT = 1e-2  # component of a side's normal along an axis, below which there is no distance to the side along it
 
 
@@ -79,21 +52,13 @@ class FootstepPart(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FootstepWalk:
+class FootstepWalk(WholeWalk):
     """A walk along footholds, sampled over all its phases."""
 
-    body: Body
     feet: tuple[Foothold, ...]  # right and left foot at the start, then where each step lands
-    variables: tuple[Variable, ...]
-    phases: Mapping[str, Phase]  # by kind; in double support with the margins of a stance side by side
-
-    @property
-    def steps(self) -> int:
-        """Number of swings."""
-        return len(self.feet) - 2
 
     @cached_property
-    def parts(self) -> dict[str, FootstepPart]:
+    def parts(self) -> dict[str, Any]:
         """All phases in the order of time, between the poses in which the robot stands; of these only the limits count."""
         swings = list_swings(self.feet[2:], self.body.feet_y)
         first = (swings[0][0],) * 2
@@ -104,95 +69,62 @@ class FootstepWalk:
         for k, (lifted, landed) in enumerate(swings, 1):
             begin, middle = f"step{k}_lift_off", f"step{k}_touch_down"
             end = f"step{k + 1}_lift_off" if k < self.steps else STAND
-            times = {kind: f"step{k}_{time}" for kind, time in TIMES.items()}
-            found[f"step{k}_ssp"] = FootstepPart("ssp", k, begin, middle, (lifted, landed), times["ssp"])
+            single, double = (f"step{k}_{time}" for time in TIMES.values())
             kind = STAND if np.allclose(landed, first[0], atol=BESIDE) else "dsp"
-            found[f"step{k}_dsp"] = FootstepPart(kind, k, middle, end, (landed, landed), times["dsp"])
-        return {**found, "rest": found[f"step{self.steps}_dsp"]._replace(begin=STAND)}
+            found[f"step{k}_ssp"] = FootstepPart("ssp", k, begin, middle, (lifted, landed), single)
+            found[f"step{k}_dsp"] = last = FootstepPart(kind, k, middle, end, (landed, landed), double)
+        return {**found, STAND_AT_END: last._replace(begin=STAND)}
 
-    @property
-    def moving(self) -> dict[str, FootstepPart]:
-        """The phases without the poses."""
-        return {name: part for name, part in self.parts.items() if name not in (STAND, "rest")}
+    def find_distance(self, at: Point, inner: MX) -> MX:
+        """Return the mean of the lengths of both feet's paths [m]."""
+        return MX(sum(math.dist(a[:2], b[:2]) for a, b in zip(self.feet, self.feet[2:], strict=False)) / 2)
 
-    @property
-    def distance_m(self) -> float:
-        """Mean of the lengths of both feet's paths."""
-        return sum(math.dist(a[:2], b[:2]) for a, b in zip(self.feet, self.feet[2:], strict=False)) / 2
+    def limit_phase(self, name: str) -> Phase:
+        """Return the phase with the limits of a part: in double support, the ZMP is limited by the hull of both soles."""
+        part = self.parts[name]
+        if part.kind != "dsp":
+            return self.phases[part.kind]
+        return replace_margins(self.phases["dsp"], make_stance_margins(self.body, part.right[1]))
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of all phases; those of balance begin with the kind of the phase."""
-        return tuple(sorted(collect_parameters(self.phases), key=lambda p: p.name.endswith((".lower", ".upper"))))
-
-    def assemble(self, at: Point, ops: Nonsmooth) -> Assembly:
-        """Return energy per metre, rows and indexes."""
-        points = {name: self.read_part(part, at) for name, part in self.parts.items()}
-        samples: dict[str, Samples] = {}
-        for kinds in (("ssp",), ("dsp", STAND)):  # double support differs in its limits only
-            names = [name for name, part in self.parts.items() if part.kind in kinds]
-            several = self.phases[kinds[0]].sample_several([points[name] for name in names], ops)
-            samples |= dict(zip(names, several, strict=True))
-        found = {
-            name: assemble_part(name, part.kind, self._limit_phase(part), points[name], samples[name], ops)
-            for name, part in self.parts.items()
-        }
-        energy = sum((found[name].indexes[f"{name}_power_W"] * points[name][DURATION] for name in self.moving), MX(0))
-        return Assembly(
-            objective=energy / self.distance_m,
-            constraints=tuple(row for part in found.values() for row in part.constraints),
-            indexes={
-                "energy_J": energy,
-                "distance_m": MX(self.distance_m),
-                "duration_s": sum((points[name][DURATION] for name in self.moving), MX(0)),
-                "energy_J_per_m": energy / self.distance_m,
-                **{name: value for part in found.values() for name, value in part.indexes.items()},
-            },
-        )
-
-    def _limit_phase(self, part: FootstepPart) -> Phase:
-        """Return the phase of a part: in double support, the ZMP is limited by the hull of both soles."""
-        phase = self.phases[part.kind]
-        return replace_margins(phase, make_stance_margins(self.body, part.right[1])) if part.kind == "dsp" else phase
-
-    def read_part(self, part: FootstepPart, at: NumericPoint) -> NumericPoint:
-        """Return the point of one phase: its own variables, see ``make_footstep_variables``, from those of the walk."""
+    def read_part(self, name: str, at: NumericPoint) -> NumericPoint:
+        """Return the point of one phase: its own variables, of which ``RIGHT`` are the last, from those of the walk."""
+        part = self.parts[name]
         lift = at[f"step{part.step}_{LIFT}"] if part.kind == "ssp" else 0.0
-        values = [value for state in (part.begin, part.end) for value in self._read_state(state, part, at)]
-        values += [lift, ca.fmax(at[part.duration], LEAST_DURATION), *part.right[0], *part.right[1]]
-        names = self.phases["ssp"].names
-        own = {n: p for n, p in at.positions.items() if p[0] == "p"} | {n: ("x", i) for i, n in enumerate(names)}
-        return replace(at, x=ca.vertcat(*values), positions=own)
+        values = [value for state in (part.begin, part.end) for value in self._read_footstep_state(state, part, at)]
+        values += [lift, fmax(at[part.duration], LEAST_DURATION), *part.right[0], *part.right[1]]
+        return self.make_part_point(at, values)
 
-    def _read_state(self, state: str, part: FootstepPart, at: NumericPoint) -> list[MX | float]:
+    def _read_footstep_state(self, state: str, part: FootstepPart, at: NumericPoint) -> list[MX | float]:
         """Values of a state in the order of ``make_state_variables``, seen from the standing foot of a part."""
         coordinates, right, y = self.body.coordinates, part.right[1], self.body.feet_y[0]
-        cos, sin = math.cos(right.yaw), math.sin(right.yaw)
         if state == STAND:  # between both feet, in the mean of their directions
-            angles = [at[f"{c.name}_{STAND}_rad"] if c.image > 0 else 0 for c in coordinates]
+            _, _, height, *still = super()._read_state(STAND, at)
             ahead, half = at[f"hip_x_{STAND}_m"], right.yaw / 2
-            place = right.x / 2 + math.cos(half) * ahead, (right.y + y) / 2 + math.sin(half) * ahead
-            return [*place, at[f"hip_z_{STAND}_m"], 0, 0, 0, *(v for angle in angles for v in (angle, 0))]
+            return [right.x / 2 + math.cos(half) * ahead, (right.y + y) / 2 + math.sin(half) * ahead, height, *still]
         names = [variable.name for variable in make_state_variables(self.body, state, "lift_off")]
         values = [at[name] for name in names]
         if state.startswith(f"step{part.step}_"):
             return values
         hip_x, hip_y, z, vx, vy, vz, *angles = values  # the mirror image, seen from the foot that has landed
         images = [c.image for c in coordinates for _ in range(2)]
-        (ahead, aside), (forward, leftward) = (hip_x, y - hip_y), (vx, -vy)
-        place = right.x + cos * ahead - sin * aside, right.y + sin * ahead + cos * aside
-        rate = cos * forward - sin * leftward, sin * forward + cos * leftward
-        return [*place, z, *rate, vz, *(image * angle for image, angle in zip(images, angles, strict=True))]
+        (place_x, place_y), velocity = right.turn(hip_x, y - hip_y), right.turn(vx, -vy)
+        return [
+            right.x + place_x,
+            right.y + place_y,
+            z,
+            *velocity,
+            vz,
+            *(i * a for i, a in zip(images, angles, strict=True)),
+        ]
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories of the whole walk at a point of numbers."""
         steps, places = [], []
-        for k in range(1, self.steps + 1):
-            own = [part for part in self.moving.values() if part.step == k]
-            steps.append(join_phases(self.phases[part.kind].signals(self.read_part(part, at)) for part in own))
-            x, y, yaw = self.feet[k]
-            aside = self.body.feet_y[(k + 1) % 2]
-            places.append((x + math.sin(yaw) * aside, y - math.cos(yaw) * aside, 0.0, yaw))
+        for k, stance in enumerate(self.feet[1:-1], 1):
+            own = [name for name, part in self.parts.items() if part.step == k and not name.startswith(STAND)]
+            steps.append(join_phases(self.phases[self.parts[n].kind].signals(self.read_part(n, at)) for n in own))
+            x, y = stance.turn(0.0, -self.body.feet_y[(k + 1) % 2])
+            places.append((stance.x + x, stance.y + y, 0.0, stance.yaw))
         return join_steps(steps, self.body.robot, np.array(places))
 
 
@@ -229,44 +161,28 @@ def make_footstep_planner(body: Body, swings: bool) -> Planner:
     def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
         begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
         hip, angles = between(begin, end, at[DURATION], phase)
-        starts, ends = [at[name] for name in RIGHT[:3]], [at[name] for name in RIGHT[3:]]
+        share, rise = constant_motion(1.0), constant_motion(0.0)
         if swings:
             share = cubic(SX(0), SX(1), SX(0), SX(0), at[DURATION], phase)
             rise = parabola_lift(share, 0.0, 1.0, at[LIFT])
-            x, y, yaw = (
-                Motion(a + (b - a) * share.position, (b - a) * share.velocity, (b - a) * share.acceleration)
-                for a, b in zip(starts, ends, strict=True)
-            )
-            foot = stack(x, y, rise._replace(position=rise.position + height))
-        else:
-            x, y, yaw = (Motion(place, SX(0), SX(0)) for place in ends)
-            foot = stack(x, y, constant_motion(height))
+        ends = zip(RIGHT[:3], RIGHT[3:], strict=True)
+        x, y, yaw = (
+            Motion(at[a] + (at[b] - at[a]) * share[0], *((at[b] - at[a]) * s for s in share[1:])) for a, b in ends
+        )
+        foot = stack(x, y, rise._replace(position=rise.position + height))
         turns = {TORSO_YAW: Motion(*(part / 2 for part in yaw)), RIGHT_YAW: yaw}
         return body.plan(hip, {**body.cycle_angles(angles), **turns}, {"L": left, "R": foot}, at[REACH_MARGIN], ops)
 
     return plan
 
 
-def make_footstep_variables(body: Body) -> tuple[Variable, ...]:
-    """Return the variables of one phase: states at both ends, height of the swing, duration, footholds of the right foot."""
-    states = [
-        *make_state_variables(body, "begin", "lift_off"),
-        *make_state_variables(body, "end", "touch_down"),
-    ]
-    footholds = (
-        Variable(name=name, unit=name.rpartition("_")[2], lower=-FAR, upper=FAR, description="of the right foot")
-        for name in RIGHT
-    )
-    return (*states, body.lift_variable, replace(body.make_time_variable("ssp"), name=DURATION), *footholds)
-
-
-def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
+def make_footstep_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     """Return the variables of a walk of so many steps: the pose at both ends, and states, swing and times of each step."""
-    own = {variable.name: variable for variable in make_cycle_variables(body)}
-    pose = ["hip_x_{}_m", "hip_z_{}_m", *(f"{c.name}_{{}}_rad" for c in body.coordinates if c.image > 0)]
-    found = [replace(own[name.format("lift_off")], name=name.format(STAND)) for name in pose]
-    found = [replace(v, description=v.description.replace("at lift-off", "standing")) for v in found]
-    found.append(replace(body.make_time_variable("dsp"), name=SHIFT, description="duration of the first weight shift"))
+    own: Mapping[str, Variable] = {variable.name: variable for variable in make_cycle_variables(body)}
+    found = [
+        *make_pose_variables(body),
+        replace(own[TIMES["dsp"]], name=SHIFT, description="duration of the phase shift"),
+    ]
     for k in range(1, steps + 1):
         for switch in ("lift_off", "touch_down"):
             found += make_state_variables(body, f"step{k}_{switch}", switch)
@@ -276,45 +192,20 @@ def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
 
 
 def plan_footstep_walk(
-    body: Body, footholds: tuple[Foothold, ...], grid: Grid, goal: Goal, sharing: LoadSharing
+    body: Body, footholds: tuple[Foothold, ...], steps: int, grid: Grid, goal: Goal, sharing: LoadSharing
 ) -> GaitProblem:
     """Return the problem of a walk along footholds, the right foot's first, with least energy per metre."""
+    if steps != len(footholds):
+        raise InputError(f"steps must be the number of footholds, {len(footholds)}, got {steps}")
     body = replace(body, upright=frozenset())  # a swinging foot turns
-    feet, foot = list_feet(footholds, body.feet_y), body.robot.feet["left"]
-    right, left, *_ = feet
-    box = make_support_box(body.robot, {"L": left[:2], "R": right[:2]})
-    margins = {
-        "ssp": (body.make_sole_margins(left[:2]), compute_single_support_mean_margins(foot)),
-        STAND: (make_double_support_margins(box), compute_double_support_mean_margins(box)),
-    }
-    phases = {
-        kind: Phase(
-            body=body,
-            variables=make_footstep_variables(body),
-            duration=DURATION,
-            plan=make_footstep_planner(body, swings=kind == "ssp"),
-            loads=make_single_support_loads(body) if kind == "ssp" else sharing.loads,
-            grid=grid,
-            limits=(*make_phase_limits(body, *own), *body.motors.limits),
-            goal=goal,
-        )
-        for kind, own in margins.items()
-    }
-    phases["dsp"] = replace_margins(phases[STAND], make_stance_margins(body, right))
-    variables = make_walk_variables(body, len(footholds))
-    wide = tuple(
+    feet, (*others, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
+    given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
+    planners = [make_footstep_planner(body, swings) for swings in (False, True)]
+    phases = make_walk_phases(body, (*others[:-1], *given), planners, sharing, grid, goal)
+    phases["dsp"] = replace_margins(phases["dsp"], make_stance_margins(body, feet[0]))
+    variables = make_footstep_variables(body, steps)
+    both_ways = tuple(
         replace(v, lower=min(v.lower, -v.upper)) if v.name.startswith(("hip_x", "hip_vx")) else v for v in variables
     )
-    walk = FootstepWalk(body=body, feet=feet, variables=wide, phases=phases)
-    problem = GaitProblem(
-        name=f"{body.family}-walk",
-        title=f"{body.title}, walk along footholds: least energy per metre",
-        variables=wide,
-        own_parameters=walk.parameters,
-        objective=ENERGY_PER_METRE,
-        assemble=walk.assemble,
-        grid=grid,
-        display=Display(motion=walk.signals, durations=tuple(part.duration for part in walk.moving.values())),
-        hints=SolverHints(start=partial(start_walk, variables, 0.0), starts=3, searchable=False),
-    )
-    return add_robot(problem, body, steps=walk.steps)
+    walk = FootstepWalk(body=body, steps=steps, feet=feet, variables=both_ways, phases=phases)
+    return make_walk_problem(walk, variables)

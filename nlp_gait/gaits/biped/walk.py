@@ -8,9 +8,9 @@ positions and velocities for any x. A walk of two half steps has no inner step, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import casadi as ca
 import numpy as np
@@ -33,6 +33,7 @@ from nlp_gait.formulation import (
     Variable,
 )
 from nlp_gait.formulation.assembly import parameters
+from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import (
@@ -61,7 +62,7 @@ from nlp_gait.gaits.biped.limits import RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Samples
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Planner, Samples
 from nlp_gait.gaits.biped.single_support import make_single_support_loads
 from nlp_gait.gaits.biped.walk_parts import (
     CYCLE_END,
@@ -71,6 +72,7 @@ from nlp_gait.gaits.biped.walk_parts import (
     LEAST_SPEED,
     PARTS,
     RIGHT_FROM,
+    STAND_AT_END,
     Part,
     make_phase_variables,
     make_walk_variables,
@@ -99,7 +101,7 @@ class WholeWalk:
         """Height that each step gains."""
         return 0.0 if self.flight is None else self.flight.rise_m
 
-    @property
+    @cached_property
     def parts(self) -> dict[str, Part]:
         """The phases that it consists of: without those of the inner steps if there are none."""
         return {name: part for name, part in PARTS.items() if self.steps > HALF_STEPS or name not in TIMES}
@@ -107,7 +109,7 @@ class WholeWalk:
     @property
     def counts(self) -> dict[str, int]:
         """How often each part occurs in the walk."""
-        often = {STAND: 0, "ssp": self.steps - HALF_STEPS, "dsp": self.steps - HALF_STEPS}
+        often = {STAND: 0, STAND_AT_END: 0, "ssp": self.steps - HALF_STEPS, "dsp": self.steps - HALF_STEPS}
         return {name: often.get(name, 1) for name in self.parts}
 
     @property
@@ -134,17 +136,17 @@ class WholeWalk:
             several = self.phases[kinds[0]].sample_several([points[name] for name in names], ops)
             samples |= dict(zip(names, several, strict=True))
         found = {
-            name: assemble_part(name, part.kind, self.phases[part.kind], points[name], samples[name], ops)
+            name: assemble_part(name, part.kind, self.limit_phase(name), points[name], samples[name], ops)
             for name, part in parts.items()
         }
         times = {name: point[DURATION] for name, point in points.items()}
         energies = {name: found[name].indexes[f"{name}_power_W"] * times[name] for name in parts}
         inner = at[STEPS] - HALF_STEPS
         energy, duration = (
-            sum((part[name] * (inner if name in TIMES else 1) for name in parts if name != STAND), MX(0))
+            sum((part[name] * (inner if name in TIMES else 1) for name in parts if not name.startswith(STAND)), MX(0))
             for part in (energies, times)
         )
-        distance = (inner + 1) * at[STEP]
+        distance = self.find_distance(at, inner)
         speeds, indexes = self._limit_speed(at, times, energies) if "ssp" in parts else ((), {})
         return Assembly(
             objective=energy / distance,
@@ -158,6 +160,14 @@ class WholeWalk:
                 **{name: value for part in found.values() for name, value in part.indexes.items()},
             },
         )
+
+    def find_distance(self, at: Point, inner: MX) -> MX:
+        """Return the distance that the feet advance with so many inner steps [m]."""
+        return (inner + 1) * at[STEP]
+
+    def limit_phase(self, name: str) -> Phase:
+        """Return the phase with the limits of a part."""
+        return self.phases[self.parts[name].kind]
 
     def _limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
         """Return the row and the indexes of the inner steps."""
@@ -180,9 +190,14 @@ class WholeWalk:
         lift = at[part.lift] if part.kind == "ssp" else 0.0
         values = [*self._read_state(part.begin, at), *self._read_state(part.end, at), lift]
         values += [ca.fmax(at[part.duration], LEAST_DURATION), part.feet[0] * step, part.feet[1] * step]
-        names = [variable.name for variable in self.phases["ssp"].variables]
+        return self.make_part_point(at, values)
+
+    def make_part_point(self, at: NumericPoint, values: Sequence[MX | float]) -> NumericPoint:
+        """Return the point of a phase from the values of its variables."""
         own = replace(at, x=ca.vertcat(*values), positions={n: p for n, p in at.positions.items() if p[0] == "p"})
-        return replace(own, positions={**own.positions, **{n: ("x", i) for i, n in enumerate(names)}})
+        return replace(
+            own, positions={**own.positions, **{n: ("x", i) for i, n in enumerate(self.phases["ssp"].names)}}
+        )
 
     def _read_state(self, state: str, at: NumericPoint) -> list[MX]:
         """Values of a state in the order of ``make_state_variables``."""
@@ -219,20 +234,38 @@ def make_whole_walk(
     body: Body, steps: int, sharing: LoadSharing, grid: Grid, goal: Goal, flight: Flight | None
 ) -> WholeWalk:
     """Return the phases of a walk of so many swings, joined."""
-    margins = make_cycle_margins(body)
-    box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
-    beside = make_double_support_margins(box), compute_double_support_mean_margins(box)
 
     def read(at: InstantPoint, swings: bool) -> PhaseMotion:
         begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
         return PhaseMotion(begin, end, at[DURATION], at[RIGHT_FROM], at[STEP], at[LIFT] if swings else None)
 
-    phases = {
+    planners = [make_planner(body, partial(read, swings=swings), flight) for swings in (False, True)]
+    phases = make_walk_phases(body, make_phase_variables(body), planners, sharing, grid, goal)
+    variables = make_walk_variables(body, steps)
+    if flight is not None:
+        flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
+        variables = tuple(_raise_lift(variable, body, flight) for variable in variables)
+    return WholeWalk(body=body, steps=steps, variables=variables, phases=phases, flight=flight)
+
+
+def make_walk_phases(
+    body: Body,
+    variables: tuple[Variable, ...],
+    planners: Sequence[Planner],
+    sharing: LoadSharing,
+    grid: Grid,
+    goal: Goal,
+) -> dict[str, Phase]:
+    """Return the phases by kind; planners are those of a right foot that stands, and of one that swings."""
+    margins = make_cycle_margins(body)
+    box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
+    beside = make_double_support_margins(box), compute_double_support_mean_margins(box)
+    return {
         kind: Phase(
             body=body,
-            variables=make_phase_variables(body),
+            variables=variables,
             duration=DURATION,
-            plan=make_planner(body, partial(read, swings=kind == "ssp"), flight),
+            plan=planners[kind == "ssp"],
             loads=make_single_support_loads(body) if kind == "ssp" else sharing.loads,
             grid=grid,
             limits=(*make_phase_limits(body, *own), *body.motors.limits),
@@ -240,11 +273,6 @@ def make_whole_walk(
         )
         for kind, own in {"ssp": margins["ssp"], "dsp": margins["dsp"], STAND: beside}.items()
     }
-    variables = make_walk_variables(body, steps)
-    if flight is not None:
-        flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
-        variables = tuple(_raise_lift(variable, body, flight) for variable in variables)
-    return WholeWalk(body=body, steps=steps, variables=variables, phases=phases, flight=flight)
 
 
 def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
@@ -261,7 +289,19 @@ def plan_whole_walk(
     """Return the problem of a whole walk of least energy per metre; for the options see ``gaits.nao``."""
     steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
     walk = make_whole_walk(body, steps, sharing, grid, goal, flight)
-    durations = [PARTS[name].duration for name, count in walk.counts.items() for _ in range(count)]
+    if flight is None:
+        return make_walk_problem(walk, walk.variables)
+    treads = flight.list_treads(steps - 1)
+    return make_walk_problem(walk, walk.variables, lambda at, count: treads).fix(**{STEP: flight.run_m})
+
+
+def make_walk_problem(
+    walk: WholeWalk,
+    started: Sequence[Variable],
+    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
+) -> GaitProblem:
+    """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
+    body = walk.body
     problem = GaitProblem(
         name=f"{body.family}-walk",
         title=f"{body.title}, walk from standing to standing: least energy per metre",
@@ -269,14 +309,12 @@ def plan_whole_walk(
         own_parameters=walk.parameters,
         objective=ENERGY_PER_METRE,
         assemble=walk.assemble,
-        grid=grid,
+        grid=walk.phases["ssp"].grid,
         rows_over_time=walk.rows_over_time if body.closed_form else (),
-        display=Display(motion=walk.signals, durations=tuple(durations)),
-        hints=SolverHints(
-            start=partial(start_walk, walk.variables, math.tan(body.slope_rad)), starts=3, searchable=False
+        display=Display(
+            motion=walk.signals,
+            durations=tuple(walk.parts[name].duration for name, count in walk.counts.items() for _ in range(count)),
         ),
+        hints=SolverHints(start=partial(start_walk, started, math.tan(body.slope_rad)), starts=3, searchable=False),
     )
-    if flight is None:
-        return add_robot(problem, body, steps=steps)
-    treads = flight.list_treads(steps - 1)
-    return add_robot(problem, body, steps=steps, ground=lambda at, count: treads).fix(**{STEP: flight.run_m})
+    return add_robot(problem, body, steps=walk.steps, ground=ground)

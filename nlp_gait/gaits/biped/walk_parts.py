@@ -10,7 +10,7 @@ from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
 from nlp_gait.gaits.biped.cycle_motion import make_cycle_variables, make_state_variables
 from nlp_gait.gaits.biped.joined_phases import STAND
 
-CYCLE_END = "cycle_end"
+CYCLE_END, STAND_AT_END = "cycle_end", "stand_at_end"
 HALF_STEPS = 2  # the first and the last step are half steps
 LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
 # Variables of a phase besides those of its first and last state.
@@ -72,12 +72,7 @@ def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     found = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
     for name, switch in STATES.items():
         found += make_state_variables(body, name, switch)
-    # The pose at both ends is symmetric and at rest, so the other coordinates are zero.
-    pose = ["hip_x_{}_m", "hip_z_{}_m", *(f"{c.name}_{{}}_rad" for c in body.coordinates if c.image > 0)]
-    for name in pose:
-        variable = own[name.format("lift_off")]
-        text = variable.description.replace("at lift-off", "standing")
-        found.append(replace(variable, name=name.format(STAND), description=text))
+    found += make_pose_variables(body)
     for name, part in PARTS.items():
         if name in (STAND, *TIMES):
             continue
@@ -88,3 +83,11 @@ def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
             words = f"{body.lift_variable.description}, phase {name}"
             found.append(replace(body.lift_variable, name=part.lift, description=words))
     return tuple(found)
+
+
+def make_pose_variables(body: Body) -> list[Variable]:
+    """Return the variables of the pose at both ends: symmetric and at rest, so that the other coordinates are zero."""
+    names = ["hip_x_{}_m", "hip_z_{}_m", *(f"{c.name}_{{}}_rad" for c in body.coordinates if c.image > 0)]
+    own = {v.name: v for v in make_state_variables(body, STAND, "lift_off")}
+    found = (own[name.format(STAND)] for name in names)
+    return [replace(v, description=v.description.replace("at stand", "standing")) for v in found]

@@ -130,10 +130,8 @@ def humanoid_walk(
         if slope_deg or stair_rise_m or stair_run_m:
             raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")
         places = parse_footholds(footholds)
-        if len(places) != steps:
-            raise InputError(f"steps must be the number of footholds, {len(places)}, got {steps}")
         check_turns(body, places)
-        return plan_footstep_walk(body, places, grid, goal, sharing)
+        return plan_footstep_walk(body, places, steps, grid, goal, sharing)
     flight = None
     if stair_rise_m or stair_run_m:
         flight = Flight(
