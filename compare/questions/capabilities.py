@@ -8,11 +8,13 @@ from typing import ClassVar, NamedTuple
 
 from compare.analysis.units import choose_natural_step, join_words, with_unit
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
+from nlp_gait.backends.plan_walk import find_walk
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, GaitProblem, Objective, Point
 from nlp_gait.formulation.solution import ActiveConstraint, Solution
+from nlp_gait.gaits.capabilities import SHARPEST_TURNS, resolve
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 
@@ -130,7 +132,7 @@ class Capabilities(Question[tuple[Capability, ...]]):
         return Answer(
             stem=stem,
             title=f"What {robot.name if robot is not None else self.problem.name} can do",
-            verdict=tuple(describe_capability(c) for c in findings),
+            verdict=(*(describe_capability(c) for c in findings), *describe_sharpest_turn(self.problem)),
             parts=[
                 make_table("Greatest values of a walking cycle, and the limits that stop it", findings, columns),
                 "Each value is the maximum of a walking cycle under all limits of the problem; limits are listed by what a "
@@ -210,6 +212,17 @@ def move_bound(problem: GaitProblem, stop: Stop) -> tuple[str, float]:
     outwards = (stop.side == "upper") == (stop.bound > 0.0)
     wider = stop.bound * FACTOR if outwards else stop.bound / FACTOR
     return f"{variable}.{stop.side}", wider
+
+
+def describe_sharpest_turn(problem: GaitProblem) -> list[str]:
+    """Return the sharpest turn that footholds allow in a sentence; nothing for cycles of robots that do not turn."""
+    if problem.name not in SHARPEST_TURNS or find_walk(str(problem.options["robot"])) == "nao-walk":
+        return []
+    turn = resolve(SHARPEST_TURNS, problem.name)(problem.options["robot"])
+    return [
+        f"sharpest turn that joints and soles allow: {turn.turn_deg:g} degrees with each step of {turn.step_m:.3g} m; "
+        f"if it is sharper, {turn.stopped_by}."
+    ]
 
 
 def describe_stops(found: Round | None) -> str:

@@ -37,6 +37,8 @@ SHIFT = "shift_time_s"
 # Last variables of a phase: the right foot's foothold at both ends, seen from the left foot.
 RIGHT = tuple(f"right_{end}_{what}" for end in ("from", "to") for what in ("x_m", "y_m", "yaw_rad"))
 BESIDE = 1e-6  # [m, rad]; feet this close to their places at the start stand side by side
+# Of the sole in x and y, least distance of the ZMP from its edges in single support: without it, JVRC-1 falls after a turn.
+LEAST_SHARE = 1 / 8
 LEAST_SLANT = 1e-2  # component of a side's normal along an axis, below which there is no distance to the side along it
 
 
@@ -202,6 +204,10 @@ def plan_footstep_walk(
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
     planners = [make_footstep_planner(body, swings) for swings in (False, True)]
     phases = make_walk_phases(body, (*others[:-1], *given), planners, sharing, grid, goal)
+    sole, margins = body.robot.feet["left"], body.make_sole_margins((0.0, body.feet_y[0]))
+    least = round((sole.back_m + sole.front_m) * LEAST_SHARE, 4), round((sole.left_m + sole.right_m) * LEAST_SHARE, 4)
+    single = BalanceMargins(margins, compute_single_support_mean_margins(sole), least)
+    phases["ssp"] = replace_margins(phases["ssp"], single)
     phases["dsp"] = replace_margins(phases["dsp"], make_stance_margins(body, feet[0]))
     variables = make_footstep_variables(body, steps)
     both_ways = tuple(

@@ -170,15 +170,17 @@ class TorqueChange(Limit):
 class BalanceMargins(Limit):
     """Least dynamic balance margins, at every sample and in the mean (sections 3.1, 3.2, 4.1 and 4.2).
 
-    ``mean_limits_m`` are the defaults of the least mean margins in x and y [m].
+    ``mean_limits_m`` are the defaults of the least mean margins in x and y, ``least_m`` those of the margins at samples [m].
     """
 
-    def __init__(self, margins: Margins, mean_limits_m: tuple[float, float]) -> None:
+    def __init__(
+        self, margins: Margins, mean_limits_m: tuple[float, float], least_m: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
         self._margins = margins
-        x, y = mean_limits_m
+        (x, y), (least_x, least_y) = mean_limits_m, least_m
         self.parameters = table(
-            ("dbm_x_min_limit_m", "m", 0.0, "least balance margin in x", -math.inf, math.inf),
-            ("dbm_y_min_limit_m", "m", 0.0, "least balance margin in y", -math.inf, math.inf),
+            ("dbm_x_min_limit_m", "m", least_x, "least balance margin in x", -math.inf, math.inf),
+            ("dbm_y_min_limit_m", "m", least_y, "least balance margin in y", -math.inf, math.inf),
             ("dbm_x_mean_limit_m", "m", x, "least mean margin in x", -math.inf, math.inf),
             ("dbm_y_mean_limit_m", "m", y, "least mean margin in y", -math.inf, math.inf),
         )

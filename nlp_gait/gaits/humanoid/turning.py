@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from nlp_gait.errors import InputError, check_count
 from nlp_gait.gaits.biped.footholds import Foothold, list_arc, list_swings, meets, parse_footholds
-from nlp_gait.gaits.humanoid.body import Humanoid
+from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.robots.biped import Biped
 
 UPRIGHT = 0.9  # vertical component of the axis of a joint that turns a leg
@@ -19,9 +19,10 @@ USUAL_TURN_DEG, STEP_SHARE = 15.0, 2 / 3  # of a step by default: its angle, and
 
 
 class SharpestTurn(NamedTuple):
-    """Greatest angle between consecutive footholds of a turn."""
+    """Greatest angle between consecutive footholds of a turn with steps of a length."""
 
     turn_deg: float
+    step_m: float
     stopped_by: str
 
 
@@ -89,6 +90,12 @@ def list_turn(body: Humanoid, turn_deg: float, steps: int | None, distance_m: fl
     return list_arc(turn_deg, count, step_m * (count - 1), body.feet_y)
 
 
+def find_robots_sharpest_turn(robot: str) -> SharpestTurn:
+    """Return the sharpest turn with the steps of turns by default; raises GaitError as ``make_humanoid``."""
+    body = make_humanoid(robot)
+    return find_sharpest_turn(body, STEP_SHARE * body.step_length_m)
+
+
 def find_sharpest_turn(body: Humanoid, step_m: float) -> SharpestTurn:
     """Return the sharpest turn of equal steps of a length [m], to a half degree, and what stops a sharper one."""
     angle = 0.0
@@ -96,5 +103,5 @@ def find_sharpest_turn(body: Humanoid, step_m: float) -> SharpestTurn:
         wider = angle + FINE_DEG
         arc = list_arc(ARC_STEPS * wider, ARC_STEPS + 1, ARC_STEPS * step_m, body.feet_y)
         if stop := find_turn_stop(body, parse_footholds(arc)):
-            return SharpestTurn(angle, stop)
+            return SharpestTurn(angle, step_m, stop)
         angle = wider

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 from casadi import MX
 
-from compare.questions.capabilities import Capabilities, Capability
+from compare.questions.capabilities import Capabilities, Capability, describe_sharpest_turn
 from compare.questions.question import Work, find
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Objective, Parameter, Point, Variable, load
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.robots.crooked import crooked
 
 MOST_ACCELERATION, LONGEST = 0.32, 0.5  # [m/s^2], [m]
 
@@ -87,3 +88,10 @@ def test_the_answer_says_what_stops_it_and_whose_bounds_these_are(
 def test_a_problem_without_steps_is_refused() -> None:
     with pytest.raises(InputError, match=r"nao-dsp has no variable 'step_length_m'; use nao-cycle or humanoid-cycle"):
         Capabilities(problem=load("nao-dsp"))
+
+
+def test_robots_that_turn_have_a_sharpest_turn(tmp_path: Path) -> None:
+    pytest.importorskip("urdf_parser_py")
+    (sentence,) = describe_sharpest_turn(load("humanoid-cycle", robot=crooked(tmp_path), intervals=2))
+    assert sentence.startswith("sharpest turn that joints and soles allow: ") and "if it is sharper, " in sentence
+    assert not describe_sharpest_turn(load("humanoid-cycle", intervals=2))
