@@ -14,7 +14,8 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, GaitProblem, Objective, Point
 from nlp_gait.formulation.solution import ActiveConstraint, Solution
-from nlp_gait.gaits.capabilities import SHARPEST_TURNS, resolve
+from nlp_gait.gaits.humanoid.body import make_humanoid
+from nlp_gait.gaits.humanoid.turning import find_sharpest_turn
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 
@@ -215,10 +216,11 @@ def move_bound(problem: GaitProblem, stop: Stop) -> tuple[str, float]:
 
 
 def describe_sharpest_turn(problem: GaitProblem) -> list[str]:
-    """Return the sharpest turn that footholds allow in a sentence; nothing for cycles of robots that do not turn."""
-    if problem.name not in SHARPEST_TURNS or find_walk(str(problem.options["robot"])) == "nao-walk":
+    """Return the sharpest turn that footholds allow in a sentence; nothing for robots that do not turn."""
+    robot = problem.options.get("robot")
+    if not isinstance(robot, str) or find_walk(robot) == "nao-walk":
         return []
-    turn = resolve(SHARPEST_TURNS, problem.name)(problem.options["robot"])
+    turn = find_sharpest_turn(make_humanoid(robot))
     return [
         f"sharpest turn that joints and soles allow: {turn.turn_deg:g} degrees with each step of {turn.step_m:.3g} m; "
         f"if it is sharper, {turn.stopped_by}."

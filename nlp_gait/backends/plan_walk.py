@@ -124,17 +124,9 @@ def plan_walk(
             raise InputError(
                 "a walk that turns is on a level floor and has no given speed; leave out speed, slope and stairs"
             )
-        if name == "nao-walk":
-            raise InputError(
-                f"robot {robot!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns alone; "
-                "turns are planned for legs whose hip joints turn one by one"
-            )
         if footholds is not None and (turn_deg, steps, distance_m) != (0.0, None, None):
             raise InputError("footholds determine steps, distance and turn; leave out steps, distance and turn")
-        body = make_humanoid(robot)
-        text = read_footholds(footholds) if footholds else list_turn(body, turn_deg, steps, distance_m)
-        swings = list_swings(parse_footholds(text), body.feet_y)
-        ahead = sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)
+        text, ahead = _list_footholds(robot, footholds, turn_deg, steps, distance_m)
         steps, distance_m, more = text.count(";") + 1, None, {"footholds": text}
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
     problem = load(name, robot=robot, steps=count, intervals=intervals, slope_deg=slope_deg, **more)
@@ -159,6 +151,21 @@ def plan_walk(
         least, most = (cycle.value(f"{STEP}.{end}") for end in ("lower", "upper"))
         cycle = cycle.fix(**{STEP: min(max(ahead, least), most)})
     return _solve(problem, cycle, starts, progress)
+
+
+def _list_footholds(
+    robot: str, path: str | Path | None, turn_deg: float, steps: int | None, distance_m: float | None
+) -> tuple[str, float]:
+    """Return the footholds of a file or of a turn, and the mean length of their steps [m]."""
+    if find_walk(robot) == "nao-walk":
+        raise InputError(
+            f"robot {robot!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns alone; "
+            "turns are planned for legs whose hip joints turn one by one"
+        )
+    body = make_humanoid(robot)
+    text = list_turn(body, turn_deg, steps, distance_m) if path is None else read_footholds(path)
+    swings = list_swings(parse_footholds(text), body.feet_y)
+    return text, sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)
 
 
 def _parse_stairs(text: str) -> tuple[float, float, int]:

@@ -19,8 +19,6 @@ CART_TABLE_BODIES = {
 }
 # Fits free joints to a planned motion, by the problem with free joints.
 FITTED_STARTS = {"nao-ssp-free": _NAO_FITTED, "nao-dsp-free": _NAO_FITTED}
-# Finds the sharpest turn of a robot by name or file, by the walking cycle.
-SHARPEST_TURNS = {"humanoid-cycle": "nlp_gait.gaits.humanoid.turning:find_robots_sharpest_turn"}
 
 
 def resolve(functions: Mapping[str, str], problem: str) -> Any:

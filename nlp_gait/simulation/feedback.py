@@ -173,6 +173,8 @@ class Balance:
         self._engine.mj_kinematics(self._model, posture)
         self._engine.mj_comPos(self._model, posture)
         attitude = posture.site_xmat[self._at.soles[standing]].reshape(3, 3).T
+        (x, y, z), (cos, sin) = attitude, self._plan.direction(standing, at)[0]
+        attitude = np.stack([cos * x - sin * y, sin * x + cos * y, z])
         return attitude, posture.site_xpos[self._at.soles] - posture.xpos[self._at.torso]
 
 

@@ -89,6 +89,12 @@ class Plan:
         w, x, y, z = self.attitude(times).T
         return np.asarray(np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
 
+    def direction(self, foot: int, times: Array) -> Array:
+        """Return the planned direction (T, 2) of a sole by its number in ``SIDES``, its cosine and sine."""
+        samples = self.signals.arrays
+        yaw = np.interp(times, samples["t"], samples["feet_yaw"][:, foot]) if "feet_yaw" in samples else 0.0 * times
+        return np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+
     @property
     def spin_at_start(self) -> Array:
         """(3,) planned angular velocity of the root at time zero, in its own axes [rad/s]."""

@@ -186,13 +186,14 @@ def test_a_hip_joint_limits_the_angle_between_the_feet(tmp_path: Path) -> None:
         ("0,0,0", r"foothold 1 must be four numbers x_m,y_m,z_m,yaw_deg, got '0,0,0'"),
         ("0.05,-0.05,0.1,0", r"foothold 1 is 0.1 m high, but footholds are planned on a level floor"),
         ("0.05,nan,0,0", r"foothold 1 must have finite numbers"),
-        ("0.05,0.05,0,0", r"in step 1 the swinging sole passes over the standing one; take more steps"),
-        ("0.05,-0.05,0,0;0.05,0.05,0,0", r"steps must be the number of footholds, 2, got 1"),
+        ("0,-0.05,0,0", r"a walk has 2 to 100 footholds, got 1"),
+        ("0.05,0.05,0,0;0.05,0.05,0,0", r"in step 1 the swinging sole passes over the standing one; take more steps"),
+        ("0.05,-0.05,0,0;0.05,0.05,0,0;0.1,-0.05,0,0", r"steps must be the number of footholds, 3, got 4"),
     ],
 )
 def test_footholds_that_cannot_be_walked_are_refused(footholds: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        nlp_gait.load("humanoid-walk", steps=1 if "got 1" in words else footholds.count(";") + 1, footholds=footholds)
+        nlp_gait.load("humanoid-walk", steps=footholds.count(";") + (2 if "got 4" in words else 1), footholds=footholds)
 
 
 @pytest.mark.parametrize(

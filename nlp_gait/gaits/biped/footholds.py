@@ -64,8 +64,8 @@ def parse_footholds(text: str) -> tuple[Foothold, ...]:
                 f"foothold {k} is {z:g} m high, but footholds are planned on a level floor; write 0, or climb with stairs"
             )
         found.append(Foothold(x, y, math.radians(yaw)))
-    if not 1 <= len(found) <= MOST_FOOTHOLDS:
-        raise InputError(f"a walk has 1 to {MOST_FOOTHOLDS} footholds, got {len(found)}")
+    if not 2 <= len(found) <= MOST_FOOTHOLDS:
+        raise InputError(f"a walk has 2 to {MOST_FOOTHOLDS} footholds, got {len(found)}")
     return tuple(found)
 
 
@@ -75,10 +75,10 @@ def read_footholds(path: str | Path) -> str:
     Raises:
         InputError: it cannot be read, or has another header.
     """
-    header, *rows = (line.strip() for line in read_text(Path(path), "footholds").splitlines() if line.strip()) or ("",)
+    header, *rows = read_text(Path(path), "footholds").strip().splitlines() or [""]
     if header.replace(" ", "") != COLUMNS:
         raise InputError(f"{path}: the first line must be {COLUMNS}, got {header!r}")
-    return ";".join(rows)
+    return ";".join(row for row in rows if row.strip())
 
 
 def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float, float]) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from nlp_gait.errors import InputError, check_count
 from nlp_gait.gaits.biped.footholds import Foothold, list_arc, list_swings, meets, parse_footholds
-from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
+from nlp_gait.gaits.humanoid.body import Humanoid
 from nlp_gait.robots.biped import Biped
 
 UPRIGHT = 0.9  # vertical component of the axis of a joint that turns a leg
@@ -26,27 +29,17 @@ class SharpestTurn(NamedTuple):
     stopped_by: str
 
 
-def find_yaw_limits(biped: Biped) -> dict[str, tuple[float, float, str]]:
-    """Return the least and the greatest yaw of each foot from the torso [rad] and the joint; only of legs with such a joint."""
-    found = {}
-    for side, leg in biped.legs.items():
-        for axis, limits, joint in zip(leg.axes[:3], leg.limits_rad, leg.joints, strict=False):
-            if abs(axis[2]) > UPRIGHT:
-                low, high = sorted((axis[2] > 0 or -1) * float(limit) for limit in limits)
-                found[side] = (low, high, joint)
-    return found
-
-
 def find_stiff_joint(biped: Biped, yaw: float) -> tuple[str, float] | None:
-    """Return the hip joint that does not allow a yaw of the right foot from the left one [rad], and the yaw that it allows.
+    """Return the hip joint that does not allow a yaw of the right foot from the left one [rad], and the largest that it allows.
 
-    The torso points into the mean of both feet's directions.
+    The torso points into the mean of both feet's directions, and a joint about the vertical turns each leg from there.
     """
-    for side, (low, high, joint) in find_yaw_limits(biped).items():
-        sign = 1.0 if side == "right" else -1.0
-        allowed = 2 * sign * min(max(sign * yaw / 2, low), high)
-        if abs(allowed - yaw) > 1e-9:
-            return joint, allowed
+    for side, leg in biped.legs.items():
+        turn = (yaw if side == "right" else -yaw) / 2
+        for axis, (low, high), joint in zip(leg.axes[:3], leg.limits_rad, leg.joints, strict=False):
+            angle = turn * np.sign(axis[2])
+            if abs(axis[2]) > UPRIGHT and not low <= angle <= high:
+                return joint, 2 * abs(float(low if angle < low else high))
     return None
 
 
@@ -55,11 +48,8 @@ def find_turn_stop(body: Humanoid, footholds: Sequence[Foothold]) -> str | None:
     standing = Foothold(0.0, body.feet_y[0], 0.0).outline(body.robot.feet["left"])
     for k, (lifted, landed) in enumerate(list_swings(footholds, body.feet_y), 1):
         if stiff := find_stiff_joint(body.biped, landed.yaw):
-            joint, allowed = stiff
-            return (
-                f"step {k} turns by {math.degrees(abs(landed.yaw)):.3g} degrees, and the limits of {joint} allow "
-                f"{math.degrees(abs(allowed)):.3g}"
-            )
+            turned, allowed = (math.degrees(angle) for angle in (abs(landed.yaw), stiff[1]))
+            return f"step {k} turns by {turned:.3g} degrees, and the limits of {stiff[0]} allow {allowed:.3g}"
         if meets(standing, body.robot.feet["right"], lifted, landed):
             return f"in step {k} the swinging sole passes over the standing one"
     return None
@@ -90,18 +80,11 @@ def list_turn(body: Humanoid, turn_deg: float, steps: int | None, distance_m: fl
     return list_arc(turn_deg, count, step_m * (count - 1), body.feet_y)
 
 
-def find_robots_sharpest_turn(robot: str) -> SharpestTurn:
-    """Return the sharpest turn with the steps of turns by default; raises GaitError as ``make_humanoid``."""
-    body = make_humanoid(robot)
-    return find_sharpest_turn(body, STEP_SHARE * body.step_length_m)
-
-
-def find_sharpest_turn(body: Humanoid, step_m: float) -> SharpestTurn:
-    """Return the sharpest turn of equal steps of a length [m], to a half degree, and what stops a sharper one."""
-    angle = 0.0
-    while True:
-        wider = angle + FINE_DEG
-        arc = list_arc(ARC_STEPS * wider, ARC_STEPS + 1, ARC_STEPS * step_m, body.feet_y)
+def find_sharpest_turn(body: Humanoid, step_m: float | None = None) -> SharpestTurn:
+    """Return the sharpest turn of equal steps of a length [m], or of that of turns by default, and what stops a sharper one."""
+    step_m = STEP_SHARE * body.step_length_m if step_m is None else step_m
+    for k in itertools.count(1):
+        arc = list_arc(ARC_STEPS * k * FINE_DEG, ARC_STEPS + 1, ARC_STEPS * step_m, body.feet_y)
         if stop := find_turn_stop(body, parse_footholds(arc)):
-            return SharpestTurn(angle, step_m, stop)
-        angle = wider
+            return SharpestTurn((k - 1) * FINE_DEG, step_m, stop)
+    raise AssertionError("soles meet at the latest when a foot has turned around")
