@@ -101,7 +101,7 @@ def _build(problem: GaitProblem) -> NlpModel:
 
     rows = [constraint.columns for constraint in assembly.constraints]
     values, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
-    bounds = ca.Function("row_bounds", [p], [lower, upper])
+    bounds = ca.Function("row_bounds", [p], [ca.densify(lower), ca.densify(upper)])
     cost = problem.objective.sign * assembly.objective
     row_names = tuple(name for constraint in assembly.constraints for name in constraint.row_names)
     if any(not lift.tight for lift in ops.lifts):

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from nlp_gait.backends.derivatives.compiled import DERIVATIVES, NLP_VALUES, CompiledNlp
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array, GaitProblem
-
-LOG = logging.getLogger("nlp_gait")
 
 
 class NlpFunctions:
     """Values at a point (w, p) after ``evaluate``, derivatives there after ``differentiate``."""
 
-    def __init__(self, problem: GaitProblem) -> None:
-        """Compile the functions, or interpret them with a warning if that fails."""
+    def __init__(self, problem: GaitProblem, functions: Mapping[str, ca.Function]) -> None:
+        """Take the functions that ``nlpsol`` uses, by its names."""
         self.model = model = build_nlp(problem)
         size, n = model.nlp["x"].shape[0], model.variables
         rows = model.nlp["g"].shape[0]
         self.w, self.p = np.zeros(size), np.append(problem.p, model.widths[-1])
         self.cost, self.g = np.zeros(1), np.zeros(rows)
         self.gradient, self.multipliers = np.zeros(size), np.zeros(rows)
-        self.row_lower, self.row_upper = np.zeros(len(model.row_names)), np.zeros(len(model.row_names))
+        #: (m,) bounds of the rows
+        self.lower, self.upper = np.zeros(rows), np.concatenate([np.zeros(len(model.row_names)), model.tie_upper])
         self._own_p = np.zeros(len(problem.p))
-        functions = _make_functions(problem)
         jacobian, hessian = functions["nlp_jac_g"].sparsity_out(1), functions["nlp_hess_l"].sparsity_out(0)
         self._jacobian, self._hessian = np.zeros(jacobian.nnz()), np.zeros(hessian.nnz())
         self._run = {
@@ -44,9 +39,7 @@ class NlpFunctions:
                 ("nlp_hess_l", (self.w, self.p, np.ones(1), self.multipliers), (self._hessian,)),
             )
         }
-        p = ca.MX.sym("p", len(problem.p))
-        bounds = ca.Function("dense_bounds", [p], [ca.densify(bound) for bound in model.row_bounds(p)])
-        self._run_bounds = _bind(bounds, (self._own_p,), (self.row_lower, self.row_upper))
+        self._run_bounds = _bind(model.row_bounds, (self._own_p,), (self.lower, self.upper))
         row, column = (np.array(part, dtype=int) for part in jacobian.get_triplet())
         of_z = column < n
         self._of_z, self._place = np.flatnonzero(of_z), row[of_z] * n + column[of_z]
@@ -60,12 +53,13 @@ class NlpFunctions:
         self.rows_by_s = sparse.csr_array((np.zeros(len(of_s)), column[self._of_s] - n, starts), shape=(rows, size - n))
         row, column = (np.array(part, dtype=int) for part in hessian.get_triplet())
         above = np.flatnonzero(row < column)
-        self._both = np.concatenate([np.arange(len(row)), above])
+        both = np.concatenate([np.arange(len(row)), above])
+        places = np.concatenate([row, column[above]]), np.concatenate([column, row[above]])
+        order = np.lexsort(places[::-1])
+        self._both = both[order]
+        starts = np.searchsorted(places[0][order], np.arange(size + 1))
         #: (N, N) Hessian of the Lagrangian
-        self.hessian = sparse.coo_array(
-            (np.zeros(len(self._both)), (np.concatenate([row, column[above]]), np.concatenate([column, row[above]]))),
-            shape=(size, size),
-        )
+        self.hessian = sparse.csr_array((np.zeros(len(both)), places[1][order], starts), shape=(size, size))
 
     def set_parameters(self, p: Array) -> None:
         """Set the problem's parameters (k,), and the bounds of its rows."""
@@ -87,16 +81,6 @@ class NlpFunctions:
         self.rows_by_z.ravel()[self._place] = self._jacobian[self._of_z]
         self.rows_by_s.data[:] = self._jacobian[self._of_s]
         self.hessian.data[:] = self._hessian[self._both]
-
-
-def _make_functions(problem: GaitProblem) -> dict[str, ca.Function]:
-    model = build_nlp(problem)
-    try:
-        return CompiledNlp(model.nlp, np.append(problem.p, model.widths[-1])).functions
-    except CompilerError as error:
-        LOG.warning("the functions of %s are interpreted, which is slower: %s", problem.name, error)
-        solver = ca.nlpsol("functions", "ipopt", dict(model.nlp))
-        return {name: solver.get_function(name) for name in (*NLP_VALUES, *DERIVATIVES.values())}
 
 
 def _bind(function: ca.Function, inputs: tuple[Array, ...], outputs: tuple[Array | None, ...]) -> Callable[[], None]:

@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
-from nlp_gait.backends.onboard.reduced_qp import StepSolver
+from nlp_gait.backends.onboard.reduced_qp import LEAST_DAMPING, StepSolver
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
@@ -27,6 +27,8 @@ SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays
 LEAST_COST = 0.1  # of which relative tolerances are taken
 # Longest step, as a share of the variables' ranges: shorter after a step that had to be shortened, or whose program failed.
 LONGEST, SHORTEN, SHORTEST = 0.25, 2.5, 1e-3
+# Factors of the damping after a program failed, and after a shortened or a full step.
+DAMP_FAILED, DAMP_SHORTENED, DAMP_LESS = 10.0, 4.0, 0.8
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step that are tried
 PRICE_FACTOR = 2.0  # weight of the violation in the merit, in units of the largest multiplier
 MEMORY = 3  # a step may raise the merit above that of the last point, not above all of so many
@@ -79,11 +81,12 @@ class Replanner:
                 f"{problem.name}: planning again needs an optimum by IPOPT to begin from; it {near.status}"
             )
         self.problem = problem
-        self._functions = NlpFunctions(problem)
+        self._ipopt = IpoptSettings(hessian="exact").prepare(problem, solves=SOLVES)
+        self._functions = NlpFunctions(problem, self._ipopt.functions)
         self._steps = StepSolver(self._functions)
+        self._steps.begin(near.guess.rows)
         self._exact = build_exact_model(problem)
         self._scale = self._exact.row_scales[: len(self._functions.model.row_names)]
-        self._ipopt = IpoptSettings().prepare(problem, solves=SOLVES)
         self._threads = ThreadpoolController()
         self._near, self._guess = near, near.guess
 
@@ -122,8 +125,12 @@ class Replanner:
             run = _Run(problem, self._functions, self._steps, self._scale, guess)
             run.improve(iterations, started + time_limit_s)
         found = run.result()
+        if not found.feasible:
+            found = replace(found, violated=self._exact.find_violated(self._exact.at(found.x, problem.p)))
         if run.converged or found.feasible:
             self._guess = found.guess
+        if not run.converged:
+            self._steps.begin(self._guess.rows)
         if not run.converged and math.isinf(time_limit_s):
             found = self._solve_by_ipopt(problem, found)
         if judge:
@@ -155,6 +162,7 @@ class Replanner:
         note = f"{found.note}; IPOPT {outcome.status}"
         if outcome.converged and outcome.guess is not None:
             self._guess, self._near = outcome.guess, outcome
+            self._steps.begin(outcome.guess.rows)
         elif found.feasible:
             return replace(found, note=note, iterations=found.iterations + outcome.iterations)
         return Replan(
@@ -178,9 +186,6 @@ class _Run:
         self._problem, self._at, self._steps, self._scale = problem, at, steps, scale
         model = at.model
         at.set_parameters(problem.p)
-        ties = len(model.tie_upper)
-        self._lower = np.concatenate([at.row_lower, np.zeros(ties)])
-        self._upper = np.concatenate([at.row_upper, model.tie_upper])
         self._z_lower, self._z_upper = (
             (bound - model.offset) / model.scale for bound in (problem.lower, problem.upper)
         )
@@ -189,7 +194,6 @@ class _Run:
         self._go_to(guess.primal.copy())
         self._best: tuple[float, Array] | None = None
         self._keep_best()
-        steps.begin(guess.rows)
 
     def improve(self, iterations: int, deadline: float) -> None:
         """Take steps until one converges or a limit is reached."""
@@ -204,10 +208,11 @@ class _Run:
             size = max(abs(cost), LEAST_COST)
             at.differentiate(self._multipliers)
             z_lower, z_upper = np.maximum(self._z_lower - w[:n], -longest), np.minimum(self._z_upper - w[:n], longest)
-            step = self._steps.solve(self._ties, self._lower - at.g, self._upper - at.g, z_lower, z_upper)
+            step = self._steps.solve(self._ties, at.lower - at.g, at.upper - at.g, z_lower, z_upper)
             self.iterations += 1
-            if step is None and longest > SHORTEST:
-                longest /= SHORTEN
+            if step is None and (self._steps.damping < 1.0 or longest > SHORTEST):
+                longest /= SHORTEN if self._steps.damping == 1.0 else 1.0
+                self._steps.damping = min(DAMP_FAILED * self._steps.damping, 1.0)
                 continue
             if step is None:
                 self.note = f"the quadratic program of step {self.iterations} failed"
@@ -220,6 +225,8 @@ class _Run:
                     break
             self._multipliers = self._multipliers + share * (step.multipliers - self._multipliers)
             self._keep_best()
+            factor = DAMP_LESS if share == 1.0 else DAMP_SHORTENED
+            self._steps.damping = min(max(factor * self._steps.damping, LEAST_DAMPING), 1.0)
             error = abs(at.cost[0] - cost + step.decrease)
             length = float(np.abs(step.w[:n]).max(initial=0.0))
             accurate = share == 1.0 and error <= COST_ERROR * size and length <= SHORT and length < longest
@@ -246,7 +253,7 @@ class _Run:
             time_s=0.0,
             solver="sqp",
             note=self.note,
-            violated=() if feasible else self._list_violated(),
+            violated=(),
             guess=Guess(
                 primal=self._w, bounds=np.zeros(len(self._w)), rows=self._multipliers.copy(), width=self._width
             ),
@@ -266,27 +273,11 @@ class _Run:
             at.evaluate(w)
         rows = at.g[:first]
         self._w = w
-        self._violations = np.maximum(np.maximum(self._lower[:first] - rows, rows - self._upper[:first]), 0.0)
-        violation = float(np.sum(self._violations / self._scale))
+        violations = np.maximum(np.maximum(at.lower[:first] - rows, rows - at.upper[:first]), 0.0)
+        violation = float(np.sum(violations / self._scale))
         self._violation = violation if math.isfinite(violation) else math.inf
 
     def _keep_best(self) -> None:
         cost = float(self._at.cost[0])
         if self._violation <= FEASIBILITY_TOLERANCE and (self._best is None or cost < self._best[0]):
             self._best = cost, self._w.copy()
-
-    def _list_violated(self) -> tuple[ConstraintValue, ...]:
-        names, units, g = self._at.model.row_names, build_exact_model(self._problem).row_units, self._at.g
-        order = np.argsort(-self._violations / self._scale)
-        return tuple(
-            ConstraintValue(
-                name=names[i],
-                value=float(g[i]),
-                lower=float(self._lower[i]) if math.isfinite(self._lower[i]) else None,
-                upper=float(self._upper[i]) if math.isfinite(self._upper[i]) else None,
-                violation=float(self._violations[i]),
-                unit=units[i],
-            )
-            for i in order
-            if self._violations[i] > 0.0
-        )

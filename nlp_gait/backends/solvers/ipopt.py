@@ -171,7 +171,8 @@ class Ipopt(Solver):
         all_rows = ca.nlpsol("cold", "ipopt", nlp, options)
         names = (*NLP_VALUES, *DERIVATIVES.values())
         functions = {name: all_rows.get_function(name) for name in names if all_rows.has_function(name)}
-        functions = native.functions if self.compiled else functions
+        #: of the NLP, by the names of ``nlpsol``
+        self.functions = functions = native.functions if self.compiled else functions
         warm_options: dict[str, Any] = {
             **options,
             **{option: functions[name] for option, name in DERIVATIVES.items() if name in functions},
