@@ -12,6 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign, partners
+from nlp_gait.symbolic.kinematics import turn_quaternion
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
 SIDES_SWAPPED = {
@@ -93,10 +94,7 @@ def _move(signals: Signals, distance: Array, yaw: float, delay: float) -> dict[s
         elif name == YAW:
             arrays[name] = array + yaw
         elif name == "attitude":
-            (w, x, y, z), cos, sin = array.T, math.cos(yaw / 2), math.sin(yaw / 2)
-            arrays[name] = np.stack(
-                [cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w], axis=1
-            )
+            arrays[name] = np.stack(turn_quaternion(array.T, math.cos(yaw / 2), math.sin(yaw / 2)), axis=1)
         else:
             turned = array @ turn[:width, :width].T if yaw else array
             arrays[name] = turned if name in TURNED_ONLY else turned + distance[:width]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import casadi as ca
 from casadi import DM, SX
@@ -29,10 +29,10 @@ def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
     return rotation_matrix(DM(axis), ca.cos(angle), ca.sin(angle))
 
 
-def turn_quaternion(attitude: SX, yaw: SX) -> SX:
-    """Return an attitude (4,), a quaternion (w, x, y, z), after a rotation about the vertical by an angle [rad]."""
-    (w, x, y, z), cos, sin = ca.vertsplit(attitude), ca.cos(yaw / 2), ca.sin(yaw / 2)
-    return ca.vertcat(cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w)
+def turn_quaternion(attitude: Iterable[Any], cos: Any, sin: Any) -> list[Any]:
+    """Return an attitude, a quaternion (w, x, y, z), after a rotation about the vertical by twice the angle of cos and sin."""
+    w, x, y, z = attitude
+    return [cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]
 
 
 def rotation_matrix(k: DM, cos: SX, sin: SX) -> SX:

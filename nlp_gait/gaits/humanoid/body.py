@@ -127,22 +127,23 @@ class Humanoid(Body):
             reach.append(found.reach)
             miss.append(found.miss)
         half_roll, half_pitch = roll.position / 2, pitch.position / 2
-        attitude = ca.vertcat(
+        attitude = [
             ca.cos(half_pitch) * ca.cos(half_roll),
             ca.cos(half_pitch) * ca.sin(half_roll),
             ca.sin(half_pitch) * ca.cos(half_roll),
             -ca.sin(half_pitch) * ca.sin(half_roll),
-        )
+        ]
         if TORSO_YAW in angles:
-            rotation = axis_rotation(UP, angles[TORSO_YAW].position) @ rotation
-            attitude = turn_quaternion(attitude, angles[TORSO_YAW].position)
+            half_yaw = angles[TORSO_YAW].position / 2
+            rotation = axis_rotation(UP, 2 * half_yaw) @ rotation
+            attitude = turn_quaternion(attitude, ca.cos(half_yaw), ca.sin(half_yaw))
         return Instant(
             joints=joints,
             hip=hip.position - rotation @ DM(middle),
             ankles={letter: ankle.position for letter, ankle in ankles.items()},
             reach=ca.vertcat(*reach),
             miss=ca.vertcat(*miss) if ops.exact else SX(0, 1),
-            attitude=attitude,
+            attitude=ca.vertcat(*attitude),
             yaw=angles[RIGHT_YAW].position if TORSO_YAW in angles else SX(0, 1),
         )
 
