@@ -26,6 +26,7 @@ from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import output_file
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
+from nlp_gait.interrupts import Interrupted
 from nlp_gait.user_code import is_reference
 
 # Solvers that run beside yours on instances or with a budget for which no baseline is shipped.
@@ -40,6 +41,7 @@ def bench(
     families: str | None = None,
     seeds: str = "0:5",
     against: str = RIVALS,
+    objectives: Literal["1", "2"] = "1",
     tune: int = 0,
     audit: bool = False,
     submit: Path | None = None,
@@ -87,6 +89,9 @@ def bench(
         return
     if audit:
         _audit(algorithm, as_json)
+        return
+    if objectives == "2":
+        _bench_fronts(algorithm, instances, against, runs, evaluations, out, jobs, as_json)
         return
     chosen = choose_instances(suite, instances, families, seeds)
     shipped = evaluations == EVALUATIONS and set(chosen) <= set(list_instances())
@@ -145,6 +150,40 @@ def bench(
         "standings": [asdict(standing) for standing in board.standings],
     }
     print_result(as_json, data, written, tables)
+
+
+def _bench_fronts(
+    algorithm: str | None,
+    instances: str | None,
+    against: str,
+    runs: int,
+    evaluations: int,
+    out: Path,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Run searches on the instances with two objectives and write their page."""
+    from compare.bench.fronts import SEARCHES, make_fronts_page, rank_searches, run_fronts
+    from compare.report.writing import add_session, write_document
+    from nlp_gait import gaitbench
+    from nlp_gait.backends.kernel.compiled import available_cores
+
+    chosen = parse_names(instances) if instances else list(gaitbench.fronts())
+    solvers = list(SEARCHES if against == RIVALS else parse_names(against))
+    solvers += [algorithm] if algorithm and algorithm not in solvers else []
+    make_writable_folder(out)
+    options = {"runs": runs, "evaluations": evaluations, "folder": out, "jobs": jobs or available_cores()}
+    with progress_bar("runs", len(chosen) * len(solvers) * runs) as advance:
+        try:
+            results = run_fronts(chosen, solvers, **options, progress=advance)  # type: ignore[arg-type]
+        except Interrupted:
+            end_interrupted(f"interrupted; finished runs are stored in {out}; rerun the command to continue")
+    page = add_session(make_fronts_page(results, runs, evaluations), describe_command(), [], str(options["jobs"]))
+    written, ranks = write_document(out, page, "fronts"), rank_searches(results)
+    data = {"instances": chosen, "mean_ranks": ranks}
+    title = f"GaitBench with two objectives: {len(chosen)} instances"
+    rows = [(name, f"{rank:.2f}") for name, rank in ranks.items()]
+    print_result(as_json, data, written, lambda: print_table(title, ("search", "mean rank by hypervolume"), rows))
 
 
 def _audit(algorithm: str | None, as_json: bool) -> None:

@@ -142,7 +142,7 @@ def solve_ends(
     if not solution.converged:
         raise InputError(f"{problem.name} has no front: {solution.status}")
     low = _make_reached(problem, criterion, solution)
-    reward = LARGEST_TRADE_OFF * low.power_W / abs(low.value)
+    reward = LARGEST_TRADE_OFF * abs(low.power_W / low.value)
     ending = add_reward(problem, criterion).with_values(**{REWARD: reward})
     solution = solve(ending, starts=2 * starts, seed=seed, solver=solver)
     if not solution.converged:
