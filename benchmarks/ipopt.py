@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import reduce
 
 import casadi as ca
 import numpy as np
@@ -35,9 +36,9 @@ class Naive(Exact):
         """Root of v^2 and a little more."""
         return ca.sqrt(v**2 + self.SMOOTHING**2)
 
-    def min(self, a: MX, b: MX) -> MX:
+    def min(self, *values: MX) -> MX:
         """By the smooth absolute value."""
-        return (a + b - self.abs(a - b)) / 2
+        return reduce(lambda a, b: (a + b - self.abs(a - b)) / 2, values)
 
     def step(self, switch: MX, below: MX, above: MX) -> MX:
         """A sigmoid."""
