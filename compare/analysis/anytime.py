@@ -70,6 +70,23 @@ def score_anytime(comparisons: Sequence[Comparison]) -> list[AnytimeScore]:
     return sorted(scores, key=lambda score: -score.best)
 
 
+def rank_at_budgets(comparisons: Sequence[Comparison]) -> dict[str, Array]:
+    """Return the mean rank of each solver that ran on all problems, by median gap at each of ``SHARES``; equals share a rank."""
+    from scipy.stats import rankdata
+
+    found, names = index_solvers(comparisons)
+    ranks = [
+        rankdata([[read_median_gap(s[name], share * compute_budget(c)) for name in names] for share in SHARES], axis=1)
+        for c, s in zip(comparisons, found, strict=True)
+    ]
+    return dict(zip(names, np.mean(ranks, axis=0).T, strict=True))
+
+
+def read_median_gap(solver: SolverRuns, cost: float) -> float:
+    """Return the median gap of a solver's runs after some evaluations, infinite where half of them have nothing feasible."""
+    return float(np.median([read_gap(curve, cost) for curve in solver.curves]))
+
+
 def compute_budget(comparison: Comparison) -> float:
     """Return the largest number of evaluations of a run with a history; of all runs if none has one."""
     curves = [curve for solver in comparison.solvers for curve in solver.curves if len(curve.gap)]
@@ -77,8 +94,8 @@ def compute_budget(comparison: Comparison) -> float:
 
 
 def _median_gaps(solver: SolverRuns, budget: float) -> Array:
-    """Return the median gap over the runs at each share of the budget, infinite where half of them have nothing feasible."""
-    return np.median([[read_gap(curve, share * budget) for share in GRID] for curve in solver.curves], axis=0)
+    """Return the median gap over the runs at each share of the budget."""
+    return np.array([read_median_gap(solver, share * budget) for share in GRID])
 
 
 def read_gap(curve: Curve, cost: float) -> float:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from compare.study.definition import select_shared
 from compare.study.record import History, RunRecord, Times, Verdict, decode_record
@@ -26,20 +26,21 @@ from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_file
 from nlp_gait.gaitbench.definitions import Subset
-from nlp_gait.gaitbench.generated import list_test_seeds, make_id
+from nlp_gait.gaitbench.generated import is_generated, list_test_seeds, make_id
 
 # Rules: the same runs, budget and seeds for all solvers.
 RUNS = 15
 EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
 BASELINE = tuple("random pso ga aco aco-grid cma de pymoo:GA pymoo:DE pymoo:ISRES slsqp ipopt".split())
 FOLDER = Path(__file__).with_name("records")
+DRAWN = "drawn"  # folder below it, and the suite, of drawn instances: fewer runs of the same solvers
 SEEDS = re.compile(r"([0-9]{1,12}):([0-9]{1,12})")
 MOST_SEEDS = 1000
 DIGITS = 12  # of numbers in the histories
 
 
 def choose_instances(
-    suite: Subset, instances: str | None = None, families: str | None = None, seeds: str = "0:5"
+    suite: Subset | Literal["drawn"], instances: str | None = None, families: str | None = None, seeds: str = "0:5"
 ) -> tuple[str, ...]:
     """Return the ids of instances: of a suite, or those of a list, or those that families draw by seeds; both as texts.
 
@@ -51,7 +52,7 @@ def choose_instances(
     if families is not None:
         drawn = parse_seeds(seeds)
         chosen += tuple(make_id(family.strip(), seed) for family in families.split(",") for seed in drawn)
-    chosen = chosen or gaitbench.names(suite)
+    chosen = chosen or (list_drawn() if suite == "drawn" else gaitbench.names(suite))
     for id in chosen:
         gaitbench.load(id)  # raises for unknown ids
     return chosen
@@ -80,7 +81,7 @@ def make_bench_study(
     return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
-def pack_records(instance: str, records: Sequence[RunRecord], folder: Path = FOLDER) -> Path:
+def pack_records(instance: str, records: Sequence[RunRecord], folder: Path | None = None) -> Path:
     """Write the records of one instance, and return the file. Equal records give an equal file."""
     packed = [_shorten(record) for record in records]
     shared: dict[str, Any] = {}
@@ -91,26 +92,36 @@ def pack_records(instance: str, records: Sequence[RunRecord], folder: Path = FOL
         if shared.setdefault(record.solver, definition) != definition:
             raise InputError(f"runs of {record.solver!r} on {instance!r} differ in their settings")
     text = json.dumps([record.to_json() for record in packed], separators=(",", ":"))
-    path = folder / f"{instance}.json.gz"
-    make_folder(folder)
+    path = _locate(instance, folder)
+    make_folder(path.parent)
     with replace_file(path) as temporary:
         temporary.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
     return path
 
 
 def list_instances(folder: Path = FOLDER) -> tuple[str, ...]:
-    """Return the ids of the instances with baseline records."""
+    """Return the ids of the instances with baseline records, without drawn ones."""
     return tuple(sorted(path.name.removesuffix(".json.gz") for path in folder.glob("*.json.gz")))
 
 
+def list_drawn(folder: Path = FOLDER) -> tuple[str, ...]:
+    """Return the ids of the drawn instances with baseline records."""
+    return tuple(id.replace("_", ":") for id in list_instances(folder / DRAWN))
+
+
+def _locate(instance: str, folder: Path | None) -> Path:
+    """Return the file of an instance's records: Windows allows no colons in names."""
+    folder = folder or (FOLDER / DRAWN if is_generated(instance) else FOLDER)
+    return folder / f"{instance.replace(':', '_')}.json.gz"
+
+
 @cache
-def load_baseline(instance: str, folder: Path = FOLDER) -> tuple[RunRecord, ...]:
+def load_baseline(instance: str, folder: Path | None = None) -> tuple[RunRecord, ...]:
     """Return the records of all solvers of the baseline on an instance; raises InputError if none are shipped."""
-    path = folder / f"{instance}.json.gz"
+    path = _locate(instance, folder)
     if not path.is_file():
-        raise InputError(
-            f"no baseline records of {instance!r} are shipped; available: {', '.join(list_instances(folder))}"
-        )
+        available = ", ".join((*list_instances(folder or FOLDER), *list_drawn(folder or FOLDER)))
+        raise InputError(f"no baseline records of {instance!r} are shipped; available: {available}")
     return tuple(map(decode_record, json.loads(gzip.decompress(path.read_bytes()))))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,10 @@ from compare.analysis.comparison import Comparison, compare_problems, index_solv
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.bench.baseline import load_baseline
 from compare.study.record import RunRecord
+from nlp_gait import gaitbench
+from nlp_gait.gaitbench.generated import is_generated, parse_id
+
+FEW_VARIABLES = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,3 +86,15 @@ def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:
         ),
         key=lambda standing: (standing.mean_rank, standing.solved_rank),
     )
+
+
+def filter_instances(instances: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
+    """Return all instances, and those of each family and of few or many variables where that is a part of them."""
+    parts = {"all instances": tuple(instances)}
+    for id in instances:
+        instance = gaitbench.load(id)
+        family = parse_id(id)[0].name if is_generated(id) else instance.definition.problem
+        size = "up to" if len(instance.names) <= FEW_VARIABLES else "more than"
+        for name in (f"family {family}", f"{size} {FEW_VARIABLES} variables"):
+            parts[name] = (*parts.get(name, ()), id)
+    return {name: part for name, part in parts.items() if name == "all instances" or len(part) < len(instances)}

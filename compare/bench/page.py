@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from compare.analysis.anytime import SHARES, rank_at_budgets
 from compare.analysis.comparison import Comparison
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning
-from compare.bench.baseline import EVALUATIONS, RUNS
-from compare.bench.leaderboard import Leaderboard
+from compare.bench.baseline import EVALUATIONS
+from compare.bench.leaderboard import Leaderboard, filter_instances
 from compare.drawing.comparison_figures import plot_suite_ecdf
 from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Section, Table, text_table
@@ -20,13 +21,13 @@ from compare.report.tuning_section import make_tuning_section
 from nlp_gait import gaitbench
 
 PER_INSTANCE_TARGET = 1e-3
+LEAST_GROUPS = 4  # of instances, for a table of who leads where
 
 
 def make_leaderboard_page(
     board: Leaderboard,
     solver: str | None,
     suite: str,
-    own_runs: int = RUNS,
     evaluations: int = EVALUATIONS,
     tunings: Sequence[Tuning] = (),
 ) -> Document:
@@ -45,6 +46,7 @@ def make_leaderboard_page(
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 drawing=plot_suite_ecdf(board.comparisons),
             ),
+            *make_leads(board),
             *((make_anytime_section(board.comparisons),) if count_of > 1 else ()),
             *(() if solver is None else (_make_scores(board, solver),)),
             *make_tuning_section(tunings),
@@ -52,8 +54,8 @@ def make_leaderboard_page(
             Section(
                 title="How it was measured",
                 parts=(
-                    f"The baseline's solvers make {RUNS} runs on each instance with {EVALUATIONS} evaluations each, others "
-                    f"{own_runs} with {evaluations}, run k with the seed k; "
+                    f"Every solver makes {_describe_runs(board)} runs on each instance, with {evaluations} evaluations each, run "
+                    "k with the seed k; "
                     "IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within "
                     "60 s. What counts is the exact functions' verdict. The mean rank is "
                     "that of the expected running time over all instances and the targets "
@@ -63,6 +65,26 @@ def make_leaderboard_page(
             ),
         ),
     )
+
+
+def _describe_runs(board: Leaderboard) -> str:
+    counts = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
+    return " or ".join(map(str, counts))
+
+
+def make_leads(board: Leaderboard) -> tuple[Section, ...]:
+    """Return who has the best mean rank on each family and size of instances, early and late; none for few instances."""
+    groups = filter_instances([comparison.problem for comparison in board.comparisons])
+    if len(groups) < LEAST_GROUPS:
+        return ()
+    rows = []
+    for name, ids in groups.items():
+        ranks = rank_at_budgets([comparison for comparison in board.comparisons if comparison.problem in ids])
+        leads = [min(ranks, key=lambda solver: ranks[solver][k]) for k in range(len(SHARES))]
+        rows.append((name, str(len(ids)), *(f"{s} ({ranks[s][k]:.1f})" for k, s in enumerate(leads))))
+    header = ("instances", "number", *(f"after {100 * share:g} %" for share in SHARES))
+    caption = "Solver with the best mean rank by median gap after a share of the budget"
+    return (Section(title="Who leads where", parts=(text_table(header, rows, caption),)),)
 
 
 def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from compare.bench.leaderboard import rank_solvers
+from compare.bench.leaderboard import filter_instances, rank_solvers
 from compare.bench.page import make_leaderboard_page
 from compare.bench.submission import SUFFIX, verify_submission
 from compare.report.document import Document, Prose, Section
 from compare.report.writing import write_document
 from compare.study.record import RunRecord
-from nlp_gait import gaitbench
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
-from nlp_gait.gaitbench.generated import is_generated, parse_id
 from nlp_gait.progress import Progress, ignore_progress
-
-FEW_VARIABLES = 10
 
 
 def write_public_pages(
@@ -64,18 +60,6 @@ def write_public_pages(
     return [*write_document(out, index, "index"), *pages], rejected
 
 
-def filter_instances(instances: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
-    """Return all instances, and those of each family and of few or many variables where that is a part of them."""
-    parts = {"all instances": tuple(instances)}
-    for id in instances:
-        instance = gaitbench.load(id)
-        family = parse_id(id)[0].name if is_generated(id) else instance.definition.problem
-        size = "up to" if len(instance.names) <= FEW_VARIABLES else "more than"
-        for name in (f"family {family}", f"{size} {FEW_VARIABLES} variables"):
-            parts[name] = (*parts.get(name, ()), id)
-    return {name: part for name, part in parts.items() if name == "all instances" or len(part) < len(instances)}
-
-
 def _write_board(
     out: Path, name: str, instances: Sequence[str], evaluations: int, records: Sequence[RunRecord]
 ) -> tuple[list[Path], str]:
@@ -85,14 +69,12 @@ def _write_board(
     place = out / _make_file_name(f"{evaluations} {name} {hash_json(list(instances))[:8]}")
     make_folder(place)
     suite = f"{name}, {evaluations} evaluations"
-    pages = write_document(place, make_leaderboard_page(board, None, suite, runs, evaluations), "ranking")
+    pages = write_document(place, make_leaderboard_page(board, None, suite, evaluations), "ranking")
     links = []
     for number, standing in enumerate(board.standings, start=1):
         page = _make_file_name(standing.solver)
         if len(board.standings) > 1:
-            pages += write_document(
-                place, make_leaderboard_page(board, standing.solver, suite, runs, evaluations), page
-            )
+            pages += write_document(place, make_leaderboard_page(board, standing.solver, suite, evaluations), page)
             links.append(f"{number}. [{standing.solver}]({place.name}/{page}.html)")
     title = f"{name}: {len(instances)} instances, {evaluations} evaluations, {runs} runs"
     return pages, f"- [{title}]({place.name}/ranking.html): {', '.join(links)}"

@@ -36,7 +36,7 @@ RIVALS = "random,pso,de,cma"
 @command
 def bench(
     algorithm: str | None = None,
-    suite: Literal["small", "full"] = "small",
+    suite: Literal["small", "full", "drawn"] = "small",
     instances: str | None = None,
     families: str | None = None,
     seeds: str = "0:5",
@@ -67,7 +67,7 @@ def bench(
     `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
     """
     from compare.analysis.tuning import read_tunings
-    from compare.bench.baseline import list_instances
+    from compare.bench.baseline import list_drawn, list_instances
     from compare.bench.leaderboard import rank_solvers
     from compare.bench.page import make_leaderboard_page, make_verdict
     from compare.bench.submission import SUFFIX, pack_submission, verify_submission
@@ -94,7 +94,7 @@ def bench(
         _bench_fronts(algorithm, instances, against, runs, evaluations, out, jobs, as_json)
         return
     chosen = choose_instances(suite, instances, families, seeds)
-    shipped = evaluations == EVALUATIONS and set(chosen) <= set(list_instances())
+    shipped = evaluations == EVALUATIONS and set(chosen) <= {*list_instances(), *list_drawn()}
     label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
     solvers = {} if shipped else dict.fromkeys(parse_names(against), "")
     if algorithm is not None:
@@ -123,7 +123,7 @@ def bench(
     board = rank_solvers(chosen, records, shipped=shipped)
     suite_name = "chosen instances" if instances or families else f"suite {suite}"
     page = add_session(
-        make_leaderboard_page(board, name, suite_name, runs, evaluations, read_tunings(out)),
+        make_leaderboard_page(board, name, suite_name, evaluations, read_tunings(out)),
         describe_command(),
         [{"name": "gaitbench", "options": {"instance": id}} for id in chosen],
         scheduler or str(jobs or available_cores()),

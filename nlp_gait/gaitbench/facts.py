@@ -83,7 +83,12 @@ class Features:
 
 
 @cache
-def load_facts() -> Mapping[str, Facts]:
-    """Return the facts about all instances by id."""
-    raw = json.loads(files("nlp_gait.gaitbench").joinpath("facts.json").read_text(encoding="utf-8"))
+def load_facts(file: str = "facts.json") -> Mapping[str, Facts]:
+    """Return the facts about all instances of GaitBench 1 by id, or those of another file."""
+    raw = json.loads(files("nlp_gait.gaitbench").joinpath(file).read_text(encoding="utf-8"))
     return {id: decode(Facts, entry, id) for id, entry in raw.items()}
+
+
+def find_shipped_facts(id: str) -> Facts | None:
+    """Return the facts about an instance of GaitBench 1, or a drawn one with a baseline; None for others."""
+    return load_facts().get(id) or load_facts("drawn_facts.json").get(id)

@@ -17,7 +17,8 @@ from compare.archive.unpack import MANIFEST
 from compare.archive.verify import Finding
 from compare.bench import public_pages
 from compare.bench.baseline import make_bench_study, parse_seeds
-from compare.bench.public_pages import filter_instances, write_public_pages
+from compare.bench.leaderboard import filter_instances
+from compare.bench.public_pages import write_public_pages
 from compare.bench.submission import check_rules, pack_submission, verify_submission
 from compare.study.evidence import check_claims, check_history
 from compare.study.record import RunRecord
