@@ -51,6 +51,10 @@ class NlpFunctions:
         starts = np.searchsorted(row[self._of_s], np.arange(rows + 1))
         #: (m, lifted) Jacobian by the lifted variables
         self.rows_by_s = sparse.csr_array((np.zeros(len(of_s)), column[self._of_s] - n, starts), shape=(rows, size - n))
+        #: its transpose, of the same numbers
+        self.s_by_rows = sparse.csc_array(
+            (self.rows_by_s.data, self.rows_by_s.indices, self.rows_by_s.indptr), shape=(size - n, rows)
+        )
         row, column = (np.array(part, dtype=int) for part in hessian.get_triplet())
         above = np.flatnonzero(row < column)
         both = np.concatenate([np.arange(len(row)), above])

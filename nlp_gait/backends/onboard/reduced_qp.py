@@ -29,7 +29,7 @@ ROUNDS = 15  # in which rows and lifted variables are added
 VIOLATED = 1e-9  # by a solution of the program, in units of the row
 PRICED = 1e-6  # multiplier of a row that is active
 KINK = 1e-3  # least share of the price of |v|'s other row where v is zero
-RANK = 1e-9  # singular values of active rows below this share of the largest are zero
+RANK = 1e-6  # singular values of active rows below this share of the largest are zero
 # Smallest curvature, relative to the largest: along active rows, and at first across them.
 LEAST_CURVATURE, LEAST_DAMPING = 1e-6, 1e-3
 NO_BOUND = 1e30  # DAQP's infinity
@@ -46,16 +46,9 @@ class Step:
     multipliers: Array  #: (m,) of all rows, positive at an upper bound
     decrease: float  #: predicted decrease of the cost
     relaxed: bool  #: whether rows had to be violated
-    normals: Array  #: (a, n) derivatives of the active rows and bounds by the problem's variables
-    hessian: Array  #: (n, n) by them
-    bent: Array  #: (n, n) what took its place
-
-    def estimate_rest(self) -> float:
-        """Return how much less the cost would be with the Hessian itself, if the same rows are active."""
-        along = _split(self.normals)[1]
-        gradient = along.T @ ((self.bent - self.hessian) @ self.w[: len(self.hessian)])
-        values, directions = np.linalg.eigh(along.T @ self.hessian @ along)
-        return 0.5 * float(np.sum((directions.T @ gradient) ** 2 / np.maximum(values, _least(self.hessian))))
+    estimate_rest: Callable[
+        [], float
+    ]  #: how much less the cost would be with the Hessian itself, if the same rows are active
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +108,7 @@ class StepSolver:
         at, n, first = self._functions, self.n, self._first
         program = self._reduce(ties, lower)
         is_active, is_kept = self._find_active()
-        bent = _make_convex(program.hessian, self._list_normals(program, is_active), self.damping)
+        bent = _make_convex(program.hessian, self._list_normals(program, ties, is_active), self.damping)
         is_inside = lower == upper
         is_inside[:first] |= is_active[:first]
         for _ in range(ROUNDS):
@@ -147,11 +140,16 @@ class StepSolver:
         curved = at.hessian @ w
         multipliers = np.zeros(len(at.g))
         multipliers[inside] = prices[len(y) :]
-        multipliers[ties] = program.divide(-(at.gradient + curved)[n:] - at.rows_by_s.T @ multipliers, "T")
+        multipliers[ties] = program.divide(-(at.gradient + curved)[n:] - at.s_by_rows @ multipliers, "T")
         self._prices, self._z_prices = multipliers, prices[:n]
-        normals = self._list_normals(program, self._find_active()[0])
         decrease = -float(at.gradient @ w + 0.5 * w @ curved)
-        return Step(w, multipliers, decrease, relaxed, normals, program.hessian, bent)
+        return Step(w, multipliers, decrease, relaxed, lambda: self._estimate_rest(program, ties, bent, y[:n]))
+
+    def _estimate_rest(self, program: _Program, ties: IntArray, bent: Array, z: Array) -> float:
+        along = _split(self._list_normals(program, ties, self._find_active()[0]))[1]
+        gradient = along.T @ ((bent - program.hessian) @ z)
+        values, directions = np.linalg.eigh(along.T @ program.hessian @ along)
+        return 0.5 * float(np.sum((directions.T @ gradient) ** 2 / np.maximum(values, _least(program.hessian))))
 
     def _find_active(self) -> tuple[BoolArray, BoolArray]:
         """Return which rows have a price, apart from the only one of a lifted variable, and which lifted variables have two."""
@@ -167,8 +165,9 @@ class StepSolver:
         is_active[self._first :] &= is_kept[self._owner]
         return is_active, is_kept
 
-    def _list_normals(self, program: _Program, is_active: BoolArray) -> Array:
-        """Return the derivatives of active rows and bounds by z."""
+    def _list_normals(self, program: _Program, ties: IntArray, is_active: BoolArray) -> Array:
+        """Return the derivatives of active rows and bounds by z; those of the chosen ties are 0."""
+        is_active[ties] = False
         return np.concatenate([program.rows[is_active, : self.n], self._unit[np.abs(self._z_prices) > PRICED]])
 
     def _reduce(self, ties: IntArray, lower: Array) -> _Program:
@@ -216,10 +215,10 @@ class StepSolver:
 
 def _split(normals: Array) -> tuple[Array, Array]:
     """Return orthonormal bases of the span of rows (a, n), and of what is orthogonal to it, as columns."""
-    lengths = np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-    _, s, vt = np.linalg.svd(np.linalg.qr(normals / lengths[:, None], mode="r"))
-    rank = int(np.sum(s > RANK * s.max(initial=0.0)))
-    return vt[:rank].T, vt[rank:].T
+    unit = normals / np.maximum(np.sqrt(np.einsum("ij,ij->i", normals, normals)), 1e-300)[:, None]
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    is_across = values > RANK**2 * values[-1]
+    return vectors[:, is_across], vectors[:, ~is_across]
 
 
 def _least(hessian: Array) -> float:
@@ -233,14 +232,14 @@ def _make_convex(hessian: Array, normals: Array, damping: float) -> Array:
     the convergence is quadratic. Curvature across them, which acts only where one of them is left, becomes at least the damping
     times the largest, and what connects both is removed.
     """
-    across, along = _split(normals)
     least = _least(hessian)
-    values, directions = np.linalg.eigh(along.T @ hessian @ along)
-    axes = along @ directions
-    bent = (axes * np.maximum(np.abs(values), least)) @ axes.T
-    values, directions = np.linalg.eigh(across.T @ hessian @ across)
-    axes = across @ directions
-    return np.asarray(bent + (axes * np.maximum(values, damping / LEAST_CURVATURE * least)) @ axes.T)
+    bent = np.zeros_like(hessian)
+    for basis, lowest, is_along in zip(_split(normals), (damping / LEAST_CURVATURE, 1.0), (False, True), strict=True):
+        if basis.size:
+            values, directions = np.linalg.eigh(basis.T @ hessian @ basis)
+            axes = basis @ directions
+            bent += (axes * np.maximum(np.abs(values) if is_along else values, lowest * least)) @ axes.T
+    return bent
 
 
 def _load_daqp() -> Any:
