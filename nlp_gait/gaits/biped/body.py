@@ -15,7 +15,7 @@ from casadi import MX, SX, fmax
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
 from nlp_gait.formulation.display import Skeleton
-from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
+from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Limit, Margins
 from nlp_gait.gaits.biped.motors import Motors
@@ -181,13 +181,30 @@ class Body(ABC):
             for name, unit, lower, upper, text in rows
         )
 
+    def split_hip(
+        self, splines: Splines, along: tuple[float, float], across: tuple[float, float]
+    ) -> tuple[tuple[Variable, ...], tuple[Parameter, ...]]:
+        """Return the hip's variables, and those of a measured start as parameters, for its places at both ends [m].
+
+        By default the start is that of ``along`` and ``across``, highest, at rest but for 1/s of the distance across.
+        """
+        if not splines.is_measured:
+            return self.hip_variables, ()
+        at_start = [variable for variable in self.hip_variables if "_start_" in variable.name]
+        speeds = {"hip_vy_start_m_s": across[1] - across[0]}
+        rows = [(each.name, each.unit, speeds.get(each.name, 0.0), each.description) for each in at_start]
+        for axis, place in {"x": along[0], "y": across[0], "z": self.hip_height_m[1]}.items():
+            rows.append((f"hip_{axis}_start_m", "m", place, f"{axis} of the {self.hip_name} at the start"))
+        state = (Parameter(name=name, unit=unit, default=value, description=text) for name, unit, value, text in rows)
+        return tuple(variable for variable in self.hip_variables if variable not in at_start), tuple(state)
+
     @property
     def lift_variable(self) -> Variable:
         """Height of the swing."""
         lower, upper = self.scale_length(0.015), self.scale_length(0.03)
         return Variable(name=LIFT, unit="m", lower=lower, upper=upper, description="highest point of the swing foot")
 
-    def make_splines(self, phase: PhaseName, trajectory: Trajectory) -> Splines:
+    def make_splines(self, phase: PhaseName, trajectory: PhaseTrajectory) -> Splines:
         """Return the splines of a phase; a swing foot stays on its line across the walking direction."""
         units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(self.angle_names(phase), "rad")
         if phase == "ssp":

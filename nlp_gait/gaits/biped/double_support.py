@@ -9,7 +9,7 @@ from casadi import MX, SX
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
 from nlp_gait.gaits.biped.body import TIMES, Body, State, read_duration
-from nlp_gait.gaits.biped.curves import Splines, Trajectory, hip_on_spline
+from nlp_gait.gaits.biped.curves import PhaseTrajectory, Splines, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
@@ -89,7 +89,7 @@ def plan_double_support(
     body: Body,
     step_m: float,
     grid: Grid,
-    trajectory: Trajectory,
+    trajectory: PhaseTrajectory,
     goal: Goal,
     sharing: LoadSharing,
     derivatives: Derivatives = "analytic",
@@ -113,11 +113,12 @@ def make_double_support_phase(
     """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
     soles = place_soles(body, step_m)
     box, ends = make_support_box(body.robot, soles), hip_ends(body, soles)
+    variables, measured = body.split_hip(splines, *ends)
     ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
 
     def state(at: InstantPoint, s: SX) -> State:
         more = splines.motions(at, read_duration(at, "dsp"), s)
-        hip = hip_on_spline(at, more, *ends, read_duration(at, "dsp"), s)
+        hip = hip_on_spline(at, more, *ends, read_duration(at, "dsp"), s, splines.is_measured)
         return hip, body.angles("dsp", at, more, read_duration(at, "dsp"), s), ankles
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
@@ -126,7 +127,7 @@ def make_double_support_phase(
     return Phase(
         body=body,
         variables=(
-            *body.hip_variables,
+            *variables,
             *body.angle_variables,
             body.make_time_variable("dsp"),
             *splines.variables,
@@ -144,5 +145,6 @@ def make_double_support_phase(
             *sharing.limits,
         ),
         goal=goal,
+        state=measured,
         kinks=splines.kinks,
     )

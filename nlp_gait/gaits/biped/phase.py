@@ -63,12 +63,13 @@ class Phase:
     derivatives: Derivatives = "analytic"  # analytic ones, or finite differences of the sampled angles as in the paper
     limits: Sequence[Limit] = ()  # they add the rows
     goal: Goal = Goal()  # what it minimises
+    state: tuple[Parameter, ...] = ()  # at the start, if it is measured
     kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Of the goal and of all limits; pairs of bounds are last because there are many."""
-        own = (self.goal.heat, *(parameter for limit in self.limits for parameter in limit.parameters))
+        own = (self.goal.heat, *self.state, *(parameter for limit in self.limits for parameter in limit.parameters))
         return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
     def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
@@ -224,10 +225,15 @@ class Phase:
     def _exact_plan(self) -> tuple[list[SX], Instant, InstantPoint]:
         return self._symbolic_plan(Exact())
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of the parameters that the motion reads."""
+        return (REACH_MARGIN, *(parameter.name for parameter in self.state))
+
     def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant, InstantPoint]:
-        x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
-        at = InstantPoint.of(x, margin, self.names, [REACH_MARGIN])
-        return [x, margin, phase], self.plan(at, phase, ops), at
+        x, known, phase = SX.sym("x", len(self.variables)), SX.sym("margin", len(self.known)), SX.sym("phase")
+        at = InstantPoint.of(x, known, self.names, self.known)
+        return [x, known, phase], self.plan(at, phase, ops), at
 
     def _map_instant(
         self, inputs: list[SX], outputs: list[SX], ats: Sequence[Point], ops: Nonsmooth, phases: MX | None
@@ -331,7 +337,14 @@ class Phase:
         last: Any = phases
         if phases is None:
             function, last = tabulate_last_input(function, DM(np.linspace(0.0, 1.0, n)).T)
-        points = [[ca.repmat(at.select(self.names).x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), last] for at in ats]
+        points = [
+            [
+                ca.repmat(at.select(self.names).x, 1, n),
+                ca.repmat(ca.vertcat(*(at[name] for name in self.known)), 1, n),
+                last,
+            ]
+            for at in ats
+        ]
         inputs = points[0] if len(ats) == 1 else [ca.horzcat(*parts) for parts in zip(*points, strict=True)]
         return list(function.map(n * len(ats)).call([*columns, *inputs]))
 

@@ -94,7 +94,7 @@ def make_phase_problem(
 
     body = phase.body
     if not body.closed_form:
-        start = make_start_within_reach(phase.names, (), lambda at: phase.sample(at, Exact()).reach, start)
+        start = make_start_within_reach(phase.names, phase.known[1:], lambda at: phase.sample(at, Exact()).reach, start)
     problem = GaitProblem(
         name=f"{body.family}-{name}",
         title=f"{body.title}, {title}",

@@ -9,7 +9,7 @@ from casadi import MX, SX
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Point
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State, read_duration
-from nlp_gait.gaits.biped.curves import Splines, Trajectory, hip_on_spline
+from nlp_gait.gaits.biped.curves import PhaseTrajectory, Splines, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, FootClearance, Margins
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
@@ -41,7 +41,12 @@ def place_stance(body: Body, step_m: float) -> Stance:
 
 
 def plan_single_support(
-    body: Body, step_m: float, grid: Grid, trajectory: Trajectory, goal: Goal, derivatives: Derivatives = "analytic"
+    body: Body,
+    step_m: float,
+    grid: Grid,
+    trajectory: PhaseTrajectory,
+    goal: Goal,
+    derivatives: Derivatives = "analytic",
 ) -> GaitProblem:
     """Return the problem of single support; for the options see ``gaits.nao``."""
     splines = body.make_splines("ssp", trajectory)
@@ -54,6 +59,7 @@ def make_single_support_phase(
 ) -> Phase:
     """Return the phase from rest behind the standing foot to rest in front of it, with feet ``step_m`` apart."""
     stance, foot = place_stance(body, step_m), body.robot.feet["left"]
+    hip, measured = body.split_hip(splines, stance.hip_x, stance.hip_y)
     left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
 
     def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
@@ -65,7 +71,7 @@ def make_single_support_phase(
     def state(at: InstantPoint, s: SX) -> State:
         time = read_duration(at, "ssp")
         more = splines.motions(at, time, s)
-        hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, time, s)
+        hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, time, s, splines.is_measured)
         return hip, body.angles("ssp", at, more, time, s), {"L": left, "R": swing(at, more, right_height, s)}
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
@@ -77,7 +83,7 @@ def make_single_support_phase(
     return Phase(
         body=body,
         variables=(
-            *body.hip_variables,
+            *hip,
             *body.angle_variables,
             body.lift_variable,
             body.make_time_variable("ssp"),
@@ -97,6 +103,7 @@ def make_single_support_phase(
             *body.motors.limits,
         ),
         goal=goal,
+        state=measured,
         kinks=splines.kinks,
     )
 

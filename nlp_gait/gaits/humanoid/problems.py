@@ -6,7 +6,7 @@ from typing import Literal
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
-from nlp_gait.gaits.biped.curves import Trajectory, make_grid
+from nlp_gait.gaits.biped.curves import PhaseTrajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import plan_double_support
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
@@ -30,7 +30,7 @@ def humanoid_ssp(
     intervals: int = 10,
     step_length_m: float = 0.0,
     samples_per_interval: int = 0,
-    trajectory: Trajectory = "cubic",
+    trajectory: PhaseTrajectory = "cubic",
     objective: Criterion = "power",
     drive_limits: bool = True,
     motors: str = "",
@@ -54,7 +54,7 @@ def humanoid_dsp(
     torso_share: Share = "lever",
     step_length_m: float = 0.0,
     samples_per_interval: int = 0,
-    trajectory: Trajectory = "cubic",
+    trajectory: PhaseTrajectory = "cubic",
     objective: Criterion = "power",
     drive_limits: bool = True,
     motors: str = "",

@@ -13,7 +13,7 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, load, maker
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
-from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory, make_grid
+from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, PhaseTrajectory, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import hip_ends, make_double_support_phase, place_soles, plan_double_support
 from nlp_gait.gaits.biped.goals import Goal
@@ -46,7 +46,7 @@ def nao_ssp(
     rotational_inertia: bool = True,
     step_length_m: float = 0.06,
     samples_per_interval: int = 0,
-    trajectory: Trajectory = "cubic",
+    trajectory: PhaseTrajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
     arms: Arms = "carried",
@@ -79,7 +79,7 @@ def nao_dsp(
     torso_share: TorsoShare = "printed",
     step_length_m: float = 0.06,
     samples_per_interval: int = 0,
-    trajectory: Trajectory = "cubic",
+    trajectory: PhaseTrajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
     arms: Arms = "carried",

@@ -50,6 +50,17 @@ def test_every_change_of_the_parameters_leads_to_ipopts_optimum(nao: Replanner) 
         assert found.objective == pytest.approx(sharp.objective, rel=1e-6)
 
 
+def test_a_disturbed_robot_plans_from_the_state_where_it_is() -> None:
+    plan = replanner(nlp_gait.load("nao-dsp", trajectory="measured", intervals=4), starts=1)
+    state = {"hip_x_start_m": 0.002, "hip_y_start_m": -0.003, "hip_z_start_m": -0.002, "hip_vx_start_m_s": 0.01}
+    values = {key: plan.problem.value(key) + change for key, change in state.items()}
+    found = plan.solve(values, judge=True)
+    assert found.converged and found.feasible and found.solver == "sqp", found.note
+    hip = plan.problem.with_values(**values).signals(found.x)["hip"]
+    np.testing.assert_allclose(hip[0], [values[f"hip_{axis}_start_m"] for axis in "xyz"], atol=1e-12)
+    assert set(values).isdisjoint(plan.problem.names)
+
+
 def test_parameters_in_order_and_a_start_give_the_same_result(nao: Replanner) -> None:
     by_name = nao.solve({"dbm_y_mean_limit_m": nao.problem.value("dbm_y_mean_limit_m")})
     in_order = nao.solve(nao.problem.p.tolist(), x0=dict(zip(nao.problem.names, by_name.x, strict=True)))
