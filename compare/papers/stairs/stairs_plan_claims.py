@@ -224,7 +224,7 @@ def _check_climb(findings: StairsFindings) -> Check:
     first, after = (np.array([measure_hip_speeds(findings, what, case) for case in findings.cases]) for what in STEPS)
     jumps = np.abs([first[:, 1] - after[:, 0], after[:, 1] - after[:, 0]])
     texts = {"first": Series(first[:, 1]), "start": Series(after[:, 0]), "end": Series(after[:, 1])}
-    return decide(jumps.max() <= CONTINUOUS or Verdict.NOT_SHOWN, **texts)
+    return decide(jumps.max() <= CONTINUOUS or Verdict.UNTESTABLE, **texts)
 
 
 def _check_network(findings: StairsFindings) -> Check:
@@ -292,7 +292,13 @@ def _check_jerk_terms(_: StairsFindings) -> Check:
     """Shares of the jerk terms in (31) and (32), of the acceleration terms, with the maxima of Table IV."""
     ratios = [100 * row.jerk * QUANTUM / row.acceleration for row in TABLE_4.values()]
     speeds, places = (Series(ratio / part for ratio in ratios) for part in (2, 3))
-    return compare_levels(np.zeros(6), [*speeds, *places], speeds=speeds, places=places)
+    return decide(Verdict.UNTESTABLE, speeds=speeds, places=places)
+
+
+def _check_torso_mass(_: StairsFindings) -> Check:
+    rods = toe_foot_biped().rods
+    torso, total = rods["UH"].mass, sum(rod.mass for rod in rods.values())
+    return decide(torso > total / 2, torso=torso, total=total, share=100 * torso / total)
 
 
 def _check_ratio(_: StairsFindings, exponent: int) -> Check:
