@@ -112,6 +112,9 @@ def _tune(
     search = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=training.seed))
     made = Task(problem=training.problems[0], solver=solver.name, settings=solver.settings).make_search()
     defaults = {name: getattr(made, name) for name in ranges if hasattr(made, name)}
+    known = len(defaults) == len(ranges) and all(_contains(within, defaults[name]) for name, within in ranges.items())
+    if known:
+        search.enqueue_trial(defaults)
     proposals: list[dict[str, Any]] = []
     areas: list[float] = []
     records: list[RunRecord] = []
@@ -131,7 +134,10 @@ def _tune(
         by_label = {spec.label: [record for record in found if record.solver == spec.label] for spec in specs}
         areas += [compute_mean_area(runs, records, training.stop.evaluations) for runs in by_label.values()]
         for trial, area in zip(asked, areas[first:], strict=True):
-            search.tell(trial, area)
+            if known or trial.number:
+                search.tell(trial, area)
+            else:  # its proposal was not what ran
+                search.tell(trial, state=optuna.trial.TrialState.FAIL)
     best = max(range(trials), key=areas.__getitem__)
     return Tuning(
         solver=solver.label,
@@ -168,6 +174,10 @@ def _propose(trial: Any, ranges: Mapping[str, Range]) -> dict[str, Any]:
             value = trial.suggest_float(name, low, high, log=bool(scale))
             chosen[name] = min(max(float(f"{value:.{DIGITS}g}"), low), high)
     return chosen
+
+
+def _contains(within: Range, value: Any) -> bool:
+    return value in within if isinstance(within[0], str) else bool(within[0] <= value <= within[1])
 
 
 def _import_optuna() -> Any:

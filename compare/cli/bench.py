@@ -99,6 +99,8 @@ def bench(
     solvers = {} if shipped else dict.fromkeys(parse_names(against), "")
     if algorithm is not None:
         solvers[algorithm] = label
+    if tune and not solvers:
+        raise InputError("--tune needs a search that runs here: name it with --algorithm, or drawn instances with --families")
     make_writable_folder(out)
     records: list[RunRecord] = []
     name: str | None = None
@@ -107,12 +109,12 @@ def bench(
         settings = make_bench_study(chosen, *specs, runs=runs, evaluations=evaluations)
         study = Study(tasks=settings.tasks(), folder=out, jobs=jobs or available_cores(), scheduler=scheduler)
         name = study.tasks[-1].title if algorithm is not None else None
-        if tune:
-            settings = tune_first(study, settings, tune)
-            study = replace(study, tasks=settings.tasks())
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         check_study(study)
+        if tune:
+            settings = tune_first(study, settings, tune)
+            study = replace(study, tasks=settings.tasks())
         write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
         with progress_bar(f"{name or 'all'} runs", len(study.tasks)) as advance:
             records, stopped = until_interrupted(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import runpy
 import sys
 import warnings
 from pathlib import Path
@@ -163,6 +164,28 @@ def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
     for trial in study.trials:
         x = np.array([[trial.params[name] for name in instance.names]])
         assert trial.value == instance(x)[0][0]
+
+
+@pytest.mark.slow
+def test_the_package_of_optunahub(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its example runs with the real package, generated ids are accepted, and trials know whether they are feasible."""
+    package("optunahub")
+    optuna = package("optuna")
+    import optunahub
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    root = Path(__file__).parents[2] / "examples" / "optunahub"
+    monkeypatch.chdir(root)
+    found = runpy.run_path("benchmarks/gaitbench/example.py")
+    best, known = found["study"].best_trial, found["problem"].instance
+    x = [best.params[name] for name in known.names]
+    assert known.violation(x) == 0 and best.value == known.objective(x) >= known.best_known
+    assert capsys.readouterr().out == f"best feasible: {best.value:.4f} W, best known: {known.best_known:.4f} W\n"
+    problem = optunahub.load_local_module("benchmarks/gaitbench", registry_root=".").Problem("gb2:walk12-long:3")
+    study = optuna.create_study(directions=problem.directions, sampler=optuna.samplers.RandomSampler(seed=0))
+    study.optimize(problem, n_trials=10)
+    for trial in study.trials:
+        assert trial.constraints == problem.evaluate_constraints(trial.params)
 
 
 @pytest.mark.slow

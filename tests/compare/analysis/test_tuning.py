@@ -17,7 +17,7 @@ from metaheuristics.settings import list_ranges
 from nlp_gait.errors import InputError
 from tests.backends.toys import corner, toy
 
-pytest.importorskip("optuna", reason="optuna is not installed: pip install 'nlp-gait[tune]'")
+optuna = pytest.importorskip("optuna", reason="optuna is not installed: pip install 'nlp-gait[tune]'")
 
 OWN = """
 import numpy as np
@@ -43,7 +43,12 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> StudySettings:
     )
 
 
-def test_a_tuned_search_is_better_and_the_same_again(settings: StudySettings, tmp_path: Path) -> None:
+def test_a_tuned_search_is_better_and_the_same_again(
+    settings: StudySettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searches: list[optuna.Study] = []
+    create = optuna.create_study
+    monkeypatch.setattr(optuna, "create_study", lambda **given: searches.append(create(**given)) or searches[-1])
     said: list[str] = []
     study = Study(tasks=settings.tasks(), folder=tmp_path)
     tuned, tunings = tune_solvers(study, settings, 7, said.append)
@@ -51,6 +56,9 @@ def test_a_tuned_search_is_better_and_the_same_again(settings: StudySettings, tm
     assert [tuning.trials for tuning in tunings] == [7, 7] and said[0] == "random has no settings to tune"
     for tuning, solver in zip(tunings, tuned.solvers[2::2], strict=True):
         assert tuning.area[1] > tuning.area[0] and solver.settings == tuning.settings
+    with_default, without = (search.trials[0] for search in searches)
+    assert with_default.params == {name: getattr(algorithm("de"), name) for name in list_ranges(algorithm("de"))}
+    assert with_default.value == tunings[0].area[0] and without.state == optuna.trial.TrialState.FAIL
     assert 7 * 190 <= tunings[0].evaluations <= 7 * 200
     again = tune_solvers(replace(study, folder=None), settings, 7, said.append)[1]
     assert [(t.settings, t.area) for t in again] == [(t.settings, t.area) for t in tunings]
