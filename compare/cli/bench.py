@@ -100,7 +100,9 @@ def bench(
     if algorithm is not None:
         solvers[algorithm] = label
     if tune and not solvers:
-        raise InputError("--tune needs a search that runs here: name it with --algorithm, or drawn instances with --families")
+        raise InputError(
+            "--tune needs a search that runs here: name it with --algorithm, or drawn instances with --families"
+        )
     make_writable_folder(out)
     records: list[RunRecord] = []
     name: str | None = None
