@@ -47,6 +47,7 @@ def bench(
     submit: Path | None = None,
     verify: Path | None = None,
     rerun: float = 0.1,
+    code: list[str] | None = None,
     leaderboard: Path | None = None,
     label: str = "",
     runs: int = RUNS,
@@ -78,7 +79,7 @@ def bench(
     from nlp_gait.backends.kernel.compiled import available_cores
 
     if submit is not None or verify is not None:
-        name_all([algorithm] if algorithm and is_reference(algorithm) else [])
+        name_all([*(code or ()), *([algorithm] if algorithm and is_reference(algorithm) else ())])
         if submit is not None:
             print_written(pack_submission(submit, output_file(submit.with_name(f"{submit.name}-submission{SUFFIX}"))))
         if verify is not None:
