@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> StudySettings:
 def test_a_tuned_search_is_better_and_the_same_again(
     settings: StudySettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    searches: list[optuna.Study] = []
+    searches: list[Any] = []
     create = optuna.create_study
     monkeypatch.setattr(optuna, "create_study", lambda **given: searches.append(create(**given)) or searches[-1])
     said: list[str] = []
