@@ -15,6 +15,7 @@ TOLERANCE = 1e-11
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_compiler")
 def test_numpy_and_pinocchio_give_the_package_s_values() -> None:
     by_hand = ByHand()
     X = np.random.default_rng(0).uniform(by_hand.lower, by_hand.upper, (10, 9))

@@ -96,6 +96,7 @@ def test_the_sizes_of_the_nlps_are_those_of_today() -> None:
         assert rows[name][1:4] == [str(model.nlp["x"].numel()), str(model.lifted), str(model.nlp["g"].numel())]
 
 
+@pytest.mark.slow
 def test_the_page_of_a_problem_is_made_from_the_problem(tmp_path: Path) -> None:
     problem, found = load("nao-dsp"), problems.difficulties()["nao-dsp"]
     page = problems.problem_page(problem, found, tmp_path)

@@ -238,7 +238,7 @@ def a_gait(folder: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("calls", "ending"), [(1, "png"), (7, "gif"), (40, "png")])
+@pytest.mark.parametrize(("calls", "ending"), [(1, "png"), (7, "gif")])
 def test_animate_while_a_picture_is_drawn(
     calls: int, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,9 +64,8 @@ def test_a_closed_output_is_refused_before_anything_is_written_into_a_file_in_it
 
 @pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
-@pytest.mark.parametrize("asked", ["solve --help", "--version"])
-def test_help_that_cannot_be_written_is_reported(asked: str) -> None:
-    done = shell(f"$gait {asked} >/dev/full")
+def test_help_that_cannot_be_written_is_reported() -> None:
+    done = shell("$gait solve --help >/dev/full")
     assert (done.returncode, done.stderr) == (1, "nlp-gait: cannot write the output: No space left on device\n")
 
 

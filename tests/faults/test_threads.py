@@ -14,20 +14,20 @@ import pytest
 from tests.faults.processes import ROOT
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-# The joint step has linear systems so large that LAPACK uses its threads; numbers are printed to the last bit.
+# Numbers are printed to the last bit.
 PROGRAM = """
 import metaheuristics, nlp_gait
 from compare.study.task import GRADIENT_SOLVERS, list_solvers
 from nlp_gait.backends.solvers.registry import make_solver
-problem = nlp_gait.load("nao-ssp")
+problem = nlp_gait.load("nao-ssp", intervals=4)
 objective = nlp_gait.compile_objective(problem, threads=1)
 for name in list_solvers():
     if name in GRADIENT_SOLVERS:
         continue
-    budget = {"bayes": 20, "scipy:SLSQP": 300}.get(name, 170)
+    budget = {"bayes": 20}.get(name, 170)
     found = metaheuristics.minimize(objective, metaheuristics.algorithm(name), evaluations=budget, seed=1)
     print(name, found.evaluations, found.objective.hex(), [value.hex() for value in found.x.tolist()])
-for name, settings in (("ipopt", {}), ("slsqp", {"evaluations": 400})):
+for name, settings in (("ipopt", {}), ("slsqp", {"evaluations": 100})):
     outcome = make_solver(name, **settings).prepare(problem, 1).run(problem, 0.5 * (problem.lower + problem.upper))
     print(name, outcome.evaluations.f, outcome.objective.hex(), [value.hex() for value in outcome.x.tolist()])
 """

@@ -117,7 +117,7 @@ def test_a_fork_waits_until_no_other_thread_is_inside_casadi() -> None:
 import os, threading, nlp_gait
 problem = nlp_gait.load("walk12")
 nlp_gait.solve(problem)
-busy = threading.Thread(target=lambda: nlp_gait.solve(problem, starts=12))
+busy = threading.Thread(target=lambda: nlp_gait.solve(problem, starts=4))
 busy.start()
 child = os.fork()
 if child == 0:

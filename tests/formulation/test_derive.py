@@ -94,7 +94,7 @@ def test_time_histories_follow_changed_values(walk: GaitProblem) -> None:
     assert slower.signals([*WALK_X, 0.5]).arrays["t"][-1] == 2.0 * walk.signals(WALK_X).arrays["t"][-1]
 
 
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", "stairs-ideal"])
+@pytest.mark.parametrize("name", ["nao-ssp", "nao-cycle", pytest.param("stairs-ideal", marks=pytest.mark.slow)])
 def test_start_points_have_the_new_variable_within_its_current_bounds(name: str) -> None:
     """Where the problem has start points of its own, and where it has none."""
     options: dict[str, Any] = {"nao-cycle": {"objective": "power"}}.get(name, {})
@@ -117,6 +117,7 @@ def test_denser_grids_are_adapted(walk: GaitProblem) -> None:
     assert found.rows["least_slack"] == 0.5 and len(found.rows) == len(below.rows) + 2
 
 
+@pytest.mark.slow
 def test_the_compiled_objective_and_the_judge_see_it(walk: GaitProblem) -> None:
     changed = with_slack(walk)
     X: Array = np.column_stack([np.tile(WALK_X, (2, 1)), [0.1, 0.5]])
@@ -164,6 +165,7 @@ def test_duplicated_names_are_refused(more: dict[str, Any], twice: str) -> None:
         toy(corner).derive(**more)
 
 
+@pytest.mark.slow
 def test_an_added_variable_leaves_a_richer_motion_unchanged() -> None:
     """The swing foot halfway is a function of the phase's own variables alone."""
     plain = load("nao-ssp", trajectory="quintic", samples_per_interval=1)

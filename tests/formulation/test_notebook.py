@@ -69,6 +69,7 @@ def test_a_start_without_a_violation_ranks_last(solution: nlp_gait.Solution) -> 
     assert replace(start, violation=0.5).rank == (2.0, 0.5) < replace(start, violation=math.nan).rank == (2.0, math.inf)
 
 
+@pytest.mark.slow
 def test_a_solution_displays_a_table_its_signals_and_its_gait(solution: nlp_gait.Solution) -> None:
     shown = solution._repr_html_()
     assert "hip_height_m" in shown and "W per m" in shown and len(shown) < 5000

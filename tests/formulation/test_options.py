@@ -105,8 +105,12 @@ def test_definitions_of_tasks_depend_on_each_option(option: str) -> None:
     assert recorded.definition() == asked.definition() != make_task("walk12", {}).definition()
 
 
+# The cycle stands for the humanoid's other problems, which take the same bodies and phases.
+RELOADED = [name for name in PROBLEMS if name == "humanoid-cycle" or not name.startswith("humanoid-")]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", RELOADED)
 def test_recorded_options_make_the_same_problem(name: str) -> None:
     """With no option at its default: grid, definitions of tasks, rows, and every exact value at a point off the middle."""
     asked = make_task(name, others(name))

@@ -12,6 +12,7 @@ from tests.fuzz.arguments import argument_ended, plugin_ended
 CALLS = 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ended", [argument_ended, plugin_ended])
 def test_any_value_is_taken_or_refused_in_one_sentence(ended: Callable[[random.Random], tuple[str, str]]) -> None:
     rng = random.Random(0)

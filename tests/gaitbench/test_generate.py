@@ -106,6 +106,7 @@ def test_other_variables_keep_objective_rows_and_feasible_set() -> None:
     assert changed.dense(2) is not None
 
 
+@pytest.mark.slow
 def test_a_generated_instance_is_an_instance(walk: gaitbench.Instance) -> None:
     assert (walk.lower == 0.0).all() and (walk.upper == 1.0).all() and walk.id == ID
     f, violation = walk(walk.best_x[None])

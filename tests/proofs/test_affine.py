@@ -15,12 +15,14 @@ from tests.proofs.enclosed_operations import AFFINE, QUADRATIC, find_lost_values
 
 SEED = 7
 EACH = 50  # points of each operation; `python -m benchmarks.guarantees.enclosures` takes 100,000
-POINTS = 500
+POINTS = 200
 # Of values as computed in double precision, relative: they err themselves.
 ROUNDING = 1e-9
 
 
-@pytest.mark.parametrize("quadratic", [False, True], ids=["affine", "quadratic"])
+@pytest.mark.parametrize(
+    "quadratic", [pytest.param(False, id="affine"), pytest.param(True, id="quadratic", marks=pytest.mark.slow)]
+)
 def test_every_operation_encloses_exact_values_at_random_points(quadratic: bool) -> None:
     rng = np.random.default_rng(SEED)
     for name in QUADRATIC if quadratic else AFFINE:

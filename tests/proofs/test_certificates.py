@@ -32,7 +32,7 @@ PHASES = ("nao-dsp", "nao-ssp")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["walk12", *PHASES])
 def test_no_box_loses_a_feasible_point_that_is_better_than_the_target(name: str) -> None:
-    assert count_lost_boxes(load(name), best_x(name), 200, np.random.default_rng(SEED)) == 0
+    assert count_lost_boxes(load(name), best_x(name), 100, np.random.default_rng(SEED)) == 0
 
 
 @pytest.mark.slow
@@ -73,6 +73,7 @@ def test_an_infeasible_gait_is_not_an_incumbent_of_a_phase() -> None:
         certify(problem, cheat)
 
 
+@pytest.mark.slow
 def test_a_least_power_form_that_differs_from_the_exact_functions_is_refused() -> None:
     problem = nlp_gait.load("nao-dsp", intervals=2)
     form = problem.power_form(problem)
@@ -103,8 +104,8 @@ def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dsp-v5", "walk12-lambda-1"])
-def test_random_paths_of_a_shipped_proof_end(name: str) -> None:
-    assert check_certificate(load_certificates()[name], starts=1, paths=2).paths == 2
+def test_a_random_path_of_a_shipped_proof_ends(name: str) -> None:
+    assert check_certificate(load_certificates()[name], starts=1, paths=1).paths == 1
 
 
 def test_shipped_certificates_record_all_options_of_their_problems() -> None:

@@ -56,6 +56,7 @@ def compared(nlp: dict[str, MX], p: Array, points: Array) -> float:
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("longest", [0, first_order.LONGEST_WRITTEN_OUT], ids=["in directions", "written out"])
 def test_chained_samples_give_the_same_values_and_derivatives(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(first_order, "LONGEST_WRITTEN_OUT", longest)

@@ -231,6 +231,7 @@ def test_a_start_outside_the_bounds_is_refused_and_one_on_them_but_for_rounding_
     assert solve(problem, x0=[9.0, 0.0], fix={"x": 1.0}).starts[0].x0.tolist() == [1.0, 0.0]
 
 
+@pytest.mark.slow
 def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
     problem = load("nao-ssp", intervals=3)
     usual, narrower = (

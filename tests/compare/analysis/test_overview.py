@@ -52,6 +52,7 @@ def test_wins_ties_and_losses_of_the_users_solver(comparisons: list[Comparison])
     assert found == {"ipopt": (0, 0, 3), "pso": (1, 1, 1)}
 
 
+@pytest.mark.slow
 def test_the_verdict_has_at_most_five_lines_and_the_matrix_marks_the_best(comparisons: list[Comparison]) -> None:
     verdict = write_overall_verdict(comparisons, rank_over_problems(comparisons))
     assert len(verdict) <= 5 and verdict[0].startswith("Mean rank of the medians over 3 problems: ipopt 1.00")

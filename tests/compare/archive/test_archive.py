@@ -63,6 +63,7 @@ def verify(content: bytes, folder: Path, **options: object) -> list[Finding]:
     return [Finding("manifest", not differences, "; ".join(differences)), *found]
 
 
+@pytest.mark.slow
 def test_an_archive_has_everything_and_every_run_can_be_repeated(files: Files, tmp_path: Path) -> None:
     expected = {"README.md", "requirements.txt", "ro-crate-metadata.json", "manifest.json", "study.json", RECORD}
     assert expected | {"certificates/walk12-lambda-0.4.json"} <= files.keys()

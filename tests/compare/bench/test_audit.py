@@ -65,6 +65,7 @@ def run(search: Any, runs: int = 6, evaluations: int = 400) -> Audit:
     return audit_search(search, runs=runs, evaluations=evaluations, instances=(INSTANCE,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", ["pso"])
 def test_a_search_that_drifts_to_the_middle_is_found(base: str) -> None:
     found = run(Planted(algorithm(base), "middle"), 12, 800)

@@ -33,6 +33,7 @@ def runs() -> list[RunRecord]:
     return run_study(Study(tasks=make_bench_study([ID], *solvers, runs=3, evaluations=1000).tasks()))
 
 
+@pytest.mark.slow
 def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_path: Path) -> None:
     """Expected running times and final objectives to twelve digits; equal records give an equal file."""
     path = pack_records(ID, runs, tmp_path)

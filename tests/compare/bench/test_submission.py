@@ -123,6 +123,7 @@ def test_pages_rank_what_holds_and_name_what_does_not(submission: Path, tmp_path
     assert f'href="{ranking.parent.name}/ranking.html"' in index and "pso" in ranking.read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("undrawn_pictures")
 def test_searches_with_similar_names_have_pages_of_their_own(
     submission: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -113,6 +113,7 @@ def test_bench_refuses_in_one_sentence(tmp_path: Path, arguments: tuple[str, ...
     assert words in one_sentence("bench", *arguments, "--out", tmp_path / "out")
 
 
+@pytest.mark.usefixtures("without_compiler")
 def test_bench_runs_others_where_no_baseline_is_shipped(mine: Path, tmp_path: Path) -> None:
     """On instances by seed; another budget has no baseline either."""
     call = ("--algorithm", f"{mine}:Steps", "--runs", "2", "--evaluations", "200", "--jobs", "1")

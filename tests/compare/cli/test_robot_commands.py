@@ -84,12 +84,12 @@ def test_a_film_is_made_without_a_display(gait, tmp_path):
     pytest.importorskip("mujoco")
     film = tmp_path / "film.gif"
     gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.5}}))
-    options = ["--video", film, "--beside", gait, "--fps", "2", "--speed", "0.5", "--size", "320x240"]
+    options = ["--video", film, "--beside", gait, "--fps", "1", "--speed", "0.5", "--size", "320x240"]
     done = process("simulate", gait, *options)
     if "cannot be drawn off the screen" in done.stderr or "MuJoCo does not load" in done.stderr:
         pytest.skip("no off-screen graphics here")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("stays up") == 2 and f"wrote {film}" in done.stdout.replace("\n", "")
     with Image.open(film) as image:
-        assert image.size == (320, 240) and image.info["duration"] == 500
-        assert image.n_frames == 6  # 1.5 s with the settling, at half the speed, two a second
+        assert image.size == (320, 240) and image.info["duration"] == 1000
+        assert image.n_frames == 3  # 1.5 s with the settling, at half the speed, one a second

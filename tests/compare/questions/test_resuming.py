@@ -36,7 +36,7 @@ WHOLE = {
     ),
     "motors": ("motors", *NAO),
     "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
-    "prices": ("prices", "walk12", "--starts", "2"),
+    "prices": ("prices", "walk12", "--starts", "1"),
 }  # fmt: skip
 # Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
 BEGUN = {

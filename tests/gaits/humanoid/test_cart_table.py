@@ -44,6 +44,7 @@ def signals(walk: Result) -> Signals:
     return sample_finely(walk)
 
 
+@pytest.mark.slow
 def test_the_cycle_is_one_step_at_a_constant_height_and_continues_mirrored(
     cycles: RecordedCycles, walk: Result, signals: Signals
 ) -> None:

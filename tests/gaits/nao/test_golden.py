@@ -39,11 +39,9 @@ def test_every_index_of_a_verified_gait(row: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("optimum", GOLDEN["optima"], ids=[row["label"] for row in GOLDEN["optima"]])
-def test_ipopt_finds_the_optimum_from_random_starts(optimum: dict[str, Any]) -> None:
-    solution = solve(load(optimum["problem"], **optimum["options"]), starts=2, seed=1)
-    assert [start.converged for start in solution.starts] == [True, True]
-    for start in solution.starts:
-        assert start.objective == pytest.approx(optimum["power_W"], rel=1e-5)
+def test_ipopt_finds_the_optimum_from_a_random_start(optimum: dict[str, Any]) -> None:
+    solution = solve(load(optimum["problem"], **optimum["options"]), starts=1, seed=1)
+    assert solution.converged and solution.objective == pytest.approx(optimum["power_W"], rel=1e-5)
 
 
 @pytest.mark.slow

@@ -67,6 +67,7 @@ def test_a_planned_gait_that_is_read_back_gets_the_same_verdict(name: str, tmp_p
             assert rows[row.name] == pytest.approx(row.value, rel=share, abs=share), row.name
 
 
+@pytest.mark.slow
 def test_its_own_limits_are_found_broken(tmp_path: Path) -> None:
     """Faster and lower than the phase allows: its time, the hip's velocities and height, and the swing height."""
     problem = load("nao-ssp")
@@ -120,6 +121,7 @@ def angles_of_stance() -> np.ndarray:
     return np.asarray(standing.arrays["q"][0][[standing.joints.index(name) for name in JOINTS]])
 
 
+@pytest.mark.slow
 def test_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
     """The hip's velocity comes from the joints' rates through the chain of links."""
     gait = make_recorded_gait(angles_of(written(tmp_path, "nao-ssp")))

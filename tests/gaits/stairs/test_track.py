@@ -129,6 +129,7 @@ def test_the_first_step_starts_at_rest_on_both_feet() -> None:
     assert violation > 0.0
 
 
+@pytest.mark.slow
 def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
     """The paper's base and six contacts: the stance leg carries nothing, and gains like those of Table IV follow."""
     held = nlp_gait.load("stairs-track", base="hip", duration_s=0.3).with_values(gravity_compensation=0.0)
