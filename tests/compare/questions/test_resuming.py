@@ -1,4 +1,7 @@
-"""Questions that are killed continue when they are rerun: no finished step is repeated, and the answer is the same."""
+"""Questions that are killed continue when they are rerun: no finished step is repeated, and the answer is the same.
+
+All run by `compare/questions/question.py`; those here store solves, runs of searches, proofs, variants and fronts.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from compare.questions import local_optima, prices, real_motors
+from compare.questions import local_optima, real_motors
 from compare.study.store import Store, parse_outcome, plain_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.solve import run_starts
@@ -36,13 +39,10 @@ WHOLE = {
     ),
     "motors": ("motors", *NAO),
     "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
-    "prices": ("prices", "walk12", "--starts", "1"),
 }  # fmt: skip
 # Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
 BEGUN = {
     "pareto": (*PARETO, "--search", "none"),
-    "pareto of three": (*PARETO, "--objectives", "power,dbm_y_mean,speed"),
-    "robust": ("robust", *NAO, "--no-simulate", "--samples", "0"),
     "walk": ("walk", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2"),
 }
 
@@ -54,8 +54,6 @@ class Killed(BaseException):
 @pytest.fixture(autouse=True)
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_optima, "BATCH", 2)
-    price_parameters = prices.price_parameters
-    monkeypatch.setattr(prices, "price_parameters", lambda optimum: price_parameters(optimum)[:4])
     monkeypatch.setattr(real_motors, "VARIANTS", dict(list(real_motors.VARIANTS.items())[:2]))
 
 
