@@ -43,7 +43,8 @@ def format_leads() -> str:
     board = rank_solvers(list_drawn())
     runs = sum(len(comparison.records) for comparison in board.comparisons)
     words = f"{len(board.comparisons)} instances, {len(board.standings)} solvers, {runs} runs of 10 000 evaluations:"
-    return f"{words}\n{markdown_page(Document(title='', verdict=(), parts=make_leads(board)))}"
+    page = markdown_page(Document(title="", verdict=(), parts=make_leads(board)))
+    return words + page.partition("Who leads where")[2].rstrip()
 
 
 def format_instances() -> str:

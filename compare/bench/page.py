@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from compare.analysis.anytime import SHARES, rank_at_budgets
 from compare.analysis.comparison import Comparison
@@ -18,7 +19,9 @@ from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Section, Table, text_table
 from compare.report.provenance import TERMS
 from compare.report.tuning_section import make_tuning_section
+from compare.study.task import GRADIENT_SOLVERS
 from nlp_gait import gaitbench
+from nlp_gait.formulation import Array
 
 PER_INSTANCE_TARGET = 1e-3
 LEAST_GROUPS = 4  # of instances, for a table of who leads where
@@ -77,14 +80,25 @@ def make_leads(board: Leaderboard) -> tuple[Section, ...]:
     groups = filter_instances([comparison.problem for comparison in board.comparisons])
     if len(groups) < LEAST_GROUPS:
         return ()
-    rows = []
-    for name, ids in groups.items():
-        ranks = rank_at_budgets([comparison for comparison in board.comparisons if comparison.problem in ids])
-        leads = [min(ranks, key=lambda solver: ranks[solver][k]) for k in range(len(SHARES))]
-        rows.append((name, str(len(ids)), *(f"{s} ({ranks[s][k]:.1f})" for k, s in enumerate(leads))))
     header = ("instances", "number", *(f"after {100 * share:g} %" for share in SHARES))
-    caption = "Solver with the best mean rank by median gap after a share of the budget"
-    return (Section(title="Who leads where", parts=(text_table(header, rows, caption),)),)
+    words = "best mean rank by median gap after a share of the budget"
+    tables = []
+    for caption, left_out in ((f"All solvers: {words}", ()), (f"Searches alone: {words}", GRADIENT_SOLVERS)):
+        rows = []
+        for name, ids in groups.items():
+            chosen = [c for c in board.comparisons if c.problem in ids]
+            kept = [replace(c, solvers=tuple(s for s in c.solvers if s.name not in left_out)) for c in chosen]
+            rows.append((name, str(len(ids)), *_find_leads(rank_at_budgets(kept))))
+        tables.append(text_table(header, rows, caption))
+    return (Section(title="Who leads where", parts=tables),)
+
+
+def _find_leads(ranks: Mapping[str, Array]) -> Iterator[str]:
+    """Yield the best solver and its rank at each share of the budget; nobody leads where all are equal."""
+    for k in range(len(SHARES)):
+        first = min(ranks, key=lambda solver: float(ranks[solver][k]))
+        equal = all(rank[k] == ranks[first][k] for rank in ranks.values())
+        yield "nobody" if equal else f"{first} ({ranks[first][k]:.1f})"
 
 
 def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:

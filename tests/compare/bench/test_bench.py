@@ -13,9 +13,18 @@ import pytest
 from compare.analysis.comparison import compare_problems
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import TARGETS
-from compare.bench.baseline import BASELINE, FOLDER, RUNS, list_instances, load_baseline, make_bench_study, pack_records
+from compare.bench.baseline import (
+    BASELINE,
+    FOLDER,
+    RUNS,
+    list_drawn,
+    list_instances,
+    load_baseline,
+    make_bench_study,
+    pack_records,
+)
 from compare.bench.leaderboard import rank_solvers
-from compare.bench.page import make_leaderboard_page
+from compare.bench.page import make_leaderboard_page, make_leads
 from compare.report.writing import write_document
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
@@ -154,3 +163,17 @@ def test_the_page_says_it(tmp_path: Path) -> None:
     assert "gaitbench-runtime" in (tmp_path / "leaderboard.html").read_text(encoding="utf-8") or "<svg" in (
         tmp_path / "leaderboard.html"
     ).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_drawn_instances_have_a_baseline_and_a_table_of_who_leads_where() -> None:
+    drawn = list_drawn()
+    assert len(drawn) >= 54 and len({id.split(":")[1] for id in drawn}) >= 9
+    chosen = [id for id in drawn if id.startswith(("gb2:walk12", "gb2:dsp-timed"))]
+    board = rank_solvers(chosen)
+    assert all({len(solver.records) for solver in c.solvers} == {3} for c in board.comparisons)
+    assert all(c.best is not None and c.better is None for c in board.comparisons)
+    (section,) = make_leads(board)
+    rows = {row[0]: row[2:] for table in section.parts for row in table.rows}  # of the searches alone, the last table
+    assert set(rows) >= {"all instances", "family walk12-long", "family dsp-timed"}
+    assert not any("slsqp" in cell or "ipopt" in cell for cells in rows.values() for cell in cells)
