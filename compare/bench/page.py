@@ -94,11 +94,11 @@ def make_leads(board: Leaderboard) -> tuple[Section, ...]:
 
 
 def _find_leads(ranks: Mapping[str, Array]) -> Iterator[str]:
-    """Yield the best solver and its rank at each share of the budget; nobody leads where all are equal."""
+    """Yield the best solver and its rank at each share of the budget; "none" where all are equal."""
     for k in range(len(SHARES)):
         first = min(ranks, key=lambda solver: float(ranks[solver][k]))
         equal = all(rank[k] == ranks[first][k] for rank in ranks.values())
-        yield "nobody" if equal else f"{first} ({ranks[first][k]:.1f})"
+        yield "none" if equal else f"{first} ({ranks[first][k]:.1f})"
 
 
 def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
