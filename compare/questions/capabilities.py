@@ -14,6 +14,7 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, GaitProblem, Objective, Point
 from nlp_gait.formulation.solution import ActiveConstraint, Solution
+from nlp_gait.gaits.biped.body import TIMED_UNITS
 from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.humanoid.turning import find_sharpest_turn
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -32,8 +33,6 @@ GOALS = (
     Goal("longest step", "step_length_m", "m"),
     Goal("highest lift of a foot", "swing_height_m", "m"),
 )
-# Bounds on variables of these units, and the upper ones on the goals, are ours: of NAO, by Froude scaling. Others are clearances.
-OUR_UNITS = ("s", "m/s", "rad/s")
 FACTOR, MOST_ROUNDS = 2.0, 6  # by which our bounds are moved in each round, and the number of rounds
 SHOWN = 4  # limits in a sentence
 FREE = 1e-4  # share of the value: a limit whose natural step changes it by less does not stop the robot
@@ -137,8 +136,9 @@ class Capabilities(Question[tuple[Capability, ...]]):
             parts=[
                 make_table("Greatest values of a walking cycle, and the limits that stop it", findings, columns),
                 "Each value is the maximum of a walking cycle under all limits of the problem; limits are listed by what a "
-                "natural step of each would gain. Bounds on times, velocities, step and lift are ours, scaled from NAO's by "
-                f"Froude's rule: where they stop the robot, they are moved by a factor of {FACTOR:g}, again and again.",
+                "natural step of each would gain. Bounds on times, velocities, step and lift are ours: NAO's in proportion, "
+                "with least times and greatest velocities from the joints that swing the robot's legs. Where they stop the "
+                f"robot, they are moved by a factor of {FACTOR:g}, again and again.",
                 *(f"{c.words}: {c.end}." for c in findings),
                 make_csv_table(stem, header, rows),
             ],
@@ -203,7 +203,7 @@ def make_stop(active: ActiveConstraint) -> Stop:
         gain=active.price * choose_natural_step(active.unit, active.bound).size,
         ours=bool(variable)
         and active.bound != 0.0
-        and (active.unit in OUR_UNITS or is_goal and active.side == "upper"),
+        and (active.unit in TIMED_UNITS or is_goal and active.side == "upper"),  # others are clearances
     )
 
 

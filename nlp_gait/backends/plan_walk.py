@@ -20,6 +20,7 @@ from nlp_gait.errors import InputError, check_count
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
+from nlp_gait.gaits.biped.body import TIMED_UNITS
 from nlp_gait.gaits.biped.cycle_motion import STEP
 from nlp_gait.gaits.biped.footholds import list_swings, parse_footholds, read_footholds
 from nlp_gait.gaits.biped.walk_parts import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED
@@ -29,6 +30,7 @@ from nlp_gait.gaits.humanoid.turning import list_turn
 from nlp_gait.gaits.nao.body import load_nao
 from nlp_gait.progress import Progress, ignore_progress
 
+AT_BOUND = 1e-4  # share of a variable's range
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
 SENTENCES: Mapping[str, Mapping[str, Any]] = tomllib.loads(
     files(__package__).joinpath("walk_remedies.toml").read_text(encoding="utf-8")
@@ -56,7 +58,8 @@ class WalkPlan:
         """Sentences that name step, constraint, amount and remedy of the largest violations; empty if feasible."""
         if self.feasible:
             return ()
-        return tuple(dict.fromkeys(describe_violation(row, self.steps) for row in self.solution.worst_violations[:5]))
+        rows = dict.fromkeys(describe_violation(row, self.steps) for row in self.solution.worst_violations[:5])
+        return (*rows, *describe_own_bounds(self.problem, self.solution.x))
 
     @property
     def result(self) -> Result:
@@ -217,6 +220,19 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progres
     indexes = build_exact_model(problem).at(problem.check_x(best.x), problem.p).indexes
     numbers = {name: float(indexes[name]) for name in ("distance_m", "duration_s", "energy_J")}
     return WalkPlan(problem=problem, solution=best, steps=int(problem.options["steps"]), **numbers)
+
+
+def describe_own_bounds(problem: GaitProblem, x: Mapping[str, float]) -> list[str]:
+    """Return a sentence about the bounds on times and velocities that a gait reaches, which are not the robot's."""
+    reached = [
+        f"{variable.name}.{end}={bound:g}"
+        for variable, low, high in zip(problem.variables, problem.lower, problem.upper, strict=True)
+        for end, bound in (("lower", low), ("upper", high))
+        if variable.unit in TIMED_UNITS and low < high and abs(x[variable.name] - bound) <= AT_BOUND * (high - low)
+    ]
+    if not reached:
+        return []
+    return [f"it reaches bounds of this package, not of the robot: {', '.join(reached)}; --set moves them"]
 
 
 def describe_violation(row: ConstraintValue, steps: int) -> str:

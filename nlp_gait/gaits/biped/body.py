@@ -31,6 +31,7 @@ PhaseName: TypeAlias = Literal["ssp", "dsp"]
 TIMES: dict[PhaseName, str] = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
 LIFT = "swing_height_m"
 STEEPEST_DEG = 30.0  # slope of the ground
+TIMED_UNITS = ("s", "m/s", "rad/s")  # of variables whose bounds are this package's, not the robot's
 
 
 def read_duration(at: InstantPoint, phase: PhaseName) -> SX:
@@ -89,6 +90,8 @@ class Body(ABC):
     drive_limits: bool = False  # whether torques and speeds are within the limits of the robot's file
     length_scale: float = 1.0  # lengths relative to NAO's
     time_scale: float = 1.0  # times and velocities relative to NAO's
+    # By how much the robot's own joints can swing a leg faster than NAO's papers do, in proportion: bounds are as much wider
+    swing_speed: float = 1.0
     torque_scale: float = 1.0  # torques relative to NAO's
     # Joints of arms that the legs do not carry: each arm is a chain of its own on a torso at rest
     separate_joints: tuple[str, ...] = ()
@@ -174,7 +177,7 @@ class Body(ABC):
         bounds = {"z": (-0.05, 0.05, "vertical"), "x": (0.001, 0.2, "sagittal"), "y": (-0.2, 0.2, "lateral")}
         for axis, (least, most, word) in bounds.items():
             for end in ("start", "end"):
-                limits = self.scale_time(least), self.scale_time(most)
+                limits = self.scale_time(min(least, least * self.swing_speed)), self.scale_time(most * self.swing_speed)
                 rows.append((f"hip_v{axis}_{end}_m_s", "m/s", *limits, f"{word} velocity at the {end}"))
         return tuple(
             Variable(name=name, unit=unit, lower=lower, upper=upper, description=text)
@@ -216,7 +219,23 @@ class Body(ABC):
         least, most = {"ssp": (0.4, 4.0), "dsp": (0.2, 2.0)}[phase]
         word = {"ssp": "from lift-off to touch-down", "dsp": "from touch-down to the next lift-off"}[phase]
         return Variable(
-            name=TIMES[phase], unit="s", lower=self.scale_time(least), upper=self.scale_time(most), description=word
+            name=TIMES[phase],
+            unit="s",
+            lower=self.scale_time(least / self.swing_speed),
+            upper=self.scale_time(most),
+            description=word,
+        )
+
+    def narrow(self, variable: Variable) -> Variable:
+        """Return a variable with the bounds in proportion to NAO's, between which gaits start."""
+        if variable.unit == "s":
+            return replace(variable, lower=min(variable.lower * self.swing_speed, variable.upper))
+        if variable.unit not in TIMED_UNITS:
+            return variable
+        return replace(
+            variable,
+            lower=max(variable.lower, variable.lower / self.swing_speed),
+            upper=variable.upper / self.swing_speed,
         )
 
     @property

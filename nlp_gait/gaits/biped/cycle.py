@@ -226,7 +226,8 @@ def plan_cycle(body: Body, grid: Grid, objective: CycleObjective, sharing: LoadS
 
     start = sharing.start(names, partial(draw_start, names) if at_given_speed else None)
     if not body.closed_form:
-        start = make_start_within_reach(names, (SPEED,) if at_given_speed else (), reach, start)
+        usual = [body.narrow(variable) for variable in cycle.decisions]
+        start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)
     return make_cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
 
 

@@ -22,6 +22,7 @@ from nlp_gait.formulation import (
     SimulationModel,
     SolverHints,
     Start,
+    Variable,
 )
 from nlp_gait.formulation.display import Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
@@ -94,7 +95,8 @@ def make_phase_problem(
 
     body = phase.body
     if not body.closed_form:
-        start = make_start_within_reach(phase.names, phase.known[1:], lambda at: phase.sample(at, Exact()).reach, start)
+        usual = [body.narrow(variable) for variable in phase.variables]
+        start = make_start_within_reach(usual, phase.known[1:], lambda at: phase.sample(at, Exact()).reach, start)
     problem = GaitProblem(
         name=f"{body.family}-{name}",
         title=f"{body.title}, {title}",
@@ -138,22 +140,28 @@ def add_robot(
 
 
 def make_start_within_reach(
-    variables: Sequence[str], known: Sequence[str], reach: Callable[[Point], MX], start: Start | None
+    variables: Sequence[Variable], known: Sequence[str], reach: Callable[[Point], MX], start: Start | None
 ) -> Start:
     """Return start points at which all knees are within reach, or the nearest of some: beyond reach there is no slope back.
 
     Besides the margin on the reach, the motion reads the parameters ``known``; ``reach`` gives the cosines of the knees at a
-    point. Start points to choose from are those of ``start``, or any within the bounds.
+    point. Start points to choose from are those of ``start``, or any, within both the bounds and those of ``variables``.
     """
-    read = (REACH_MARGIN, *known)
+    read, names = (REACH_MARGIN, *known), [variable.name for variable in variables]
 
     @cache
     def farthest() -> ca.Function:
-        x, p = MX.sym("x", len(variables)), MX.sym("p", len(read))
-        return ca.Function("farthest", [x, p], [ca.mmax(ca.fabs(reach(Point.of(x, p, variables, read))))])
+        x, p = MX.sym("x", len(names)), MX.sym("p", len(read))
+        return ca.Function("farthest", [x, p], [ca.mmax(ca.fabs(reach(Point.of(x, p, names, read))))])
 
     def draw(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        return draw_uniform(variables, parameters, rng) if start is None else start(parameters, rng)
+        within = dict(parameters)
+        for variable in variables:
+            bounds = f"{variable.name}.lower", f"{variable.name}.upper"
+            low, high = max(within[bounds[0]], variable.lower), min(within[bounds[1]], variable.upper)
+            if low <= high:
+                within |= zip(bounds, (low, high), strict=True)
+        return draw_uniform(names, within, rng) if start is None else start(within, rng)
 
     def choose(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         best, least = np.zeros(0), np.inf

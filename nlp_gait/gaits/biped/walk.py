@@ -315,6 +315,10 @@ def make_walk_problem(
             motion=walk.signals,
             durations=tuple(walk.parts[name].duration for name, count in walk.counts.items() for _ in range(count)),
         ),
-        hints=SolverHints(start=partial(start_walk, started, math.tan(body.slope_rad)), starts=3, searchable=False),
+        hints=SolverHints(
+            start=partial(start_walk, [body.narrow(variable) for variable in started], math.tan(body.slope_rad)),
+            starts=3,
+            searchable=False,
+        ),
     )
     return add_robot(problem, body, steps=walk.steps, ground=ground)

@@ -19,6 +19,7 @@ from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.single_support import make_nearest_edge_margins
+from nlp_gait.gaits.humanoid.swing_time import NAO_SWING_S, compare_swing
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
@@ -160,7 +161,8 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
     biped = make_biped_model(load_robot(robot))
     left, (middle_x, _, middle_z) = biped.legs["left"], biped.hip_middle_m
     above = biped.model.feet["left"].ankle_height_m + float(left.ankle_m[2] - left.foot_m[2])
-    rate = float(f"{LARGEST_LEAN_RATE / biped.time_scale:.4g}")
+    swing_speed = compare_swing(biped)
+    rate = float(f"{LARGEST_LEAN_RATE * swing_speed / biped.time_scale:.4g}")
     heat = float(f"{biped.heat_W_per_Nm2:.4g}")
     return Humanoid(
         family="humanoid",
@@ -200,6 +202,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         drive_limits=drive_limits,
         length_scale=biped.length_scale,
         time_scale=biped.time_scale,
+        swing_speed=swing_speed,
         torque_scale=biped.torque_scale,
         biped=biped,
         newton_steps={side: count_newton_steps(leg) for side, leg in biped.legs.items()},
@@ -301,7 +304,11 @@ def describe_humanoid(body: Humanoid) -> list[tuple[str, str]]:
         ),
         ("heat constant K", f"{biped.heat_W_per_Nm2:.3g} W/(Nm)^2, {biped.heat_source}"),
         ("step length", f"{body.step_length_m:.3f} m by default"),
-        ("time of a swing", f"{body.scale_time(0.4):.3g} to {body.scale_time(4.0):.3g} s"),
+        (
+            "time of a swing",
+            f"{body.scale_time(NAO_SWING_S / body.swing_speed):.3g} to {body.scale_time(4.0):.3g} s"
+            + (", the least from its joints' speeds and torques" if body.swing_speed > 1.0 else ""),
+        ),
         ("torque may change", f"by {TORQUE_CHANGE_NM * biped.torque_scale:.3g} Nm over an interval"),
     ]
     return rows

@@ -10,7 +10,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, load, sample_finely
 from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
-from nlp_gait.gaits.humanoid.body import GRAVITY
+from nlp_gait.gaits.humanoid.body import GRAVITY, make_humanoid
 from nlp_gait.gaits.humanoid.problems import make_humanoid_cycles
 from tests.pinocchio_oracle import Standing, floating_model, stand
 from tests.robots.crooked import SOLE_AHEAD_M, crooked
@@ -102,7 +102,8 @@ def test_the_whole_bodys_zmp_is_the_planned_one(walk: Result, signals: Signals) 
 def test_a_planned_cycle_that_is_read_back_gets_the_same_verdict(path: str, cycles: RecordedCycles) -> None:
     """Its torso leans; a spline through samples 10 ms apart is this near to a cubic hip."""
     problem = load("humanoid-cycle", robot=path, intervals=4)
-    x = 0.5 * (problem.lower + problem.upper)
+    usual = [make_humanoid(path).narrow(variable) for variable in problem.variables]
+    x = np.array([(variable.lower + variable.upper) / 2 for variable in usual])
     x[problem.variable_index("single_support_time_s")] = STEPS.single_s
     x[problem.variable_index("double_support_time_s")] = STEPS.double_s
     finer = problem.dense(20)
