@@ -43,7 +43,10 @@ OTHER: dict[str, Any] = {
 }
 
 
-STAIRS = {"stair_rise_m": 0.02, "stair_run_m": 0.2}  # both or none, and on the level: tested by themselves
+STAIRS = {
+    "stair_rise_m": 0.02,
+    "stair_run_m": 0.2,
+}  # both or none, and on the level: tested by themselves, as footholds are
 
 
 def defaults(name: str) -> dict[str, Any]:
@@ -54,7 +57,7 @@ def others(name: str) -> dict[str, Any]:
     """A value that is not its default for every option; of a choice, the one after the default."""
     hints, found = get_type_hints(find_maker(name)), {}
     for option, default in defaults(name).items():
-        if option in STAIRS:
+        if option in (*STAIRS, "footholds"):
             continue
         choices = get_args(hints[option]) if get_origin(hints[option]) is Literal else ()
         found[option] = (

@@ -123,7 +123,7 @@ def test_bench_runs_others_where_no_baseline_is_shipped(mine: Path, tmp_path: Pa
     assert found["instances"] == ["gb2:walk12-long:3", "gb2:walk12-long:4"]
     assert {s["solver"] for s in found["standings"]} == {"random", "pso", found["solver"]}
     shown = (tmp_path / "leaderboard.md").read_text(encoding="utf-8")
-    assert "gb2:walk12-long:4" in shown and "2 with 200, run k" in shown
+    assert "gb2:walk12-long:4" in shown and "2 runs on each instance, with 200 evaluations" in shown
 
 
 def test_instances_are_problems_everywhere(tmp_path: Path) -> None:
