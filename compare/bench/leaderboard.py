@@ -64,7 +64,8 @@ def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     costs = np.array([[[on[name].expected_cost(t) for name in names] for t in TARGETS] for on in found])
     rows = costs.reshape(-1, len(names))
     rows = rows[np.isfinite(rows).any(axis=1)]
-    ranks = rankdata(rows, axis=1).mean(axis=0) if len(rows) else np.full(len(names), math.nan)
+    equal = (len(names) + 1) / 2  # where no solver reaches a target
+    ranks = rankdata(rows, axis=1).mean(axis=0) if len(rows) else np.full(len(names), equal)
     solved = [
         float(
             np.mean([math.isfinite(c.cost_to_reach(t)) for on in found for c in on[name].curves for t in ECDF_TARGETS])

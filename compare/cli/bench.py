@@ -97,9 +97,9 @@ def bench(
     chosen = choose_instances(suite, instances, families, seeds)
     shipped = evaluations == EVALUATIONS and set(chosen) <= {*list_instances(), *list_drawn()}
     label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
-    solvers = {} if shipped else dict.fromkeys(parse_names(against), "")
+    solvers = {} if shipped else {other: "" for other in parse_names(against) if other != algorithm}
     if algorithm is not None:
-        solvers[algorithm] = label
+        solvers[algorithm] = label  # the last one
     if tune and not solvers:
         raise InputError(
             "--tune needs a search that runs here: name it with --algorithm, or drawn instances with --families"
