@@ -124,7 +124,7 @@ def test_bench_runs_others_where_no_baseline_is_shipped(mine: Path, tmp_path: Pa
     assert {s["solver"] for s in found["standings"]} == {"random", "pso", found["solver"]}
     shown = (tmp_path / "leaderboard.md").read_text(encoding="utf-8")
     assert "gb2:walk12-long:4" in shown and "2 runs on each instance, with 200 evaluations" in shown
-    few = ("--families", "walk12-long", "--seeds", "3:4", "--runs", "2", "--evaluations", "20", "--jobs", "1")
+    few = ("--families", "walk12-long", "--seeds", "3:4", "--runs", "2", "--evaluations", "60", "--jobs", "1")
     named = as_json("bench", "--algorithm", "pso", *few, "--against", "pso,random", "--out", tmp_path / "named")
     assert {s["solver"]: s["mean_rank"] for s in named["standings"]} == {"my-pso": 1.5, "random": 1.5}
 
