@@ -19,7 +19,7 @@ from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.single_support import make_nearest_edge_margins
-from nlp_gait.gaits.humanoid.swing_time import NAO_SWING_S, compare_swing
+from nlp_gait.gaits.humanoid.swing_time import GRAVITY, NAO_SWING_S, STEP_M, compare_swing
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
@@ -36,7 +36,6 @@ from nlp_gait.symbolic.kinematics import UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
-GRAVITY = 9.81  # [m/s^2]
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than
 # its 0.886, with which ankles of other robots reach their limits.
 HEIGHT_SHARES = (0.5905, 0.95)
@@ -45,7 +44,6 @@ LEAN = ("torso_roll", "torso_pitch")
 LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-STEP_M = 0.06  # NAO's, from foot to foot
 # Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
 NEARLY_CLOSED, CLOSED, SHARE = 1e-9, 1e-12, 0.995
 MOST_STEPS = 8

@@ -27,7 +27,7 @@ def test_the_least_swing_is_within_speed_and_torque_of_the_hip(body: Humanoid) -
     joints = [body.biped.model.joint(name) for name in leg.joints]
     hip = max(joints[:3], key=lambda joint: abs(leg.axes[leg.joints.index(joint.name)][1]))
     s = np.linspace(0.0, 1.0, 1001)
-    angle = 0.2 * (3 * s**2 - 2 * s**3)
+    angle = 2 * 0.06 / 0.2029 * (3 * s**2 - 2 * s**3)
     rate = np.gradient(angle, s * time)
     mass = sum(body.biped.model.links[joint.child].mass_kg for joint in joints)
     torque = mass * leg.length_m**2 / 3 * np.gradient(rate, s * time)
