@@ -38,7 +38,7 @@ SHIFT = "shift_time_s"
 RIGHT = tuple(f"right_{end}_{what}" for end in ("from", "to") for what in ("x_m", "y_m", "yaw_rad"))
 BESIDE = 1e-6  # [m, rad]; feet this close to their places at the start stand side by side
 # Of the sole in x and y, least distance of the ZMP from its edges in single support: without it, JVRC-1 falls after a turn.
-LEAST_SHARE = 1 / 8
+LEAST_SHARE = 1 / 4
 LEAST_SLANT = 1e-2  # component of a side's normal along an axis, below which there is no distance to the side along it
 
 
