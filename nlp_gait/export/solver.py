@@ -13,9 +13,11 @@ from nlp_gait.backends.derivatives.plan import format_number
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
+from nlp_gait.export import planner
 from nlp_gait.export.c_files import format_comment, write_c_files
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
+from nlp_gait.formulation.solution import Outcome
 
 # Name of each file by its template; the C++ file is assembled from the plan.
 TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}
@@ -23,11 +25,14 @@ BOUNDS = {"w_lower": "lbx", "w_upper": "ubx", "g_lower": "lbg", "g_upper": "ubg"
 
 
 @lock_casadi
-def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
+def export_solver(problem: GaitProblem, folder: Path, *, near: Outcome | None = None) -> list[Path]:
     """Write source, header, example and build line of a problem's NLP with its parameter values; return the files.
+
+    With ``near``, an optimum by IPOPT, also a planner in C that begins there and solves again for other parameter values.
 
     Raises:
         CompilerError: the NLP has an operation without C++ code.
+        InputError: ``near`` is not an optimum, or no planner can be written for the problem.
         OutputError: the folder cannot be written to.
     """
     model = build_nlp(problem)
@@ -35,7 +40,10 @@ def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
     prefix = f"{problem.name.replace('-', '_')}_nlp"
     words = _words(problem, model, found, prefix)
     source = _source(problem, model, found, prefix)
-    return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
+    if near is None:
+        return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
+    words = {**words, **planner.describe_planner(problem, model, found, prefix, near)}
+    return write_c_files(folder, "nlp_gait.export", TEMPLATES | planner.TEMPLATES, words, source)
 
 
 def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
@@ -89,6 +97,7 @@ def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(FLAGS),
+        "PLANNER": "",
         "VARIABLES": format_comment(
             f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)
         ),

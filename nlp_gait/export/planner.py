@@ -1,0 +1,136 @@
+"""A solver in C that plans again for changed parameters, on the exported NLP; needs only libc and libm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from nlp_gait.backends.derivatives.assembly import NlpPlan
+from nlp_gait.backends.derivatives.compiled import write_array
+from nlp_gait.backends.derivatives.plan import CALL, FIRST, PRODUCTS, RUNS, SECOND, TAPE, VALUES, Plan, format_number
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import NlpModel
+from nlp_gait.errors import InputError
+from nlp_gait.export.c_files import format_comment
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
+
+# Files by their templates, in addition to those of the NLP.
+TEMPLATES = {
+    "{prefix}_planner.h": "planner.h.in",
+    "{prefix}_planner.c": "planner.c.in",
+    "dense.h": "dense.h",
+    "plan.c": "planner_main.c.in",
+}
+BUILD = """${{CC:-cc}} {flags} $CFLAGS -fPIC -c -o {prefix}_planner.o {prefix}_planner.c
+${{CC:-cc}} -shared -o lib{prefix}_planner.so {prefix}_planner.o {prefix}.o -lm
+${{CC:-cc}} -std=c99 -O2 -o plan plan.c {prefix}_planner.o {prefix}.o -lm
+"""
+FLAGS = "-std=c99 -O2 -fno-math-errno -ffp-contract=off"
+MOST_VARIABLES = 60  # of a problem: programs are dense
+
+
+def describe_planner(
+    problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str, near: Outcome
+) -> Mapping[str, str]:
+    """Return the words of the templates.
+
+    Raises:
+        InputError: ``near`` is not an optimum with multipliers, or dense programs do not suit the problem.
+    """
+    if near.guess is None or not near.converged:
+        raise InputError(f"{problem.name}: a planner begins from an optimum by IPOPT; it {near.status}")
+    if model.variables > MOST_VARIABLES:
+        raise InputError(
+            f"{problem.name} has {model.variables} variables; a planner in C has at most {MOST_VARIABLES}: use "
+            "nlp_gait.replanner"
+        )
+    _check_order(problem, model, found)
+    functions = [_rename(function, prefix) for function in (model.row_bounds, model.lift_start)]
+    writer = ca.CodeGenerator(f"{prefix}_functions", {"with_header": False})
+    for function in functions:
+        writer.add(function)
+    first = len(model.row_names)
+    constants = {
+        "tie_upper": ("double", map(format_number, model.tie_upper.tolist())),
+        "tie_owner": ("int", model.tie_owner.tolist()),
+        "lift_sense": ("double", map(format_number, model.lift_sense.tolist())),
+        "row_scale": ("double", map(format_number, build_exact_model(problem).row_scales[:first].tolist())),
+    }
+    optimum = {"x": near.x, "multipliers": near.guess.rows}
+    return {
+        "OWN": str(len(problem.p)),
+        "FIRST": str(first),
+        "TOLERANCE": repr(FEASIBILITY_TOLERANCE),
+        "CONSTANTS": "\n".join(
+            [
+                *(write_array(kind, name, values) for name, (kind, values) in constants.items()),
+                *(
+                    write_array("double", f"{prefix}_{name}", map(format_number, values.tolist())).removeprefix("static ")
+                    for name, values in optimum.items()
+                ),
+            ]
+        ),
+        "FUNCTIONS": writer.dump(),
+        "COUNTS": format_comment(_count_parts(model, found)),
+        "CASADI_NUMBERS": str(max(1, *(function.sz_w() for function in functions))),
+        "CASADI_INTEGERS": str(max(1, *(function.sz_iw() for function in functions))),
+        "CASADI_ARGUMENTS": str(max(function.sz_arg() for function in functions)),
+        "CASADI_RESULTS": str(max(function.sz_res() for function in functions)),
+        "PLANNER": BUILD.format(prefix=prefix, flags=FLAGS),
+    }
+
+
+def _rename(function: ca.Function, prefix: str) -> ca.Function:
+    inputs = function.mx_in()
+    return ca.Function(f"{prefix}_{function.name()}", inputs, function.call(inputs, True, False))
+
+
+def _check_order(problem: GaitProblem, model: NlpModel, found: NlpPlan) -> None:
+    """Check that each lifted variable depends on earlier ones only, so that one substitution after another finds all."""
+    first, n = len(model.row_names), model.variables
+    for row, column in zip(*found.jacobian.get_triplet(), strict=True):
+        if row >= first and column - n > model.tie_owner[row - first]:
+            raise InputError(
+                f"{problem.name} solves equations within its motion, which a planner in C cannot; use nlp_gait.replanner"
+            )
+
+
+def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
+    """Return lines with the number of operations of a step's parts."""
+    n, lifted, rows = model.variables, model.lifted, len(model.row_names) + len(model.tie_upper)
+    by_lifted = found.jacobian.nnz() - found.jacobian.colind()[n]
+    reduction = 2 * (by_lifted * 2 * (n + 1) + 2 * found.hessian.nnz() * n + lifted * n * (n + 1))
+    parts = {
+        "values of all functions": _count(found.plan, VALUES),
+        "first derivatives, in addition": _count(found.plan, FIRST),
+        "second derivatives, in addition": _count(found.plan, SECOND),
+        "elimination of the lifted variables": reduction,
+        "eigenvectors of the curvature, four times": 4 * 30 * 6 * n**3,
+        "a change of the program's active rows, with r variables kept": 0,
+    }
+    *others, last = parts
+    return [
+        *(f"{parts[name]:10d}  {name}" for name in others),
+        f"6 q^2 + 2 q a  {last}: q = {n} + r, a <= {rows} rows",
+        "A step needs derivatives once, values at most 20 times (5 lengths, 4 evaluations each), at most 15 programs, each with at",
+        f"most {10 * (n + lifted + 100)} changes; typically 1 program and {n} changes.",
+    ]
+
+
+def _count(plan: Plan, phase: int) -> int:
+    """Count a phase's additions, multiplications and functions."""
+    total = 0
+    for kind, first, last in plan.steps[phase]:
+        if kind == TAPE:
+            total += last - first
+        elif kind == RUNS:
+            total += sum(2 * length for *_, length in plan.runs[first:last])
+        elif kind == PRODUCTS:
+            total += sum(1 + 2 * length for *_, length in plan.products[first:last])
+        elif kind == CALL:
+            call = plan.calls[first]
+            times = call.samples if call.directions is None else int(call.directions.sum())
+            total += times * plan.functions[call.function].n_instructions()
+    return total
