@@ -43,12 +43,17 @@ def export_objective(instance: str, to: Path, as_json: bool = False) -> None:
 
 
 @command
-def export_solver(to: Path, *, problem: NamedProblem, nl: bool = False, as_json: bool = False) -> None:
+def export_solver(
+    to: Path, *, problem: NamedProblem, planner: bool = False, nl: bool = False, as_json: bool = False
+) -> None:
     """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
 
     The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
 
-    Examples: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
+    With `--planner` also a solver in C for changed parameters, which begins from an optimum that is found first.
+
+    Examples: `nlp-gait export-solver nao-ssp --to DIR --planner`, then `sh DIR/build.sh && DIR/plan`,
+    `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
     `nlp-gait export-solver nao-ssp --to DIR --nl`
     """
     from compare.study.references import find_reference

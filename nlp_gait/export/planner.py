@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import casadi as ca
+from casadi import SX
 
 from nlp_gait.backends.derivatives.assembly import NlpPlan
 from nlp_gait.backends.derivatives.compiled import write_array
@@ -13,8 +14,9 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import NlpModel
 from nlp_gait.errors import InputError
 from nlp_gait.export.c_files import format_comment
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import GaitProblem, InstantPoint
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
+from nlp_gait.symbolic.simplification import simplify
 
 # Files by their templates, in addition to those of the NLP.
 TEMPLATES = {
@@ -29,6 +31,7 @@ ${{CC:-cc}} -std=c99 -O2 -o plan plan.c {prefix}_planner.o {prefix}.o -lm
 """
 FLAGS = "-std=c99 -O2 -fno-math-errno -ffp-contract=off"
 MOST_VARIABLES = 60  # of a problem: programs are dense
+MOTION = ("q", "qd", "tau", "zmp")  # at any time
 
 
 def describe_planner(
@@ -48,6 +51,10 @@ def describe_planner(
         )
     _check_order(problem, model, found)
     functions = [_rename(function, prefix) for function in (model.row_bounds, model.lift_start)]
+    joints: tuple[str, ...] = ()
+    if problem.display.at_time is not None:
+        functions.append(_make_motion(problem, problem.display.at_time, prefix))
+        joints = problem.signals(near.x).joints
     writer = ca.CodeGenerator(f"{prefix}_functions", {"with_header": False})
     for function in functions:
         writer.add(function)
@@ -78,6 +85,8 @@ def describe_planner(
         "CASADI_INTEGERS": str(max(1, *(function.sz_iw() for function in functions))),
         "CASADI_ARGUMENTS": str(max(function.sz_arg() for function in functions)),
         "CASADI_RESULTS": str(max(function.sz_res() for function in functions)),
+        "JOINTS": str(len(joints)),
+        "JOINT_NAMES": ", ".join(joints) or "none",
         "PLANNER": BUILD.format(prefix=prefix, flags=FLAGS),
     }
 
@@ -85,6 +94,16 @@ def describe_planner(
 def _rename(function: ca.Function, prefix: str) -> ca.Function:
     inputs = function.mx_in()
     return ca.Function(f"{prefix}_{function.name()}", inputs, function.call(inputs, True, False))
+
+
+def _make_motion(
+    problem: GaitProblem, at_time: Callable[[InstantPoint, SX], Mapping[str, SX]], prefix: str
+) -> ca.Function:
+    """Return a function of x, p and a time to joint angles, rates, torques and ZMP."""
+    names = [parameter.name for parameter in problem.parameters]
+    x, p, t = SX.sym("x", len(problem.names)), SX.sym("p", len(names)), SX.sym("t")
+    found = at_time(InstantPoint.of(x, p, problem.names, names), t)
+    return ca.Function(f"{prefix}_motion", [x, p, t], simplify([ca.densify(found[name]) for name in MOTION]))
 
 
 def _check_order(problem: GaitProblem, model: NlpModel, found: NlpPlan) -> None:

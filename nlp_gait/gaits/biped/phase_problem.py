@@ -106,7 +106,11 @@ def make_phase_problem(
         assemble=assemble,
         grid=phase.grid,
         rows_over_time=phase.rows_over_time() if body.closed_form else (),
-        display=Display(motion=phase.signals, durations=(phase.duration,)),
+        display=Display(
+            motion=phase.signals,
+            at_time=phase.at_time if phase.derivatives == "analytic" else None,
+            durations=(phase.duration,),
+        ),
         hints=SolverHints(start=start, searchable=searchable),
     )
     return add_robot(problem, body)
