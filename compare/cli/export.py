@@ -50,19 +50,30 @@ def export_solver(
 
     The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
 
-    With `--planner` also a solver in C for changed parameters, which begins from an optimum that is found first.
+    With `--planner` the problem is solved first, and a solver in C is written that plans again from there.
 
-    Examples: `nlp-gait export-solver nao-ssp --to DIR --planner`, then `sh DIR/build.sh && DIR/plan`,
-    `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
+    Examples: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
+    `nlp-gait export-solver nao-ssp --to DIR --planner`, then `sh DIR/build.sh && DIR/plan`,
     `nlp-gait export-solver nao-ssp --to DIR --nl`
     """
     from compare.study.references import find_reference
     from nlp_gait.backends.identity import identify_problem
+    from nlp_gait.backends.solve import solve
+    from nlp_gait.errors import InputError
     from nlp_gait.export.nl_file import export_nl
+    from nlp_gait.export.planner import check_planner
     from nlp_gait.export.solver import export_solver as write
 
-    loaded = problem.spec().load()
-    written = export_nl(loaded, to, find_reference(identify_problem(loaded)).to_json()) if nl else write(loaded, to)
+    if planner and nl:
+        raise InputError("--planner writes C code and --nl an .nl file; give one of them")
+    loaded, near = problem.spec().load(), None
+    if planner:
+        check_planner(loaded)
+        near = min(solve(loaded).starts, key=lambda outcome: outcome.rank)
+    if nl:
+        written = export_nl(loaded, to, find_reference(identify_problem(loaded)).to_json())
+    else:
+        written = write(loaded, to, near=near)
     print_result(as_json, {"problem": loaded.address}, written, lambda: None)
 
 

@@ -11,10 +11,10 @@ from nlp_gait.backends.derivatives.assembly import NlpPlan
 from nlp_gait.backends.derivatives.compiled import write_array
 from nlp_gait.backends.derivatives.plan import CALL, FIRST, PRODUCTS, RUNS, SECOND, TAPE, VALUES, Plan, format_number
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.nlp import NlpModel
+from nlp_gait.backends.nlp import NlpModel, build_nlp
 from nlp_gait.errors import InputError
 from nlp_gait.export.c_files import format_comment
-from nlp_gait.formulation import GaitProblem, InstantPoint
+from nlp_gait.formulation import Array, GaitProblem, InstantPoint
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
 from nlp_gait.symbolic.simplification import simplify
 
@@ -30,8 +30,25 @@ ${{CC:-cc}} -shared -o lib{prefix}_planner.so {prefix}_planner.o {prefix}.o -lm
 ${{CC:-cc}} -std=c99 -O2 -o plan plan.c {prefix}_planner.o {prefix}.o -lm
 """
 FLAGS = "-std=c99 -O2 -fno-math-errno -ffp-contract=off"
-MOST_VARIABLES = 60  # of a problem: programs are dense
+MOST_VARIABLES, MOST_LIFTED = 60, 2000  # programs are dense
 MOTION = ("q", "qd", "tau", "zmp")  # at any time
+
+
+def check_planner(problem: GaitProblem) -> None:
+    """Raise InputError if no planner in C can be written for a problem."""
+    model = build_nlp(problem)
+    first, n = len(model.row_names), model.variables
+    if n > MOST_VARIABLES or model.lifted > MOST_LIFTED:
+        raise InputError(
+            f"{problem.name} has {n} variables and {model.lifted} lifted ones; a planner in C has at most {MOST_VARIABLES} "
+            f"and {MOST_LIFTED}: use nlp_gait.replanner"
+        )
+    # Each lifted variable must depend on earlier ones only, so that one substitution after another finds all.
+    for row, column in zip(*ca.jacobian_sparsity(model.nlp["g"], model.nlp["x"]).get_triplet(), strict=True):
+        if row >= first and column - n > model.tie_owner[row - first]:
+            raise InputError(
+                f"{problem.name} solves equations within its motion, which a planner in C cannot; use nlp_gait.replanner"
+            )
 
 
 def describe_planner(
@@ -42,14 +59,9 @@ def describe_planner(
     Raises:
         InputError: ``near`` is not an optimum with multipliers, or dense programs do not suit the problem.
     """
+    check_planner(problem)
     if near.guess is None or not near.converged:
         raise InputError(f"{problem.name}: a planner begins from an optimum by IPOPT; it {near.status}")
-    if model.variables > MOST_VARIABLES:
-        raise InputError(
-            f"{problem.name} has {model.variables} variables; a planner in C has at most {MOST_VARIABLES}: use "
-            "nlp_gait.replanner"
-        )
-    _check_order(problem, model, found)
     functions = [_rename(function, prefix) for function in (model.row_bounds, model.lift_start)]
     joints: tuple[str, ...] = ()
     if problem.display.at_time is not None:
@@ -73,10 +85,7 @@ def describe_planner(
         "CONSTANTS": "\n".join(
             [
                 *(write_array(kind, name, values) for name, (kind, values) in constants.items()),
-                *(
-                    write_array("double", f"{prefix}_{name}", map(format_number, values.tolist())).removeprefix("static ")
-                    for name, values in optimum.items()
-                ),
+                *(_write_public(f"{prefix}_{name}", values) for name, values in optimum.items()),
             ]
         ),
         "FUNCTIONS": writer.dump(),
@@ -85,10 +94,15 @@ def describe_planner(
         "CASADI_INTEGERS": str(max(1, *(function.sz_iw() for function in functions))),
         "CASADI_ARGUMENTS": str(max(function.sz_arg() for function in functions)),
         "CASADI_RESULTS": str(max(function.sz_res() for function in functions)),
+        "PARAMETER_NAMES": ", ".join(f'"{parameter.name}"' for parameter in problem.parameters),
         "JOINTS": str(len(joints)),
         "JOINT_NAMES": ", ".join(joints) or "none",
         "PLANNER": BUILD.format(prefix=prefix, flags=FLAGS),
     }
+
+
+def _write_public(name: str, values: Array) -> str:
+    return write_array("double", name, map(format_number, values.tolist())).removeprefix("static ")
 
 
 def _rename(function: ca.Function, prefix: str) -> ca.Function:
@@ -104,16 +118,6 @@ def _make_motion(
     x, p, t = SX.sym("x", len(problem.names)), SX.sym("p", len(names)), SX.sym("t")
     found = at_time(InstantPoint.of(x, p, problem.names, names), t)
     return ca.Function(f"{prefix}_motion", [x, p, t], simplify([ca.densify(found[name]) for name in MOTION]))
-
-
-def _check_order(problem: GaitProblem, model: NlpModel, found: NlpPlan) -> None:
-    """Check that each lifted variable depends on earlier ones only, so that one substitution after another finds all."""
-    first, n = len(model.row_names), model.variables
-    for row, column in zip(*found.jacobian.get_triplet(), strict=True):
-        if row >= first and column - n > model.tie_owner[row - first]:
-            raise InputError(
-                f"{problem.name} solves equations within its motion, which a planner in C cannot; use nlp_gait.replanner"
-            )
 
 
 def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
@@ -132,9 +136,9 @@ def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
     *others, last = parts
     return [
         *(f"{parts[name]:10d}  {name}" for name in others),
-        f"6 q^2 + 2 q a  {last}: q = {n} + r, a <= {rows} rows",
-        "A step needs derivatives once, values at most 20 times (5 lengths, 4 evaluations each), at most 15 programs, each with at",
-        f"most {10 * (n + lifted + 100)} changes; typically 1 program and {n} changes.",
+        f"14 q^2 + 2 q a  {last}: q = {n} + r, a <= {rows} rows",
+        "A step needs derivatives once, values at most 20 times (5 lengths, 4 evaluations each), and at most 15 programs, each",
+        f"with at most {10 * (n + lifted + 100)} changes; typically 1 program and {n} changes.",
     ]
 
 

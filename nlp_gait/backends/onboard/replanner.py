@@ -32,6 +32,7 @@ DAMP_FAILED, DAMP_SHORTENED, DAMP_LESS = 10.0, 4.0, 0.8
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step that are tried
 PRICE_FACTOR = 2.0  # weight of the violation in the merit, in units of the largest multiplier
 MEMORY = 3  # a step may raise the merit above that of the last point, not above all of so many
+ROUNDING = 1e-9  # relative difference of merits, and length of a step, that rounding may cause
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -221,7 +222,7 @@ class _Run:
             merits = [*merits[1 - MEMORY :], cost + weight * self._violation]
             for share in SHARES:
                 self._go_to(w + share * step.w)
-                if at.cost[0] + weight * self._violation <= max(merits) + 1e-12 * size:
+                if at.cost[0] + weight * self._violation <= max(merits) + ROUNDING * size:
                     break
             self._multipliers = self._multipliers + share * (step.multipliers - self._multipliers)
             self._keep_best()
@@ -236,7 +237,7 @@ class _Run:
                 and not step.relaxed
                 and step.estimate_rest() <= COST_ERROR * size
             )
-            longest = min(2.0 * longest, LONGEST) if share == 1.0 else share * length
+            longest = min(2.0 * longest, LONGEST) if share == 1.0 else max(share * length, ROUNDING)
 
     def result(self) -> Replan:
         """Return the optimum, else the best feasible point, else the last one with its violated rows."""
