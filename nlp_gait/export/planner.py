@@ -29,7 +29,7 @@ BUILD = """${{CC:-cc}} {flags} $CFLAGS -fPIC -c -o {prefix}_planner.o {prefix}_p
 ${{CC:-cc}} -shared -o lib{prefix}_planner.so {prefix}_planner.o {prefix}.o -lm
 ${{CC:-cc}} -std=c99 -O2 -o plan plan.c {prefix}_planner.o {prefix}.o -lm
 """
-FLAGS = "-std=c99 -O2 -fno-math-errno -ffp-contract=off"
+FLAGS = "-std=c99 -O3 -fno-math-errno -ffp-contract=off"
 MOST_VARIABLES, MOST_LIFTED = 60, 2000  # programs are dense
 MOTION = ("q", "qd", "tau", "zmp")  # at any time
 
