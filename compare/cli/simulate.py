@@ -199,7 +199,7 @@ def simulate(
                 stdout.print(f"{path}:")
             _print(report, survival if i == 0 else None)
             if walk is not None:
-                _print_course(walk)
+                _print_course(walk, open_loop=drive.feedback is None)
         print_written(*written)
 
 
@@ -280,9 +280,10 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
             stdout.print(f"{title}: {values}")
 
 
-def _print_course(walk: Walk) -> None:
+def _print_course(walk: Walk, *, open_loop: bool) -> None:
     if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
-        stdout.print(f"{walk.steps_done} of {walk.steps} steps completed before the fall")
+        remedy = "; with --feedback torso-spring it may stay up" if open_loop else ""
+        stdout.print(f"{walk.steps_done} of {walk.steps} steps completed before the fall{remedy}")
         return
     stdout.print(
         f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "

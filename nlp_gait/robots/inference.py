@@ -220,7 +220,8 @@ def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> Sole:
     if min(high[:2] - low[:2]) < LEAST_WIDTH_M:
         raise RobotDataError(
             f"robot {robot!r}: the lowest part of {link!r} at zero angles is {1e3 * (high[0] - low[0]):.1f} mm by "
-            f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole; {write}"
+            f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole. Soles that are tilted at zero angles are not supported; "
+            f"else {write}"
         )
     return Sole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground), kind)
 

@@ -153,7 +153,8 @@ def _compile_binary(mujoco: Any, path: str) -> bytes:
 
 def _convert(path: str, error: Exception) -> RobotDataError:
     reason = " ".join(str(error).split())[:300] or type(error).__name__
-    return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}")
+    remedy = "; meshes must be where the file names them (its meshdir)" if "opening file" in reason else ""
+    return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
 
 
 @contextmanager

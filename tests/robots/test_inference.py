@@ -156,7 +156,10 @@ INCOMPLETE = [
         lambda text: crooked_urdf(sole=False),
         r"'A_ankle_roll_link' has no shape .* write its sole into the JSON",
     ),
-    (change('size="0.17 0.09 0.02"', 'size="0.17 0.001 0.02"'), r"no flat sole; write its sole"),
+    (
+        change('size="0.17 0.09 0.02"', 'size="0.17 0.001 0.02"'),
+        r"no flat sole. Soles .* tilted .*; else write its sole",
+    ),
     (
         change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'),
         r"knees .* contradict each other; write the forward direction",

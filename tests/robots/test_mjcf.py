@@ -64,6 +64,11 @@ def test_mujocos_translation_of_a_urdf_is_the_same_robot(path: str) -> None:
     ("old", "new", "message"),
     [
         ("<worldbody>", "<wordbody>", "is not read by MuJoCo"),
+        (
+            "<worldbody>",
+            '<asset><mesh file="no.stl"/></asset><worldbody>',
+            "no.stl'; meshes must be where the file names",
+        ),
         (' actuatorfrcrange="-60 60"', "", r"torque_limit_Nm must be > 0, got 0\.0"),
         ('<joint name="A_knee"', '<joint name="extra"/><joint name="A_knee"', "has 2 hinges; give each its own body"),
     ],
