@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots.leg import LEG_JOINT_COUNT
+from nlp_gait.robots.leg import LEG_JOINT_COUNT, find_bend
 from nlp_gait.robots.meshes import FootShapes
 from nlp_gait.robots.repair import Records, turn_records
 from nlp_gait.robots.tree import Array, are_mirror_images
@@ -91,19 +91,23 @@ def find_legs(robot: str, links: Records, joints: Records, feet: Mapping[str, Ma
                 (own[0][0].place[2], "belongs to arms: they begin above the other links' centre of mass", pair)
             )
         elif count != LEG_JOINT_COUNT:
-            others_m.append((own[0][0].place[2], f"has legs of {count} joints", pair))
+            others_m.append((own[0][0].place[2], f"has legs of {count} joints, which is not supported", pair))
         else:
             found.append((own[0][0].place[2], legs))
     remedy = (
-        'name them in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
+        'name the feet in the JSON file next to the model: "feet": {"left": {"link": "..."}, "right": {"link": "..."}} '
         "(docs/custom-robots.md describes the supported legs)"
     )
     if not found:
         _, fault, pair = min(others_m, default=(0.0, "", ("", "")))
-        lowest_pair = f"; the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}" if fault else ""
+        lowest_pair = (
+            f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
+            if fault
+            else "no pair has any number of them; if z is not up in the root's axes, put a turned link above the root, otherwise "
+        )
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "
-            f"joints each below the link where both legs meet{lowest_pair}; {remedy}"
+            f"joints each below the link where both legs meet; {lowest_pair}{remedy}"
         )
     found.sort(key=lambda item: (item[0], item[1].feet))
     lowest, *others = [legs for height, legs in found if height < found[0][0] + CLEARLY_LOWER_M]
@@ -134,6 +138,7 @@ def infer_feet(
                 f"robot {robot!r}: a leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to the foot, "
                 f"{link!r} has {len(chain)}: {', '.join(joint.child for joint in chain) or 'none'}"
             )
+    _check_knees(robot, legs.chains)
     soles = [_find_sole(robot, link, read_shapes) for link in legs.feet]
     angle = FORWARD_ANGLES[forward] if forward else _find_forward(robot, legs.chains, soles)
     c, s = round(math.cos(angle)), round(math.sin(angle))  # exact: quarter turns
@@ -230,23 +235,37 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) ->
     """Return the angle about z that turns the forward direction to x: a multiple of a quarter turn [rad].
 
     Forward is perpendicular to the line between the feet, and knees bend so that the feet go back; the longer part of the soles
-    must not contradict.
+    must not contradict, and decides where knees may turn equally far both ways.
     """
     between = chains[0][0].place - chains[1][0].place
     axis = 0 if abs(between[1]) >= abs(between[0]) else 1  # forward is along it
-    knees = [_knee_direction(chain)[axis] for chain in chains]
+    knee = sum(_knee_direction(chain)[axis] for chain in chains)
     lead = sum(sole.high[axis] + sole.low[axis] for sole in soles) / 2
-    contradicted = abs(lead) >= CLEAR_LEAD_M and lead * knees[0] < 0
-    if knees[0] * knees[1] <= 0 or contradicted:
+    if abs(lead) < CLEAR_LEAD_M:
+        lead = 0.0
+    if lead * knee < 0 or not (lead or knee):
+        fault = "contradict each other" if knee else "do not show it: knees turn equally far both ways, soles are centred"
         raise RobotDataError(
-            f"robot {robot!r}: knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles contradict each other; "
+            f"robot {robot!r}: which way is forward? Knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles {fault}; "
             'write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
         )
-    return FORWARD_ANGLES[f"{'' if knees[0] > 0 else '-'}{'xy'[axis]}"]
+    return FORWARD_ANGLES[f"{'' if (knee or lead) > 0 else '-'}{'xy'[axis]}"]
+
+
+def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
+    """Raise RobotDataError if the limits of both knees make them bend in opposite directions."""
+    one, other = (_knee_direction(chain) for chain in chains)
+    if float(one @ other) < 0:
+        ranges = " and ".join(
+            f"{chain[2].child!r} by {chain[2].limits[0]:.3g} to {chain[2].limits[1]:.3g} rad about {np.round(chain[2].axis, 3) + 0.0}"
+            for chain in chains
+        )
+        raise RobotDataError(
+            f"robot {robot!r}: its knees bend in opposite directions, {ranges}; correct the axis or the limits of one of them"
+        )
 
 
 def _knee_direction(chain: Chain) -> Array:
-    """Return the direction (3,) in which the knee points when it bends, to the side of its larger range."""
+    """Return the direction (3,) in which the knee points when it bends, 0 if its limits do not show it."""
     _, fifth, knee, *_ = chain
-    bend = 1.0 if knee.limits[1] >= -knee.limits[0] else -1.0
-    return np.asarray(-bend * np.cross(knee.axis, fifth.place - knee.place))
+    return np.asarray(-find_bend(*knee.limits) * np.cross(knee.axis, fifth.place - knee.place))

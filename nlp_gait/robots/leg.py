@@ -18,6 +18,8 @@ MEETING_M = 1e-9
 # Least sine of the angle between axes that must not be parallel.
 LEAST_SINE = 0.1
 SHORTEST_M = 1e-3
+# A knee bends to the side on which its range is this many times the other side's.
+CLEAR_RANGE = 1.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,9 +108,9 @@ class Leg:
 
     @cached_property
     def bend(self) -> float:
-        """Sign of the direction in which the knee bends, that of its larger range."""
-        low, high = self.limits_rad[3]
-        return 1.0 if high - self.straight_rad >= self.straight_rad - low else -1.0
+        """Sign of the direction in which the knee bends: as its limits show, otherwise forward, along x."""
+        low, high = self.limits_rad[3] - self.straight_rad
+        return find_bend(low, high) or (1.0 if np.cross(self.axes[3], self.shank_m)[0] < 0 else -1.0)
 
     @cached_property
     def length_m(self) -> float:
@@ -125,6 +127,12 @@ class Leg:
             near = point + (axis @ (centre - point)) * axis
             found.append(centre if np.linalg.norm(near - centre) < MEETING_M else near)
         return np.array(found)
+
+
+def find_bend(low: float, high: float) -> float:
+    """Return the sign of a knee's clearly larger range on both sides of its straight angle, 0 if they are alike."""
+    larger, smaller = max(high, -low), min(high, -low)
+    return 0.0 if larger < CLEAR_RANGE * smaller else 1.0 if high >= -low else -1.0
 
 
 def make_leg(robot: Robot, side: str) -> Leg:

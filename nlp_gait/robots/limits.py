@@ -9,7 +9,7 @@ from nlp_gait.errors import RobotDataError, WorkerError
 from nlp_gait.processes import run_in_isolation
 
 TIME_LIMIT_S = 60.0
-MEMORY_LIMIT_BYTES = 2 * 2**30
+MEMORY_LIMIT_BYTES = 4 * 2**30
 LARGEST_RESULT = 256 * 2**20  # bytes
 REMEDY = "simplify the file"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 from nlp_gait.errors import GaitError, InputError, RobotDataError, UnknownNameError, warn_once
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
+from nlp_gait.robots.leg import make_leg
 from nlp_gait.robots.loading import hash_robot
 from nlp_gait.robots.robot import Link
 from nlp_gait.robots.tree import partner, partners
@@ -162,7 +164,11 @@ INCOMPLETE = [
     ),
     (
         change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'),
-        r"knees .* contradict each other; write the forward direction",
+        r"Knees .* contradict each other; write the forward direction",
+    ),
+    (
+        lambda text: re.sub(r'(name="A_knee".*?)lower="-0.1" upper="2.3"', r'\1lower="-2.3" upper="0.1"', text, flags=re.DOTALL),
+        r"knees bend in opposite directions, 'A_knee_link' by -2\.3 to 0\.1 rad about .* 'B_knee_link' by -0\.1",
     ),
     (change('<joint name="A_knee" type="revolute">', '<joint name="A_knee" type="fixed">'), r"no feet found"),
     (
@@ -241,6 +247,13 @@ def test_placeholder_inertias_are_no_fault() -> None:
     assert Link(name="a", mass_kg=0.1, com_m=(0.0, 0.0, 0.0), inertia_com_kgm2=tiny).mass_kg == 0.1
     with pytest.raises(RobotDataError, match="principal moments"):
         Link(name="a", mass_kg=0.1, com_m=(0.0, 0.0, 0.0), inertia_com_kgm2=tuple(1e12 * i for i in tiny))
+
+
+def test_knees_without_a_clear_range_bend_forward(tmp_path: Path, robot: Robot) -> None:
+    free = load_robot(crooked(tmp_path, crooked_urdf().replace('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="2.3"')))
+    for side in ("left", "right"):
+        assert free.feet[side] == robot.feet[side]
+        assert make_leg(free, side).bend == make_leg(robot, side).bend
 
 
 def test_exchanged_feet_are_refused(tmp_path: Path) -> None:

@@ -283,7 +283,7 @@ def describe_humanoid(body: Humanoid) -> list[tuple[str, str]]:
             (
                 f"{side} sole",
                 f"{1e3 * (foot.front_m + foot.back_m):.0f} mm by {1e3 * (foot.left_m + foot.right_m):.0f} mm, "
-                f"{1e3 * foot.front_m:.0f} mm ahead of the joint of {foot.link}, {1e3 * foot.ankle_height_m:.0f} mm high",
+                f"{1e3 * foot.front_m:.0f} mm of it ahead of the joint of {foot.link}, {1e3 * foot.ankle_height_m:.0f} mm high",
             )
         )
     left = legs["left"]
