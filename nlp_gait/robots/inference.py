@@ -244,7 +244,9 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) ->
     if abs(lead) < CLEAR_LEAD_M:
         lead = 0.0
     if lead * knee < 0 or not (lead or knee):
-        fault = "contradict each other" if knee else "do not show it: knees turn equally far both ways, soles are centred"
+        fault = (
+            "contradict each other" if knee else "do not show it: knees turn equally far both ways, soles are centred"
+        )
         raise RobotDataError(
             f"robot {robot!r}: which way is forward? Knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles {fault}; "
             'write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'

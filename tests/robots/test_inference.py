@@ -167,7 +167,9 @@ INCOMPLETE = [
         r"Knees .* contradict each other; write the forward direction",
     ),
     (
-        lambda text: re.sub(r'(name="A_knee".*?)lower="-0.1" upper="2.3"', r'\1lower="-2.3" upper="0.1"', text, flags=re.DOTALL),
+        lambda text: re.sub(
+            r'(name="A_knee".*?)lower="-0.1" upper="2.3"', r'\1lower="-2.3" upper="0.1"', text, flags=re.DOTALL
+        ),
         r"knees bend in opposite directions, 'A_knee_link' by -2\.3 to 0\.1 rad about .* 'B_knee_link' by -0\.1",
     ),
     (change('<joint name="A_knee" type="revolute">', '<joint name="A_knee" type="fixed">'), r"no feet found"),
