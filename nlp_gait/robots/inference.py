@@ -248,7 +248,7 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) ->
             "contradict each other" if knee else "do not show it: knees turn equally far both ways, soles are centred"
         )
         raise RobotDataError(
-            f"robot {robot!r}: which way is forward? Knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles {fault}; "
+            f"robot {robot!r}: knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles {fault}; "
             'write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
         )
     return FORWARD_ANGLES[f"{'' if (knee or lead) > 0 else '-'}{'xy'[axis]}"]
@@ -259,8 +259,8 @@ def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
     one, other = (_knee_direction(chain) for chain in chains)
     if float(one @ other) < 0:
         ranges = " and ".join(
-            f"{chain[2].child!r} by {chain[2].limits[0]:.3g} to {chain[2].limits[1]:.3g} rad about {np.round(chain[2].axis, 3) + 0.0}"
-            for chain in chains
+            f"{knee.child!r} by {knee.limits[0]:.3g} to {knee.limits[1]:.3g} rad about {np.round(knee.axis, 3) + 0.0}"
+            for knee in (chain[2] for chain in chains)
         )
         raise RobotDataError(
             f"robot {robot!r}: its knees bend in opposite directions, {ranges}; correct the axis or the limits of one of them"

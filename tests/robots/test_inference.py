@@ -164,7 +164,7 @@ INCOMPLETE = [
     ),
     (
         change('lower="-0.1" upper="2.3"', 'lower="-2.3" upper="0.1"'),
-        r"Knees .* contradict each other; write the forward direction",
+        r"knees .* contradict each other; write the forward direction",
     ),
     (
         lambda text: re.sub(
