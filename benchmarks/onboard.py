@@ -1,6 +1,7 @@
 """Planning again after 1,000 changes of the parameters: ``python -m benchmarks.onboard [--changes N] [PROBLEM...]``.
 
-``--cold N`` instead compares the same steps with IPOPT on few rows, from N random starts without multipliers.
+``--c`` instead compares the planner in C with Python's, and ``--cold N`` the same steps with IPOPT, from N random starts
+without multipliers.
 
 Every limit and weight moves by up to 5 % of its default, independently. Each result is compared with IPOPT at its sharpest from
 that result (same basin), and with IPOPT from the optimum of the defaults.
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import nlp_gait
+from benchmarks import onboard_c
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.onboard.replanner import Replan, Replanner
 from nlp_gait.backends.optima.optimum import SHARP
@@ -111,6 +113,18 @@ def measure_cold(name: str, count: int) -> None:
         )
 
 
+def measure_c(names: list[str], changes: int, starts: int, seed: int) -> None:
+    """Print the table of C beside Python, and the example at 500 Hz."""
+    print(onboard_c.HEADER, flush=True)
+    for name in names or onboard_c.PROBLEMS:
+        problem, rng = nlp_gait.load(name), np.random.default_rng(seed)
+        solution = nlp_gait.solve(problem, starts=starts, solver=nlp_gait.IpoptSettings(compiled=True), workers=1)
+        onboard_c.compare(problem, solution, [draw_change(problem, rng) for _ in range(changes)])
+    for name in onboard_c.RECORDED:
+        if not names or name in names:
+            onboard_c.run_example(name, starts)
+
+
 def time_call(call: Callable[[], Any]) -> tuple[Any, float]:
     """Return a call's result and its time of processor [s]."""
     began = time.thread_time()
@@ -130,8 +144,12 @@ def main() -> None:
     parser.add_argument("--changes", type=int, default=1000)
     parser.add_argument("--starts", type=int, default=5, help="of IPOPT for the first optimum")
     parser.add_argument("--cold", type=int, default=0, metavar="N", help="random starts of the comparison with IPOPT")
+    parser.add_argument("--c", action="store_true", help="compare the planner in C with Python's")
     parser.add_argument("--seed", type=int, default=1, help="of the changes")
     arguments = parser.parse_args()
+    if arguments.c:
+        measure_c(arguments.problems, arguments.changes, arguments.starts, arguments.seed)
+        return
     for name in arguments.problems or (COLD_PROBLEMS if arguments.cold else PROBLEMS):
         if arguments.cold:
             measure_cold(name, arguments.cold)

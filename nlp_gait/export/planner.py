@@ -136,9 +136,9 @@ def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
     *others, last = parts
     return [
         *(f"{parts[name]:10d}  {name}" for name in others),
-        f"14 q^2 + 2 q a  {last}: q = {n} + r, a <= {rows} rows",
-        "A step needs derivatives once, values at most 20 times (5 lengths, 4 evaluations each), and at most 15 programs, each",
-        f"with at most {10 * (n + lifted + 100)} changes; typically 1 program and {n} changes.",
+        f"14 q^2 + 2 q a  {last}: q = {n + 1} + r, a <= {rows} rows",
+        "A step needs derivatives once, values at most 20 times (5 lengths, 4 evaluations each), and at most 30 programs, each",
+        f"with at most 2 q + {10 * (n + lifted + 100)} changes; typically 1 or 2 programs and {n} changes.",
     ]
 
 

@@ -1,0 +1,154 @@
+"""The planner in C beside Python's, and recorded states at 500 Hz: ``python -m benchmarks.onboard --c [PROBLEM...]``.
+
+Both plan the same changes in one run, each from its own last result; times are of the processor. Both are built for this
+machine's vectors, C once more without. Then the example in C plans recorded states: the gait is simulated in MuJoCo with a push
+from each of four sides, and every 2 ms the hip's deviation from the plan, with the feedback's sensor noise, is added to the
+start state.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+import nlp_gait
+from nlp_gait.backends.kernel.compiler import lane_flags
+from nlp_gait.export.solver import export_solver
+from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation.result import Result
+from nlp_gait.formulation.solution import Outcome, Solution
+from nlp_gait.simulation.feedback import Feedback
+from nlp_gait.simulation.mjcf import TIME_STEP
+from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan
+
+PROBLEMS = ("nao-ssp", "nao-dsp", "humanoid-ssp", "humanoid-dsp", "nao-cycle", "stairs-plan", "walk12")
+RECORDED = ("nao-ssp", "humanoid-ssp")
+LANES = 8 if "avx512f" in Path("/proc/cpuinfo").read_text(encoding="utf-8") else 4
+STATE = [f"hip_{axis}_start_m" for axis in "xyz"] + [f"hip_v{axis}_start_m_s" for axis in "xyz"]
+PERIOD_S, IMPULSE_NS = 0.002, 0.2
+SAME, NEAR = 1e-9, 1e-6  # relative
+HEADER = (
+    "| problem | Python: median / 99th | C: median / 99th | C without vectors | steps | converge | equal to 1e-9 "
+    "(1e-6) | solved again |\n|---|--:|--:|--:|--:|--:|--:|--:|"
+)
+
+
+class Report(ctypes.Structure):
+    """Result of ``solve``, as in the header."""
+
+    _fields_ = (
+        ("steps", ctypes.c_int),
+        ("cost", ctypes.c_double),
+        ("violation", ctypes.c_double),
+        ("worst_row", ctypes.c_int),
+        ("worst", ctypes.c_double),
+    )
+
+
+class Planner:
+    """An exported planner, continuing from its last result."""
+
+    def __init__(self, folder: Path, name: str, near: Outcome) -> None:
+        prefix = f"{name.replace('-', '_')}_nlp_"
+        library = ctypes.CDLL(str(folder / f"lib{prefix}planner.so"))
+        count = library[f"{prefix}planner_bytes"]
+        count.restype = ctypes.c_longlong
+        self.bytes, self._solve = int(count()), library[f"{prefix}solve"]
+        self._memory = ctypes.create_string_buffer(self.bytes)
+        library[f"{prefix}planner_prepare"](self._memory)
+        assert near.guess is not None
+        self.x, self.multipliers = near.x.copy(), near.guess.rows.copy()
+
+    def solve(self, p: Array) -> tuple[bool, Report]:
+        """Return whether it converged, and the report."""
+        report = Report()
+        numbers = [array.ctypes.data_as(ctypes.c_void_p) for array in (p, self.x, self.multipliers)]
+        return self._solve(self._memory, *numbers, 20, ctypes.byref(report)) == 0, report
+
+
+def build(problem: GaitProblem, near: Outcome, folder: Path, lanes: int) -> None:
+    """Export and build a planner."""
+    export_solver(problem, folder, near=near)
+    flags = " ".join(lane_flags(lanes))
+    words = {"CFLAGS": flags, "CXXFLAGS": f"{flags} -DLANES={lanes}"}
+    subprocess.run(["sh", str(folder / "build.sh")], check=True, env=os.environ | words)
+
+
+def compare(problem: GaitProblem, solution: Solution, changes: Sequence[Mapping[str, float]]) -> None:
+    """Print a row: both solve the changes, each twice, so that a second solve removes the tolerance of the first."""
+    plan = nlp_gait.replanner(problem, near=solution)
+    near = min(solution.starts, key=lambda outcome: outcome.rank)
+    with tempfile.TemporaryDirectory() as fast, tempfile.TemporaryDirectory() as plain:
+        build(problem, near, Path(fast), LANES)
+        build(problem, near, Path(plain), 1)
+        in_c = [Planner(Path(folder), problem.name, near) for folder in (fast, plain)]
+        points = [problem.with_values(**change).p for change in changes]
+        plan.solve(changes[0])
+        for planner in in_c:
+            planner.solve(points[0])
+        used, apart = np.zeros((3, len(points))), np.zeros((2, len(points)))
+        steps, converged = [], 0
+        for k, (change, p) in enumerate(zip(changes, points, strict=True)):
+            for repeat in range(2):
+                began = [time.thread_time()]
+                found = plan.solve(change)
+                began.append(time.thread_time())
+                reports = []
+                for planner in in_c:
+                    reports.append(planner.solve(p))
+                    began.append(time.thread_time())
+                cost, (is_converged, report) = problem.objective.sign * found.objective, reports[0]
+                apart[repeat, k] = abs(report.cost - cost) / abs(cost)
+                if repeat == 0:
+                    used[:, k] = np.diff(began)
+                    steps.append(report.steps)
+                    converged += is_converged
+    times = [f"{1e3 * np.median(each):.2f} / {1e3 * np.percentile(each, 99):.2f} ms" for each in used]
+    equal = [(int(np.sum(each <= SAME)), int(np.sum(each <= NEAR))) for each in apart]
+    print(
+        f"| `{problem.name}` | {' | '.join(times)} | {np.median(steps):g} | {converged} of {len(points)} | "
+        f"{equal[0][0]} ({equal[0][1]}) | {equal[1][0]} ({equal[1][1]}) |",
+        flush=True,
+    )
+
+
+def record_states(problem: GaitProblem, x: Array) -> Array:
+    """Return parameters (instants, 6) of the start state, recorded while the gait is simulated."""
+    plan, noise, rng = make_plan(Result(problem=problem, x=x)), Feedback(), np.random.default_rng(0)
+    every = round(PERIOD_S / TIME_STEP)
+    states = []
+    for direction in DIRECTIONS.values():
+        push = Push(impulse_Ns=(IMPULSE_NS * direction[0], IMPULSE_NS * direction[1]))
+        seen = simulate_plan(plan, Conditions(push=push))
+        rates = np.gradient(seen.torso, seen.t, axis=0)
+        part = slice(0, round(plan.duration_s / TIME_STEP), every)
+        place = seen.torso[part] - plan.at("hip", seen.t[part])
+        rate = rates[part] - plan.rate("hip", seen.t[part])
+        place += rng.normal(scale=noise.position_noise_m, size=place.shape)
+        rate += rng.normal(scale=noise.velocity_noise_m_s, size=rate.shape)
+        states.append(np.hstack([place, rate]))
+    return np.concatenate(states) + [problem.value(name) for name in STATE]
+
+
+def run_example(name: str, starts: int) -> None:
+    """Print what the example in C finds for recorded states, one each 2 ms."""
+    problem = nlp_gait.load(name, trajectory="measured", samples_per_interval=1)
+    solution = nlp_gait.solve(problem, starts=starts, workers=1)
+    near = min(solution.starts, key=lambda outcome: outcome.rank)
+    states = record_states(problem, near.x)
+    with tempfile.TemporaryDirectory() as folder:
+        build(problem, near, Path(folder), LANES)
+        file = Path(folder) / "states.csv"
+        np.savetxt(file, states, delimiter=",", header=",".join(STATE), comments="", fmt="%.17g")
+        run = [str(Path(folder) / "plan"), str(file)]
+        total = subprocess.run(run, check=True, capture_output=True, text=True).stdout.splitlines()[-1]
+    most = np.abs(states - states.mean(axis=0)).max(axis=0)
+    print(f"{name}, recorded states up to {most[:3].max():.3f} m, {most[3:].max():.3f} m/s apart: {total}", flush=True)
