@@ -62,17 +62,20 @@ def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
             stdout.print(f"Source: {one.source}\n")
 
 
+def _belongs_here(record: logging.LogRecord) -> bool:
+    return "see nlp-gait list --robot" not in record.getMessage()
+
+
 def _robot(name: str, out: Path | None, as_json: bool) -> None:
     from nlp_gait.gaits.humanoid.body import describe_humanoid, make_humanoid
 
     target = None if out is None else output_file(out)
     log = logging.getLogger("nlp_gait")
-    level = log.level
-    log.setLevel(logging.ERROR)  # its warnings are printed as notes below
+    log.addFilter(_belongs_here)  # what it refers to is printed below
     try:
         body = make_humanoid(name)
     finally:
-        log.setLevel(level)
+        log.removeFilter(_belongs_here)
     facts, notes = describe_humanoid(body), body.biped.full.notes
     if as_json:
         print_json({"robot": body.biped.full.name, **{key: value for key, value in facts}, "notes": list(notes)})
@@ -81,8 +84,8 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
         for note in notes:
             stdout.print(f"note: {note}")
         stdout.print(
-            "override any of this in a JSON file next to the model, see docs/custom-robots.md; gaits: humanoid-ssp, "
-            f"humanoid-dsp and humanoid-cycle with --robot {name}"
+            "override any of this in a JSON file next to the model, see docs/custom-robots.md; gaits: solve humanoid-ssp, "
+            f"humanoid-dsp or humanoid-cycle with --robot {name}; whole walks: plan --robot"
         )
     if target is not None:
         from compare.drawing.robot_figures import plot_robot

@@ -84,7 +84,7 @@ class Biped:
         """Origin of K, in words."""
         if self.full.heat_loss_W_per_Nm2 is not None:
             return "from the robot's file"
-        return "NAO's, scaled by power over squared torque, because no URDF has it"
+        return "NAO's, scaled by power over squared torque, because its file has none"
 
 
 def make_biped_model(robot: Robot) -> Biped:

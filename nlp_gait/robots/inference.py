@@ -103,7 +103,7 @@ def find_legs(robot: str, links: Records, joints: Records, feet: Mapping[str, Ma
         lowest_pair = (
             f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
             if fault
-            else "no pair has any number of them; if z is not up in the root's axes, put a turned link above the root, otherwise "
+            else "no links are mirror images; if z is not up in the root's axes, join a turned link to it, else "
         )
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "

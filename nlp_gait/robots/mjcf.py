@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, RobotDataError
+from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import FootShapes, box_points, cylinder_points
@@ -27,6 +27,7 @@ from nlp_gait.robots.tree import Array, Mass, combine_masses
 
 LOG = logging.getLogger("nlp_gait")
 UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits
+IGNORED = {"armature": "kg m^2", "damping": "Nm s/rad", "frictionloss": "Nm"}  # of a joint
 _READING = threading.Lock()  # MuJoCo has one warning handler for all threads
 
 
@@ -44,6 +45,7 @@ def mjcf_record(path: str) -> dict[str, Any]:
     _read.cache_clear()  # the file, or one that it includes, may have changed
     model = _compile(path)
     root, frames, carriers = _tree(model)
+    _report_ignored(path, model)
     names = {i: model.body(i).name or f"body {i}" for i in frames}
     if len(set(names.values())) < len(names):
         raise ValueError("two bodies have the same name")
@@ -75,6 +77,14 @@ def mjcf_record(path: str) -> dict[str, Any]:
         "links": links,
         "joints": joints,
     }
+
+
+def _report_ignored(path: str, model: Any) -> None:
+    hinges = model.jnt_dofadr[model.jnt_type == int(import_module("mujoco").mjtJoint.mjJNT_HINGE)]
+    values = {name: float(np.max(getattr(model, f"dof_{name}")[hinges], initial=0.0)) for name in IGNORED}
+    listed = ", ".join(f"{name} up to {values[name]:.3g} {unit}" for name, unit in IGNORED.items() if values[name])
+    if listed:
+        warn_once("robot file %r: its joints' %s; neither the model nor the simulation contains it", path, listed)
 
 
 def read_foot_geoms(path: str, link: str) -> FootShapes:

@@ -81,6 +81,13 @@ def test_what_is_wrong_with_an_mjcf_is_reported(path: str, tmp_path: Path, old: 
         load_robot(str(tmp_path / "robot.xml"))
 
 
+def test_what_is_ignored_is_reported(path: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    text = Path(path).read_text(encoding="utf-8").replace('<joint name="A_knee"', '<joint damping="0.5" name="A_knee"')
+    (tmp_path / "damped.xml").write_text(text, encoding="utf-8")
+    load_robot(str(tmp_path / "damped.xml"))
+    assert "damped.xml': its joints' damping up to 0.5 Nm s/rad; neither the model nor the simulation" in caplog.text
+
+
 def test_without_mujoco_its_extra_is_named(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf, "find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"MJCF files need MuJoCo.*pip install 'nlp-gait\[sim\]'"):

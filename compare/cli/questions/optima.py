@@ -178,6 +178,8 @@ def sweep(
 def capabilities(*, starts: int = 3, seed: int = 0, problem: AnyCycle, output: Output) -> None:
     """Report the highest walking speed, the longest step and the highest lift of a foot, each with the limits that stop it.
 
+    For robots that can turn, also the sharpest turn of a step.
+
     Bounds on times and velocities that are this package's, not the robot's, are named, and moved where they stop the robot.
 
     Examples: `nlp-gait capabilities`, `nlp-gait capabilities humanoid-cycle --robot my.urdf --intervals 5`
