@@ -22,7 +22,7 @@ from compare.cli.common import (
     until_interrupted,
 )
 from compare.cli.compare import print_summaries
-from compare.cli.options import NamedProblem, SearchOptions, parse_values, parse_x
+from compare.cli.options import NamedProblem, SearchOptions, parse_names, parse_number, parse_values, parse_x
 from compare.cli.outputs import output_file
 from compare.study.settings import SolverSpec
 from nlp_gait.backends.identity import identify_problem
@@ -211,6 +211,7 @@ def plan(
     robot: str = "nao-v5",
     steps: int | None = None,
     speed: float | None = None,
+    speeds: str = "",
     distance: float | None = None,
     slope_deg: float = 0.0,
     stairs: str = "",
@@ -235,6 +236,7 @@ def plan(
         robot,
         steps,
         speed_m_s=speed,
+        speeds_m_s=[parse_number("speed", part, "--speeds") for part in parse_names(speeds)],
         distance_m=distance,
         slope_deg=slope_deg,
         stairs=stairs,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -20,14 +20,15 @@ from nlp_gait.errors import InputError, check_count
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.solution import ConstraintValue, Solution
-from nlp_gait.gaits.biped.body import TIMED_UNITS
+from nlp_gait.gaits.biped.body import TIMED_UNITS, Body
 from nlp_gait.gaits.biped.cycle_motion import STEP
-from nlp_gait.gaits.biped.footholds import list_swings, parse_footholds, read_footholds
+from nlp_gait.gaits.biped.footholds import list_arc, list_swings, parse_footholds, read_footholds
+from nlp_gait.gaits.biped.footstep_walk import name_speed
 from nlp_gait.gaits.biped.walk_parts import GREATEST_SPEED, HALF_STEPS, LEAST_SPEED
 from nlp_gait.gaits.biped.walk_start import start_from_cycle
-from nlp_gait.gaits.humanoid.body import make_humanoid
+from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import list_turn
-from nlp_gait.gaits.nao.body import load_nao
+from nlp_gait.gaits.nao.body import load_nao, make_nao
 from nlp_gait.progress import Progress, ignore_progress
 
 AT_BOUND = 1e-4  # share of a variable's range
@@ -81,6 +82,7 @@ def plan_walk(
     steps: int | None = None,
     *,
     speed_m_s: float | None = None,
+    speeds_m_s: Sequence[float] = (),
     distance_m: float | None = None,
     slope_deg: float = 0.0,
     stairs: str = "",
@@ -97,6 +99,8 @@ def plan_walk(
         robot: name or file; robots of NAO's build swing their arms and have closed-form legs, others are planned as humanoids.
         steps: swings of a foot, both half steps included; None for 10, or for as many as the distance takes.
         speed_m_s: of the inner steps; None for the cheapest.
+        speeds_m_s: of the inner steps one by one, between which it changes evenly if there are more steps; all have the same
+            length, two thirds of the robot's usual one without a distance.
         distance_m: that the feet advance; None for the cheapest steps.
         slope_deg: by which the ground rises forward; the distance is along it.
         stairs: ``RISExRUN:N``, a flight of N treads of these sizes [m]; every step climbs one, and the walk ends on the last.
@@ -122,15 +126,16 @@ def plan_walk(
             raise InputError("stairs determine steps and distance; leave out steps and distance_m")
         name, (rise, run, treads) = "humanoid-walk", _parse_stairs(stairs)
         steps, more = treads + 1, {"stair_rise_m": rise, "stair_run_m": run}
-    if turn_deg or footholds is not None:
+    if turn_deg or footholds is not None or len(speeds_m_s):
         if (speed_m_s, stairs, slope_deg) != (None, "", 0.0):
-            raise InputError(
-                "a walk that turns is on a level floor and has no given speed; leave out speed, slope and stairs"
-            )
+            raise InputError("a walk whose steps differ is on a level floor; leave out speed_m_s, slope and stairs")
         if footholds is not None and (turn_deg, steps, distance_m) != (0.0, None, None):
             raise InputError("footholds determine steps, distance and turn; leave out steps, distance and turn")
+        if steps is None and len(speeds_m_s):
+            steps = len(speeds_m_s) + HALF_STEPS
         text, ahead = _list_footholds(robot, footholds, turn_deg, steps, distance_m)
         steps, distance_m, more = text.count(";") + 1, None, {"footholds": text}
+        values = {**list_speeds(speeds_m_s, steps), **(values or {})}
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
     problem = load(name, robot=robot, steps=count, intervals=intervals, slope_deg=slope_deg, **more)
     if steps is None and distance_m is not None:
@@ -147,7 +152,11 @@ def plan_walk(
         problem = problem.with_values(**{LEAST_SPEED: speed_m_s, GREATEST_SPEED: speed_m_s})
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
-    cycle = None if name == "nao-walk" else load("humanoid-cycle", robot=robot, intervals=intervals)
+    cycle = (
+        None
+        if name == "nao-walk" and not more
+        else load(name.replace("walk", "cycle"), robot=robot, intervals=intervals)
+    )
     if ahead is None and problem.value(f"{STEP}.lower") == problem.value(f"{STEP}.upper"):
         ahead = problem.value(f"{STEP}.lower")
     if cycle is not None and ahead is not None:
@@ -159,16 +168,39 @@ def plan_walk(
 def _list_footholds(
     robot: str, path: str | Path | None, turn_deg: float, steps: int | None, distance_m: float | None
 ) -> tuple[str, float]:
-    """Return the footholds of a file or of a turn, and the mean length of their steps [m]."""
-    if find_walk(robot) == "nao-walk":
+    """Return the footholds of a file, a turn or a line, and the mean length of their steps [m]."""
+    is_nao = find_walk(robot) == "nao-walk"
+    body: Body = make_nao(robot) if is_nao else make_humanoid(robot)
+    if path is not None:
+        text = read_footholds(path)
+    elif turn_deg and isinstance(body, Humanoid):
+        text = list_turn(body, turn_deg, steps, distance_m)
+    else:
+        count = check_count("steps", steps or 10, at_least=HALF_STEPS)
+        text = list_arc(turn_deg, count, distance_m or body.step_length_m * (count - 1), body.feet_y)
+    places = parse_footholds(text)
+    if is_nao and any(place.yaw for place in places):
         raise InputError(
             f"robot {robot!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns alone; "
             "turns are planned for legs whose hip joints turn one by one"
         )
-    body = make_humanoid(robot)
-    text = list_turn(body, turn_deg, steps, distance_m) if path is None else read_footholds(path)
-    swings = list_swings(parse_footholds(text), body.feet_y)
+    swings = list_swings(places, body.feet_y)
     return text, sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)
+
+
+def list_speeds(speeds_m_s: Sequence[float], steps: int) -> dict[str, float]:
+    """Return the limits of the inner steps' speeds by name: evenly between those that are given."""
+    if not len(speeds_m_s):
+        return {}
+    speeds, count = np.asarray(speeds_m_s, dtype=float), steps - HALF_STEPS
+    if not (np.isfinite(speeds) & (speeds > 0.0)).all():
+        raise InputError(f"speeds_m_s must be finite numbers > 0, got {list(speeds_m_s)}")
+    if len(speeds) > count:
+        raise InputError(
+            f"{len(speeds)} speeds are given, and a walk of {steps} steps has {count} inner ones; plan more steps"
+        )
+    found = np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(speeds)), speeds)
+    return {name_speed(end, k): v for k, v in enumerate(found.tolist(), 2) for end in ("least", "greatest")}
 
 
 def _parse_stairs(text: str) -> tuple[float, float, int]:
@@ -238,9 +270,9 @@ def describe_own_bounds(problem: GaitProblem, x: Mapping[str, float]) -> list[st
 def describe_violation(row: ConstraintValue, steps: int) -> str:
     """Return a sentence about a violated row of a walk: step, constraint, amount and remedy."""
     begins = SENTENCES["places"]
-    if found := re.match(r"step(\d+)_", row.name):  # of a walk whose steps differ
-        kind = row.name.removeprefix(found[0]).partition("_")[0]
-        prefix, where = f"{found[0]}{kind}_", f"step {found[1]}, {'single' if kind == 'ssp' else 'double'} support"
+    if found := re.match(r"step(\d+)_(ssp_|dsp_)?", row.name):  # of a walk whose steps differ
+        support = {"ssp_": ", single support", "dsp_": ", double support"}.get(found[2], "")
+        prefix, where = found[0], f"step {found[1]}{support}"
     else:
         prefix = next(begin for begin in begins if row.name.startswith(begin))
         where = begins[prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")

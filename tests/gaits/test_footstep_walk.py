@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,11 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import describe_violation, plan_walk
+from nlp_gait.backends.plan_walk import describe_violation, list_speeds, plan_walk
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.solution import ConstraintValue
+from nlp_gait.gaits.biped.body import TIMES
 from nlp_gait.gaits.biped.footholds import (
     Foothold,
     find_support_sides,
@@ -25,6 +27,7 @@ from nlp_gait.gaits.biped.footholds import (
 from nlp_gait.gaits.biped.walk_start import start_from_cycle
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import find_sharpest_turn, find_stiff_joint, list_turn
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.mjcf import make_plan_model
@@ -200,8 +203,13 @@ def test_footholds_that_cannot_be_walked_are_refused(footholds: str, words: str)
     ("options", "words"),
     [
         ({"turn_deg": 90.0}, "robot 'nao-v5' does not turn: NAO has one motor for both hip yaw-pitch joints"),
-        ({"turn_deg": 90.0, "speed_m_s": 0.05}, "is on a level floor and has no given speed"),
-        ({"turn_deg": 90.0, "slope_deg": 2.0}, "is on a level floor and has no given speed"),
+        ({"turn_deg": 90.0, "speed_m_s": 0.05}, "whose steps differ is on a level floor; leave out speed_m_s"),
+        ({"turn_deg": 90.0, "slope_deg": 2.0}, "whose steps differ is on a level floor; leave out speed_m_s"),
+        ({"speeds_m_s": [0.05, -1.0]}, r"speeds_m_s must be finite numbers > 0, got \[0.05, -1.0\]"),
+        (
+            {"speeds_m_s": [0.05] * 5, "steps": 6},
+            "5 speeds are given, and a walk of 6 steps has 4 inner ones; plan more steps",
+        ),
     ],
 )
 def test_turns_that_cannot_be_planned_are_refused(options: dict[str, float], words: str) -> None:
@@ -213,3 +221,22 @@ def test_a_violation_names_its_step() -> None:
     row = "step3_ssp_joint_angle[RKneePitch, 3]"
     value = ConstraintValue(name=row, value=1.0, lower=None, upper=0.9, violation=0.1, unit="rad")
     assert describe_violation(value, 5).startswith("step 3, single support: RKneePitch exceeds its limit by 0.1 rad")
+    value = replace(value, name="step3_speed", unit="m/s")
+    assert describe_violation(value, 5).startswith("step 3: speed of the inner steps is not reached by 0.1 m/s")
+
+
+def test_every_inner_step_has_its_speed() -> None:
+    """What both feet advance on average, by the time between lift-offs; NAO's feet stay parallel."""
+    straight = list_arc(0.0, STEPS, LENGTH_M, make_nao("nao-v5").feet_y)
+    problem = nlp_gait.load("nao-walk", steps=STEPS, intervals=2, footholds=straight)
+    problem = problem.with_values(**list_speeds([0.04, 0.06], STEPS))
+    x = problem.start_point(np.random.default_rng(0))
+    model, point = build_exact_model(problem), problem.by_name(x)
+    rows = {row.name: row for row in model.rows(model.at(x, problem.p))}
+    for k, wanted in ((2, 0.04), (3, 0.06)):
+        row, time = rows[f"step{k}_speed"], sum(point[f"step{k}_{name}"] for name in TIMES.values())
+        assert (row.lower, row.upper) == (wanted, wanted)
+        assert row.value == pytest.approx(LENGTH_M / (STEPS - 1) / time)
+    assert list_speeds([0.02, 0.04, 0.02], 7)["step3_least_speed_m_s"] == pytest.approx(0.03)
+    arrays = make_plan(Result(problem=problem, x=x)).signals.arrays
+    assert "feet_yaw" not in arrays and arrays["right_foot"][-1, 0] == pytest.approx(LENGTH_M)

@@ -82,15 +82,19 @@ def read_footholds(path: str | Path) -> str:
 
 
 def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float, float]) -> str:
-    """Return the footholds of a turn to the left along an arc, of which the last foot closes beside the other one.
+    """Return the footholds of a turn to the left along an arc or of a line, of which the last foot closes beside the other one.
 
     All steps but the last advance equally, by a length of the arc and an angle; the right foot steps first.
     """
     found, turn = [], math.radians(turn_deg)
     for k in range(1, steps + 1):
-        yaw = min(k / (steps - 1), 1.0) * turn
-        x, y = Foothold(0.0, 0.0, yaw).turn(0.0, feet_y[k % 2] - distance_m / turn)
-        found.append(",".join(f"{value:.9g}" for value in (x, y + distance_m / turn, 0.0, math.degrees(yaw))))
+        share, y = min(k / (steps - 1), 1.0), feet_y[k % 2]
+        if turn:
+            x, y = Foothold(0.0, 0.0, share * turn).turn(0.0, y - distance_m / turn)
+            y += distance_m / turn
+        else:
+            x = share * distance_m
+        found.append(",".join(f"{value:.9g}" for value in (x, y, 0.0, share * turn_deg)))
     return ";".join(found)
 
 

@@ -16,18 +16,29 @@ import numpy as np
 from casadi import MX, SX, fmax
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Point, Signals, Variable
+from nlp_gait.formulation import (
+    Array,
+    GaitProblem,
+    Grid,
+    InstantPoint,
+    NumericPoint,
+    Parameter,
+    Point,
+    Signals,
+    Variable,
+)
+from nlp_gait.formulation.assembly import parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
 from nlp_gait.gaits.biped.cycle_motion import between, make_cycle_variables, make_state_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
 from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins
-from nlp_gait.gaits.biped.walk import WholeWalk, make_walk_phases, make_walk_problem
+from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
 from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, make_phase_variables, make_pose_variables
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -77,9 +88,35 @@ class FootstepWalk(WholeWalk):
             found[f"step{k}_dsp"] = last = FootstepPart(kind, k, middle, end, (landed, landed), double)
         return {**found, STAND_AT_END: last._replace(begin=STAND)}
 
+    @property
+    def advances(self) -> list[float]:
+        """Half the way of each step's foot [m]."""
+        return [math.dist(a[:2], b[:2]) / 2 for a, b in zip(self.feet, self.feet[2:], strict=False)]
+
     def find_distance(self, at: Point, inner: MX) -> MX:
         """Return the mean of the lengths of both feet's paths [m]."""
-        return MX(sum(math.dist(a[:2], b[:2]) for a, b in zip(self.feet, self.feet[2:], strict=False)) / 2)
+        return MX(sum(self.advances))
+
+    @property
+    def speed_limits(self) -> tuple[Parameter, ...]:
+        """Parameters of each inner step's speed."""
+        ends = ("least", 0.0), ("greatest", NO_LIMIT)
+        return parameters(
+            *(
+                (name_speed(end, k), "m/s", limit, f"{end} speed of step {k}", 0.0, NO_LIMIT)
+                for end, limit in ends
+                for k in range(2, self.steps)
+            )
+        )
+
+    def limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+        """Return the rows of the inner steps: what both feet advance on average in a swing and the double support after it."""
+        rows = []
+        for k in range(2, self.steps):
+            speed = self.advances[k - 1] / (times[f"step{k}_ssp"] + times[f"step{k}_dsp"])
+            least, greatest = (at[name_speed(end, k)] for end in ("least", "greatest"))
+            rows.append(make_speed_row(f"step{k}_speed", speed, least, greatest))
+        return rows, {}
 
     def limit_phase(self, name: str) -> Phase:
         """Return the phase with the limits of a part: in double support, the ZMP is limited by the hull of both soles."""
@@ -130,6 +167,11 @@ class FootstepWalk(WholeWalk):
         return join_steps(steps, self.body.robot, np.array(places))
 
 
+def name_speed(end: str, step: int) -> str:
+    """Return the name of the parameter that limits the speed of a step; ``end`` is least or greatest."""
+    return f"step{step}_{end}_speed_m_s"
+
+
 def replace_margins(phase: Phase, margins: BalanceMargins) -> Phase:
     """Return a phase with other balance margins."""
     limits = (margins if isinstance(limit, BalanceMargins) else limit for limit in phase.limits)
@@ -156,7 +198,7 @@ def make_polygon_margins(sides: Array) -> Margins:
     return margins
 
 
-def make_footstep_planner(body: Body, swings: bool) -> Planner:
+def make_footstep_planner(body: Body, turning: bool, swings: bool) -> Planner:
     """Return the plan of a phase over the left foot: the right one swings straight to its foothold, or stands on it."""
     left, (_, height) = body.standing_ankle("L"), body.ankle("R")
 
@@ -172,7 +214,7 @@ def make_footstep_planner(body: Body, swings: bool) -> Planner:
             Motion(at[a] + (at[b] - at[a]) * share[0], *((at[b] - at[a]) * s for s in share[1:])) for a, b in ends
         )
         foot = stack(x, y, rise._replace(position=rise.position + height))
-        turns = {TORSO_YAW: Motion(*(part / 2 for part in yaw)), RIGHT_YAW: yaw}
+        turns = {TORSO_YAW: Motion(*(part / 2 for part in yaw)), RIGHT_YAW: yaw} if turning else {}
         return body.plan(hip, {**body.cycle_angles(angles), **turns}, {"L": left, "R": foot}, at[REACH_MARGIN], ops)
 
     return plan
@@ -199,10 +241,11 @@ def plan_footstep_walk(
     """Return the problem of a walk along footholds, the right foot's first, with least energy per metre."""
     if steps != len(footholds):
         raise InputError(f"steps must be the number of footholds, {len(footholds)}, got {steps}")
-    body = replace(body, upright=frozenset())  # a swinging foot turns
+    turning = any(foothold.yaw for foothold in footholds)
+    body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
     feet, (*others, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
-    planners = [make_footstep_planner(body, swings) for swings in (False, True)]
+    planners = [make_footstep_planner(body, turning, swings) for swings in (False, True)]
     phases = make_walk_phases(body, (*others[:-1], *given), planners, sharing, grid, goal)
     sole, margins = body.robot.feet["left"], body.make_sole_margins((0.0, body.feet_y[0]))
     least = round((sole.back_m + sole.front_m) * LEAST_SHARE, 4), round((sole.left_m + sole.right_m) * LEAST_SHARE, 4)

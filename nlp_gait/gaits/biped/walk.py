@@ -115,16 +115,21 @@ class WholeWalk:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of all phases; those of balance begin with the kind of the phase."""
-        speeds = parameters(
-            (LEAST_SPEED, "m/s", 0.0, "least speed of the inner steps", 0.0, NO_LIMIT),
-            (GREATEST_SPEED, "m/s", NO_LIMIT, "greatest speed of the inner steps (no limit by default)", 0.0, NO_LIMIT),
-        )
         count = parameters(
             (STEPS, "1", float(self.steps), "number of steps; set by the option steps", self.steps, self.steps)
         )
         found = collect_parameters(self.phases)
-        own = (*count, *speeds) if "ssp" in self.parts else count
-        return (*own, *sorted(found, key=lambda p: p.name.endswith((".lower", ".upper"))))
+        return (*count, *self.speed_limits, *sorted(found, key=lambda p: p.name.endswith((".lower", ".upper"))))
+
+    @property
+    def speed_limits(self) -> tuple[Parameter, ...]:
+        """Parameters of the inner steps' speed."""
+        if "ssp" not in self.parts:
+            return ()
+        return parameters(
+            (LEAST_SPEED, "m/s", 0.0, "least speed of the inner steps", 0.0, NO_LIMIT),
+            (GREATEST_SPEED, "m/s", NO_LIMIT, "greatest speed of the inner steps (no limit by default)", 0.0, NO_LIMIT),
+        )
 
     def assemble(self, at: Point, ops: Nonsmooth) -> Assembly:
         """Return energy per metre, rows and indexes."""
@@ -147,7 +152,7 @@ class WholeWalk:
             for part in (energies, times)
         )
         distance = self.find_distance(at, inner)
-        speeds, indexes = self._limit_speed(at, times, energies) if "ssp" in parts else ((), {})
+        speeds, indexes = self.limit_speed(at, times, energies)
         return Assembly(
             objective=energy / distance,
             constraints=(*(row for part in found.values() for row in part.constraints), *speeds),
@@ -169,18 +174,12 @@ class WholeWalk:
         """Return the phase with the limits of a part."""
         return self.phases[self.parts[name].kind]
 
-    def _limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
+    def limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
         """Return the row and the indexes of the inner steps."""
+        if "ssp" not in self.parts:
+            return (), {}
         speed = at[STEP] / (times["ssp"] + times["dsp"])
-        row = Constraint(
-            name="speed",
-            unit="m/s",
-            scale=0.01,
-            value=speed,
-            lower=at[LEAST_SPEED],
-            upper=at[GREATEST_SPEED],
-            over="once",
-        )
+        row = make_speed_row("speed", speed, at[LEAST_SPEED], at[GREATEST_SPEED])
         cost = (energies["ssp"] + energies["dsp"]) / at[STEP]
         return (row,), {"speed_m_s": speed, "cycle_energy_J_per_m": cost}
 
@@ -228,6 +227,11 @@ class WholeWalk:
         inner = [join("ssp", "dsp")] * (self.steps - HALF_STEPS) if "ssp" in self.parts else []
         steps = [join("shift", "start_ssp", "start_dsp"), *inner, join("stop_ssp", "stop_dsp")]
         return join_steps(steps, self.body.robot, np.outer(range(self.steps), [float(at[STEP]), 0.0, self.rise_m, 0.0]))
+
+
+def make_speed_row(name: str, speed: MX, least: MX, greatest: MX) -> Constraint:
+    """Return the row that keeps a speed between limits [m/s]."""
+    return Constraint(name=name, unit="m/s", scale=0.01, value=speed, lower=least, upper=greatest, over="once")
 
 
 def make_whole_walk(

@@ -16,6 +16,8 @@ from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, PhaseTrajectory, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.double_support import hip_ends, make_double_support_phase, place_soles, plan_double_support
+from nlp_gait.gaits.biped.footholds import parse_footholds
+from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
@@ -159,6 +161,7 @@ def nao_walk(
     rotational_inertia: bool = True,
     samples_per_interval: int = 0,
     slope_deg: float = 0.0,
+    footholds: str = "",
     motors: str = "",
 ) -> GaitProblem:
     """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
@@ -173,6 +176,8 @@ def nao_walk(
         rotational_inertia: False takes every link as a point mass.
         samples_per_interval: above 1 for a denser grid.
         slope_deg: by which the ground rises forward; all places are in its axes, in which gravity is tilted.
+        footholds: rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, where the right foot, the left foot and so on land
+            instead; then every step has its own states. All angles are 0: one motor turns both feet.
         motors: features of the real motors; the mean square of a continuous torque is that of each phase.
 
     Source:
@@ -180,7 +185,13 @@ def nao_walk(
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
-    return plan_whole_walk(body, steps, grid, make_goal(body, "power"), share_load(body, "lever"))
+    goal, sharing = make_goal(body, "power"), share_load(body, "lever")
+    if not footholds:
+        return plan_whole_walk(body, steps, grid, goal, sharing)
+    places = parse_footholds(footholds)
+    if slope_deg or any(place.yaw for place in places):
+        raise InputError("footholds of NAO are on a level floor and all point forward; leave out slope_deg and angles")
+    return plan_footstep_walk(body, places, steps, grid, goal, sharing)
 
 
 @maker
