@@ -243,8 +243,7 @@ def cart_table(files: dict[str, str]) -> Iterator[str]:
     from compare.questions.sweep import parse_axis
     from compare.questions.walk.planners import CART_TABLE
     from compare.questions.walk.walk import CheapestWalk
-    from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.feedback import FEEDBACKS
+    from nlp_gait.simulation.drive import FEEDBACKS, Drive
 
     yield header(
         "robot", "speed m/s", "step m", "times s", "textbook W, optimum W, saved", "engine", "textbook's notes"

@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
 from compare.cli.common import end_interrupted, fail, print_json, print_table, print_written, progress_bar, stdout
@@ -38,11 +40,14 @@ class DriveOptions:
     feedback_delay_ms: float | None = None
     feedback_noise: float = 1.0
     feedback_seed: int = 0
+    replan_hz: float = 100.0
+    replan_free: str = "length,width,time"
+    speed_factor: float = 1.0
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import DRIVES
-        from nlp_gait.simulation.feedback import FEEDBACKS
+        from nlp_gait.simulation.drive import DRIVES, FEEDBACKS
+        from nlp_gait.simulation.replanning import Replanning
 
         for kind, name, known in (("drive", self.drive, DRIVES), ("feedback", self.feedback, FEEDBACKS)):
             if name not in known:
@@ -51,6 +56,12 @@ class DriveOptions:
         if feedback is not None:
             delay_s = feedback.delay_s if self.feedback_delay_ms is None else self.feedback_delay_ms / 1000.0
             feedback = replace(feedback.with_noise(self.feedback_noise), delay_s=delay_s, seed=self.feedback_seed)
+        if isinstance(feedback, Replanning):
+            if not self.replan_hz > 0.0:
+                raise InputError(f"--replan-hz must be > 0, got {self.replan_hz:g}")
+            feedback = replace(
+                feedback, period_s=1.0 / self.replan_hz, free=self.replan_free, speed_factor=self.speed_factor
+            )
         period_s = None if self.period_ms is None else self.period_ms / 1000.0
         names = ("interpolation", "feed_forward", "torque_limits")
         settings = {"period_s": period_s, **{name: getattr(self, name) for name in names}}
@@ -67,6 +78,7 @@ class ConditionOptions:
     mass_factor: float = 1.0
     stiffness_factor: float = 1.0
     push: str = "0,0"
+    push_at_s: float | None = None
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
@@ -79,7 +91,7 @@ class ConditionOptions:
             mass_factor=self.mass_factor,
             stiffness_factor=self.stiffness_factor,
             slope_rad=(math.radians(slope[0]), math.radians(slope[1])),
-            push=Push(impulse_Ns=impulse) if any(impulse) else None,
+            push=Push(impulse_Ns=impulse, start_s=self.push_at_s) if any(impulse) else None,
         )
         return conditions if self.friction is None else replace(conditions, friction=self.friction)
 
@@ -125,7 +137,7 @@ def simulate(
     robustness: bool = False,
     as_json: bool = False,
 ) -> None:
-    """Simulate a gait in MuJoCo, open loop or with balance feedback, and compare it with the model's predictions.
+    """Simulate a gait in MuJoCo, open loop or with feedback, and compare it with the model's predictions.
 
     Needs the extra `sim`, and `video` for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
     `nlp-gait simulate best.json --video walk.mp4`,
@@ -198,6 +210,7 @@ def simulate(
             if len(gaits) > 1:
                 stdout.print(f"{path}:")
             _print(report, survival if i == 0 else None)
+            _print_planning(traces[i])
             if walk is not None:
                 _print_course(walk, open_loop=drive.feedback is None)
         print_written(*written)
@@ -278,6 +291,15 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
         for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
             values = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
             stdout.print(f"{title}: {values}")
+
+
+def _print_planning(trace: Simulation) -> None:
+    if trace.plans is not None and len(trace.plans):
+        _, wall, converged, followed = trace.plans.T
+        stdout.print(
+            f"Planned {len(wall)} times: {np.mean(converged):.1%} converged, {np.mean(followed):.1%} followed, "
+            f"{1000.0 * np.median(wall):.1f} ms each (99th percentile {1000.0 * np.percentile(wall, 99):.1f} ms)"
+        )
 
 
 def _print_course(walk: Walk, *, open_loop: bool) -> None:

@@ -12,8 +12,10 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
-from nlp_gait.simulation.feedback import Balance, Feedback, check_period
+from nlp_gait.simulation.feedback import Balance, Feedback
 from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.replanning import Replanning, StepPlanner
+from nlp_gait.simulation.sensors import check_period
 
 # Published limits of NAO's joints differ by a factor of four: from the robot's file (the manufacturer's URDF), or from the motor
 # at stall or in continuous service, times the gear ratio.
@@ -39,7 +41,7 @@ class Drive:
     interpolation: str = "linear"
     feed_forward: str = "torque"  #: ``torque`` (and velocity), ``velocity``, or ``none``
     torque_limits: str = "urdf"  #: source of the limits
-    feedback: Feedback | None = None  #: corrects the set-points; None for open loop
+    feedback: Feedback | Replanning | None = None  #: corrects the set-points; None for open loop
 
     def __post_init__(self) -> None:
         for name in ("full_error_rad", "time_constant_s", "period_s"):
@@ -83,10 +85,18 @@ class Drive:
             return shifted
         return shifted + at("tau", times) / np.array([self.stiffness(joint) for joint in joints])
 
-    def balance(self, plan: Plan, model: Any) -> Balance | None:
+    def balance(self, plan: Plan, model: Any) -> Balance | StepPlanner | None:
         """Return the controller of one simulation, if the drive has a feedback."""
         if self.feedback is None:
             return None
+        joints = [plan.robot.joint(name) for name in plan.joints]
+
+        def shift(*parts: Array) -> Array:
+            found = dict(zip(("q", "qd", "tau"), parts, strict=True))
+            return self._shift(lambda name, times: found[name], np.zeros(1), joints)
+
+        if isinstance(self.feedback, Replanning):
+            return StepPlanner(self.feedback, plan, shift, model)
         stiffness = np.array([self.stiffness(plan.robot.joint(name)) for name in plan.joints])
         return Balance(self.feedback, plan, stiffness, model)
 
@@ -106,3 +116,5 @@ def stall_torque(joint: Joint) -> float:
 
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}
+# Feedbacks by name; every drive has none by default.
+FEEDBACKS = {"none": None, "torso-spring": Feedback(), "replan": Replanning()}

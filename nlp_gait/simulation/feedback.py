@@ -2,35 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.sensors import Sensing, SensorValues, TorsoSensor
 
 STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
-NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
-
-# Between two commands of a controller: NAO's has cycles of 10 ms, the engine steps of 0.5 ms.
-SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 1e-4, 1.0
-
-
-def check_period(owner: str, period_s: float) -> None:
-    """Check the time between two commands of a controller; raises InputError."""
-    if not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
-        raise InputError(
-            f"period_s of a {owner} must be from {SHORTEST_PERIOD_S:g} to {LONGEST_PERIOD_S:g} s, got {period_s!r}"
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Feedback:
+class Feedback(Sensing):
     """A spring and a damper between the torso and its planned place over the feet, and between both attitudes.
 
     Force and moment act on the ground through the legs that are planned to stand, each with its planned share of the load, and
@@ -40,9 +26,8 @@ class Feedback:
 
     Source:
         Virtual model control: Pratt, Chew, Torres, Dilworth, Pratt (2001). Gain k: Caron, Kheddar, Tempier (2019), whose
-        controller of HRP-4 has 1 + 5 / w with w = 3.55 / s, and an integral. Noise: joint sensors that round to 0.1 degrees
-        (data sheet), three in a row, over 0.3 m of leg and over 30 ms; the gyrometer's 10 mrad/s and the integral gain are
-        assumptions. `python -m benchmarks.engine feedback` shows their effects.
+        controller of HRP-4 has 1 + 5 / w with w = 3.55 / s, and an integral, whose gain is
+        an assumption. `python -m benchmarks.engine feedback` shows their effects.
     """
 
     spring_N_per_m: float = 500.0  # towards the planned place
@@ -53,44 +38,10 @@ class Feedback:
     # of the integral, along each axis: of the force as a share of the weight, of the moment as that share of the weight
     # at the height of the torso; 0.05 compensates a slope of 3 degrees
     growth_limit: float = 0.05
-    period_s: float = 0.01  # between two measurements, each of which acts until the next
-    delay_s: float = 0.01  # from a measurement to the drives: one more cycle of the controller
-    position_noise_m: float = 2.5e-4  # standard deviation of the measured place of the torso over the feet
-    velocity_noise_m_s: float = 0.012  # of its velocity
-    tilt_noise_rad: float = 1e-3  # of its attitude about each axis
-    rate_noise_rad_s: float = 0.01  # of its rates
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            least = "> 0" if name == "period_s" else ">= 0"
-            if not (math.isfinite(value) and (value > 0.0 or (value == 0.0 and least == ">= 0"))):
-                raise InputError(f"{name} of a feedback must be {least}, got {value!r}")
-        check_period("feedback", self.period_s)
 
     def with_strength(self, factor: float) -> Feedback:
         """Return the feedback with springs and dampers times a factor."""
         return replace(self, **{name: factor * getattr(self, name) for name in STRENGTHS})
-
-    def with_noise(self, factor: float) -> Feedback:
-        """Return the feedback with the noise times a factor."""
-        return replace(self, **{name: factor * getattr(self, name) for name in NOISES})
-
-
-# By name; every drive has none by default.
-FEEDBACKS = {"none": None, "torso-spring": Feedback()}
-
-
-class SensorValues(NamedTuple):
-    """Sensor values of the torso at one instant."""
-
-    step: int  # number of the engine's step
-    place: Array  # (3,) of its origin from the feet, each weighted with its planned share of the load [m]
-    velocity: Array  # (3,) [m/s]
-    attitude: Array  # (3, 3) rotation from its axes to those of the floor
-    tilt_error: Array  # (3,) error of the attitude, about the axes of the floor [rad]
-    rate: Array  # (3,) about the axes of the floor [rad/s]
 
 
 class Balance:
@@ -101,11 +52,7 @@ class Balance:
         self._engine = load_mujoco()
         self._posture = self._engine.MjData(model)  # planned angles under an upright torso at the origin
         self._at = Addresses(model, plan)
-        step_s = model.opt.timestep
-        self._every, self._late = max(1, round(feedback.period_s / step_s)), round(feedback.delay_s / step_s)
-        self._noise = np.random.default_rng(feedback.seed)
-        self._waiting: deque[SensorValues] = deque()
-        self._steps = 0
+        self._sensor = TorsoSensor(feedback, plan, model)
         self._shift = np.zeros(len(plan.joints))
         self._integral = np.zeros(6)  # force [N] and moment [Nm]
         weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
@@ -113,41 +60,23 @@ class Balance:
 
     def shift(self, data: Any) -> Array:
         """Return the correction of the set-points (J,) [rad]; call it once in each step of the engine."""
-        if self._steps % self._every == 0:
-            self._waiting.append(self._measure(data))
-        if self._waiting and self._waiting[0].step + self._late <= self._steps:
-            self._shift = self._torques(self._waiting.popleft()) / self._stiffness
-        self._steps += 1
+        seen = self._sensor.read(data)
+        if seen is not None:
+            self._shift = self._torques(seen) / self._stiffness
         return self._shift
 
-    def _time(self, step: int) -> Array:
-        return np.array([step * self._model.opt.timestep])
-
-    def _measure(self, data: Any) -> SensorValues:
-        settings, noise = self._feedback, self._noise.standard_normal((4, 3))
-        turning = np.zeros(6)  # rates, then velocity, along the floor's axes
-        body = self._engine.mjtObj.mjOBJ_XBODY
-        self._engine.mj_objectVelocity(self._model, data, body, self._at.torso, turning, 0)
-        share = compute_load_shares(self._plan, self._time(self._steps))[0]
-        return SensorValues(
-            step=self._steps,
-            place=data.xpos[self._at.torso]
-            - share @ data.site_xpos[self._at.soles]
-            + settings.position_noise_m * noise[0],
-            velocity=turning[3:] + settings.velocity_noise_m_s * noise[1],
-            attitude=data.xmat[self._at.torso].reshape(3, 3).copy(),
-            tilt_error=settings.tilt_noise_rad * noise[2],
-            rate=turning[:3] + settings.rate_noise_rad_s * noise[3],
-        )
+    def correct(self, command: Array, data: Any) -> Array:
+        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
+        return command + self.shift(data)
 
     def _torques(self, seen: SensorValues) -> Array:
         """Return the joint torques (J,) of the springs' force and moment [Nm]."""
-        settings, plan, at = self._feedback, self._plan, self._time(seen.step)
+        settings, plan, at = self._feedback, self._plan, np.array([seen.step * self._sensor.step_s])
         share = compute_load_shares(plan, at)[0]
         planned, soles = self._planned_posture(at, int(share[1] > share[0]))
         feet = np.stack([plan.at(f"{side}_foot", at)[0] for side in SIDES])
         place = plan.at("hip", at)[0] - share @ feet
-        force = settings.spring_N_per_m * (place - seen.place)
+        force = settings.spring_N_per_m * (place - share @ seen.places)
         force += settings.damper_Ns_per_m * (plan.rate("hip", at)[0] - seen.velocity)
         moment = settings.tilt_spring_Nm_per_rad * (to_rotation_vector(planned @ seen.attitude.T) - seen.tilt_error)
         moment -= settings.tilt_damper_Nms_per_rad * seen.rate

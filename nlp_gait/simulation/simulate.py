@@ -15,6 +15,7 @@ from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
+from nlp_gait.simulation.replanning import StepPlanner
 
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
@@ -35,9 +36,10 @@ OnStep = Callable[[Any, Any], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Push:
-    """Impulse on the torso's centre of mass in the middle of the phase."""
+    """Impulse on the torso's centre of mass."""
 
     impulse_Ns: tuple[float, float]  # (x, y) [N s]
+    start_s: float | None = None  # of the force; None for the middle of the motion
     duration_s: float = 0.05  # of the constant force
 
     def force(self, since_s: float) -> tuple[float, float]:
@@ -89,6 +91,8 @@ class Simulation:
     loads: Array  #: (T, 2) force of the floor on the left and right foot, along its normal [N]
     pressure: Array  #: (T, 2) centre of pressure of both feet [m]; NaN in flight
     fell_at_s: float | None  #: None if the robot stayed up
+    #: (N, 4) of planning again: time and wall time of each plan [s], whether it converged, and whether it was followed
+    plans: Array | None = None
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """Return the time histories, for an archive."""
@@ -121,12 +125,14 @@ def simulate_plan(
     rows: list[tuple[Any, ...]] = []
     fell_at_s = None
     balance = drive.balance(plan, model)
+    push = conditions.push
+    pushed_s = plan.duration_s / 2 if push is None or push.start_s is None else push.start_s
     for t, command, axis, least_height in zip(times.tolist(), commands, axes_planned, least_heights, strict=True):
         if balance is not None:
-            command += balance.shift(data)  # in place: the result contains these set-points
+            command[:] = balance.correct(command, data)  # in place: the result contains these set-points
         data.ctrl[at.actuators] = command
-        if conditions.push is not None:
-            data.xfrc_applied[at.torso, :2] = conditions.push.force(t - plan.duration_s / 2)
+        if push is not None:
+            data.xfrc_applied[at.torso, :2] = push.force(t - pushed_s)
         if on_step is not None:
             on_step(model, data)
         q, qd = data.qpos[at.angles], data.qvel[at.rates]
@@ -143,7 +149,8 @@ def simulate_plan(
     measured = dict(zip(("q", "qd", "torque", *COLUMNS), columns, strict=True))
     measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
     n = len(rows)
-    return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)
+    plans = np.array(balance.plans) if isinstance(balance, StepPlanner) else None
+    return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s, plans=plans)
 
 
 def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:

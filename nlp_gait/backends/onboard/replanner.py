@@ -85,11 +85,18 @@ class Replanner:
         self._ipopt = IpoptSettings(hessian="exact").prepare(problem, solves=SOLVES)
         self._functions = NlpFunctions(problem, self._ipopt.functions)
         self._steps = StepSolver(self._functions)
-        self._steps.begin(near.guess.rows)
         self._exact = build_exact_model(problem)
         self._scale = self._exact.row_scales[: len(self._functions.model.row_names)]
         self._threads = ThreadpoolController()
-        self._near, self._guess = near, near.guess
+        self._near, self._first = near, near
+        self.restart()
+
+    def restart(self) -> None:
+        """Continue from the first optimum, so that the same calls give the same numbers."""
+        assert self._first.guess is not None  # checked when it was made
+        self._near, self._guess = self._first, self._first.guess
+        self._steps.begin(self._guess.rows)
+        self._steps.damping = LEAST_DAMPING
 
     @lock_casadi
     def solve(

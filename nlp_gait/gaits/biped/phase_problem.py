@@ -138,6 +138,7 @@ def add_robot(
         repeats=repeats,
         steps=steps,
         ground=ground,
+        body=body,
     )
     display = replace(problem.display, robot=body.full, skeleton=body.skeleton, simulation_model=model)
     return replace(problem, display=display)

@@ -1,0 +1,108 @@
+"""Pushed walks of NAO with and without planning again: ``python -m benchmarks.onboard_loop [--walks N] [CONTROLLER...]``.
+
+Four steps of the cheapest ``nao-cycle``. The pushes (50 ms on the torso) begin at N equidistant times of the second and third
+step, each walk with noise of its own seed. For each controller and direction the impulse grows by 0.1 N s from 0.5 N s, first in
+larger steps, to the first one at which at least half of the walks fall.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+import nlp_gait
+from nlp_gait.formulation import Result
+from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.feedback import Feedback
+from nlp_gait.simulation.measurements import measure_walk
+from nlp_gait.simulation.plan import Plan, make_plan
+from nlp_gait.simulation.replanning import Replanning
+from nlp_gait.simulation.sensors import Sensing
+from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan
+
+STEPS = 4
+FIRST, COARSE, FINE, LARGEST = 0.5, 0.4, 0.1, 4.1  # impulses [N s]
+CONTROLLERS: dict[str, Sensing | None] = {
+    "open loop": None,
+    "torso-spring": Feedback(),
+    "replan, hip only": Replanning(free=""),
+    "replan, length and width": Replanning(free="length,width"),
+    "replan 100 Hz": Replanning(),
+    "replan 500 Hz": Replanning(period_s=0.002),
+}
+
+
+class Pushes:
+    """Walks of one controller, and the plans that it made."""
+
+    def __init__(self, plan: Plan, feedback: Sensing | None, walks: int) -> None:
+        self._plan, self._feedback, self._walks = plan, feedback, walks
+        self.plans: list[np.ndarray] = []
+
+    def survives(self, direction: tuple[int, int], impulse: float) -> bool:
+        """Return whether fewer than half of the walks fall; stop when that is known."""
+        period, (x, y), fallen, stood = self._plan.duration_s / STEPS, direction, 0, 0
+        for k in range(self._walks):
+            push = Push(impulse_Ns=(x * impulse, y * impulse), start_s=period * (1.0 + 2.0 * k / self._walks))
+            fell = self.walk(Conditions(push=push), k)
+            fallen, stood = fallen + fell, stood + (not fell)
+            if 2 * fallen >= self._walks or 2 * stood > self._walks:
+                break
+        return 2 * fallen < self._walks
+
+    def walk(self, conditions: Conditions, seed: int) -> bool:
+        """Return whether one walk falls."""
+        feedback = self._feedback and replace(self._feedback, seed=seed)
+        found = simulate_plan(self._plan, conditions, Drive(feedback=feedback))
+        self.plans += [] if found.plans is None or not len(found.plans) else [found.plans]
+        return found.fell_at_s is not None
+
+    def find_half(self, direction: tuple[int, int]) -> float:
+        """Return the impulse at which at least half fall [N s], infinite if none does up to ``LARGEST``."""
+        impulse = FIRST
+        while self.survives(direction, impulse):
+            impulse = round(impulse + COARSE, 9)
+            if impulse > LARGEST:
+                return np.inf
+        below = round(impulse - COARSE + FINE, 9)
+        while below < impulse - FINE / 2 and below > 0.0 and self.survives(direction, below):
+            below = round(below + FINE, 9)
+        return below
+
+
+def measure(plan: Plan, name: str, walks: int) -> None:
+    """Print one controller's rows."""
+    pushes = Pushes(plan, CONTROLLERS[name], walks)
+    drive = Drive(feedback=CONTROLLERS[name])
+    quiet = measure_walk(plan, simulate_plan(plan, Conditions(), drive), drive, STEPS)
+    cost = "falls" if quiet.engine_J_per_m is None else f"{quiet.engine_J_per_m:.2f}"
+    halves = {each: pushes.find_half(direction) for each, direction in DIRECTIONS.items()}
+    cells = [f"{halves[each]:.1f}" for each in DIRECTIONS]
+    rest = ["-", "-", "-"]
+    if pushes.plans:
+        wall, converged = np.concatenate(pushes.plans).T[1:3]
+        times = [f"{1000.0 * value:.1f} ms" for value in (np.median(wall), np.percentile(wall, 99))]
+        rest = [*times, f"{np.mean(converged):.1%}"]
+    print(f"| {name} | {' | '.join([*cells, cost, *rest])} |", flush=True)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("controllers", nargs="*", default=list(CONTROLLERS), help=", ".join(CONTROLLERS))
+    parser.add_argument("--walks", type=int, default=40)
+    arguments = parser.parse_args()
+    problem = nlp_gait.load("nao-cycle")
+    best = nlp_gait.solve(problem, starts=1, seed=0)
+    plan = make_plan(Result(problem=problem, x=best.x), STEPS)
+    print("impulse at which half of the walks fall [N s], energy undisturbed, and all plans of the pushed walks\n")
+    print(f"| controller | {' | '.join(DIRECTIONS)} | J/m | time per plan | 99th percentile | converge |")
+    print("|---|" + "--:|" * 8)
+    list(map(partial(measure, plan, walks=arguments.walks), arguments.controllers))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,231 @@
+"""The rest of a support phase from a measured state: where the hip goes, and where and when the swinging foot lands.
+
+The left foot stands at x = 0, as in a cycle. In single support the right foot swings on from where it is to a place that is
+free; in double support it stands ahead. The hip moves on a cubic from its measured place and velocity to a free state, the ZMP
+stays within a polygon of up to ``EDGES`` edges, and what is minimised is the distance from the planned state at the end of the
+phase, which is relative to the foot that stands then. The state at the next lift-off or touch-down is the planned one if the
+place of the next foothold makes up for the disturbance.
+
+Source:
+    Khadiv, Herzog, Moosavian, Righetti (2020), "Walking control based on step timing adaptation": place and time of the next
+    step as variables, and the distances from the planned ones as cost; here with the whole body's ZMP and reach instead of a
+    pendulum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import casadi as ca
+from casadi import MX, SX
+
+from nlp_gait.formulation import (
+    Assembly,
+    Display,
+    GaitProblem,
+    Grid,
+    InstantPoint,
+    Objective,
+    Parameter,
+    Point,
+    Variable,
+)
+from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, JointLimits, Limit, Reach, RowsAndIndexes, make_rows_at_samples
+from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.samples import Instant, Samples
+from nlp_gait.gaits.biped.single_support import make_single_support_loads
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack
+
+INTERVALS = 8
+EDGES = 6  # of the hull of two soles that point forward
+OUTSIDE, BEYOND = "zmp_outside_m", "beyond_reach"
+FOOT = ("foot_x_end_m", "foot_y_end_m")
+HIP_PLACES = tuple(f"hip_{axis}_end_m" for axis in "xyz")
+HIP_RATES = tuple(f"hip_v{axis}_end_m_s" for axis in "xyz")
+# Distances from the planned end that cost 1: of the hip's place over the foot that stands then, of its velocity, of both along z,
+# of the foothold and the time.
+UNITS = {"place": 0.01, "velocity": 0.06, "height": 0.01, "rise": 0.02, "foot": 0.03, "time": 0.1}
+# A ZMP outside its polygon costs OUTSIDE_COST for each of these units.
+OUTSIDE_UNIT, OUTSIDE_COST, BEYOND_COST = 0.001, 10.0, 3000.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlannedEnd(Goal):
+    """Squared distance from the planned end of the phase, and the ZMP's from its polygon."""
+
+    time: str = ""
+    swings: bool = False
+
+    def evaluate(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
+        """Return the objective; there are no other indexes."""
+
+        def miss(name: str) -> MX:
+            return at[name] - at[f"{name}.planned"]
+
+        cost = (miss(self.time) / UNITS["time"]) ** 2 + OUTSIDE_COST * at[OUTSIDE] / OUTSIDE_UNIT
+        cost += BEYOND_COST * at[BEYOND]
+        cost += (miss(HIP_PLACES[2]) / UNITS["height"]) ** 2 + (miss(HIP_RATES[2]) / UNITS["rise"]) ** 2
+        for place, rate, foot in zip(HIP_PLACES, HIP_RATES, FOOT, strict=False):
+            cost += ((miss(place) - at[foot]) / UNITS["place"]) ** 2 + (miss(rate) / UNITS["velocity"]) ** 2
+            cost += (miss(foot) / UNITS["foot"]) ** 2 if self.swings else MX(0.0)
+        return cost, {}, {}
+
+
+class SoftReach(Limit):
+    """Joints within their limits and knees within reach, or beyond by a variable: a measured state may be there already."""
+
+    def __init__(self, body: Body) -> None:
+        self._hard = (JointLimits(body.robot, body.planned), Reach())
+        self.parameters = tuple(parameter for limit in self._hard for parameter in limit.parameters)
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        rows = []
+        for row in (row for limit in self._hard for row in limit.add(at, samples, ops)[0]):
+            assert row.lower is not None and row.upper is not None  # both limits have them
+            for word, value in (("below", row.lower - row.value), ("above", row.value - row.upper)):
+                rows.append(
+                    replace(row, name=f"{row.name}_{word}", value=value - at[BEYOND], lower=None, upper=MX(0.0))
+                )
+        return rows, {}
+
+
+class ZmpPolygon(Limit):
+    """ZMP on the inner side of every edge, where normal (x, y) times ZMP is at most a distance, or outside by a variable."""
+
+    parameters = tuple(
+        Parameter(name=f"edge_{k}_{what}", unit=unit, default=value, description=f"edge {k} of the polygon: {words}")
+        for k in range(EDGES)
+        for what, unit, value, words in (
+            ("x", "1", 1.0, "its normal's x"),
+            ("y", "1", 0.0, "its normal's y"),
+            ("m", "m", 1.0, "distance from the origin"),
+        )
+    )
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        x, y = samples.zmp[0, :], samples.zmp[1, :]
+        rows = [at[f"edge_{k}_x"] * x + at[f"edge_{k}_y"] * y - at[f"edge_{k}_m"] - at[OUTSIDE] for k in range(EDGES)]
+        names = [f"edge_{k}" for k in range(EDGES)]
+        return [make_rows_at_samples("zmp", "m", ca.vertcat(*rows), names, None, MX(0.0))], {}
+
+
+def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
+    """Return the problem of the rest of single (``ssp``) or double support (``dsp``) over the left foot."""
+    swings, angles = name == "ssp", body.angle_names(name)
+    _, right_height = body.ankle("R")
+    left = body.standing_ankle("L")
+
+    def read_foot(at: InstantPoint, s: SX) -> Motion:
+        time = read_duration(at, name)
+        if not swings:
+            place = ca.vertcat(at[FOOT[0]], at[FOOT[1]], right_height)
+            return Motion(place, SX(3, 1), SX(3, 1))
+        begun, left_over = at["swing_share_start"], 1 - at["swing_share_start"]
+        x, y = (
+            cubic(at[f"foot_{axis}_start_m"], at[end], at[f"foot_v{axis}_start_m_s"], SX(0), time, s)
+            for axis, end in zip("xy", FOOT, strict=True)
+        )
+        done = cubic(SX(0), SX(1), SX(0), SX(0), time / left_over, begun + left_over * s)
+        rise = parabola_lift(done, 0.0, 1.0, at["swing_height_m"])
+        return stack(x, y, rise._replace(position=rise.position + right_height))
+
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
+        time = read_duration(at, name)
+        hip = stack(
+            *(
+                cubic(at[f"hip_{a}_start_m"], at[place], at[f"hip_v{a}_start_m_s"], at[rate], time, s)
+                for a, place, rate in zip("xyz", HIP_PLACES, HIP_RATES, strict=True)
+            )
+        )
+        arms = {
+            each: cubic(
+                at[f"{each}_start"], at[f"{each}_end"], at[f"{each}_start_rate"], at[f"{each}_end_rate"], time, s
+            )
+            for each in angles
+        }
+        return body.plan(hip, arms, {"L": left, "R": read_foot(at, s)}, at[REACH_MARGIN], ops)
+
+    phase = Phase(
+        body=body,
+        variables=_list_variables(body, name),
+        duration=TIMES[name],
+        plan=plan,
+        loads=make_single_support_loads(body) if swings else LoadSharing(body, "lever").loads,
+        grid=Grid(intervals=INTERVALS, samples_per_interval=1, refined_by="samples_per_interval"),
+        limits=(SoftReach(body), ZmpPolygon()),
+        goal=PlannedEnd(objective=Objective(name="deviation", unit="1"), time=TIMES[name], swings=swings),
+        state=_list_state(body, name),
+    )
+
+    def assemble(at: Point, ops: Nonsmooth) -> Assembly:
+        return phase.assemble(at, phase.sample(at, ops), ops)
+
+    planned = tuple(
+        Parameter(name=f"{each}.planned", unit=unit, default=0.0, description="planned value")
+        for each, unit in (
+            (TIMES[name], "s"),
+            *((place, "m") for place in HIP_PLACES),
+            *((rate, "m/s") for rate in HIP_RATES),
+            *((place, "m") for place in FOOT if swings),
+        )
+    )
+    return GaitProblem(
+        name=f"{body.family}-rest-of-{name}",
+        title=f"{body.title}, rest of a phase from a measured state",
+        variables=phase.variables,
+        own_parameters=(*planned, *phase.parameters),
+        objective=phase.goal.objective,
+        assemble=assemble,
+        grid=phase.grid,
+        display=Display(at_time=phase.at_time, durations=(phase.duration,)),
+    )
+
+
+def _list_variables(body: Body, name: PhaseName) -> tuple[Variable, ...]:
+    low, high = body.hip_height_m
+    left_y, most = body.feet_y[0], body.leg_length_m
+    rows = [
+        ("hip_x_end_m", "m", -most, most, "the hip's x at the end"),
+        ("hip_y_end_m", "m", -most, most, "the hip's y at the end"),
+        ("hip_z_end_m", "m", low, high, "the hip's height at the end"),
+        *((rate, "m/s", -1.0, 1.0, "the hip's velocity at the end") for rate in HIP_RATES),
+        *(
+            [
+                ("foot_x_end_m", "m", -0.6 * most, 0.7 * most, "where the foot lands ahead"),
+                ("foot_y_end_m", "m", left_y - 0.8 * most, left_y - 0.4 * most, "where the foot lands across"),
+            ]
+            if name == "ssp"
+            else []
+        ),
+        (TIMES[name], "s", 0.005, 4.0, "left of the phase"),
+        (OUTSIDE, "m", 0.0, 0.3, "of the ZMP beyond its polygon"),
+        (BEYOND, "1", 0.0, 1.0, "of joints beyond their limits [rad] and cosines of knees beyond theirs"),
+    ]
+    return tuple(
+        Variable(name=each, unit=unit, lower=least, upper=greatest, description=text)
+        for each, unit, least, greatest, text in rows
+    )
+
+
+def _list_state(body: Body, name: PhaseName) -> tuple[Parameter, ...]:
+    """Return what the motion reads besides the variables."""
+    left_y, right_y = body.feet_y
+    rows = [(f"hip_{a}_start_m", "m", v) for a, v in zip("xyz", (0.0, left_y / 2, body.hip_height_m[1]), strict=True)]
+    rows += [(f"hip_v{axis}_start_m_s", "m/s", 0.0) for axis in "xyz"]
+    for angle in body.angle_names(name):
+        rows += [(f"{angle}_{end}", "rad", 0.0) for end in ("start", "end")]
+        rows += [(f"{angle}_{end}_rate", "rad/s", 0.0) for end in ("start", "end")]
+    if name == "ssp":
+        rows += [("foot_x_start_m", "m", -body.step_length_m), ("foot_y_start_m", "m", right_y)]
+        rows += [("foot_vx_start_m_s", "m/s", 0.0), ("foot_vy_start_m_s", "m/s", 0.0)]
+        rows += [("swing_share_start", "1", 0.0), ("swing_height_m", "m", 0.015)]
+    else:
+        rows += [(FOOT[0], "m", body.step_length_m), (FOOT[1], "m", right_y)]
+    return tuple(
+        Parameter(name=each, unit=unit, default=value, description=each.replace("_", " ")) for each, unit, value in rows
+    )

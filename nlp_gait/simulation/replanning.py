@@ -1,0 +1,303 @@
+"""Feedback by planning again: the rest of each phase, with the place and the time of the next foothold, from the measured state.
+
+At each measurement the place and velocity of the torso over the standing foot are the start of the rest of the present phase
+(``gaits.biped.rest_of_phase``), which the replanner solves. The drives then follow the new plan. The swinging foot, the height of
+the torso and the arms continue from the last plan. At touch-down and lift-off the next phase begins at the last plan's end.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from nlp_gait.backends.onboard.replanner import Replanner, replanner
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import Array, InstantPoint
+from nlp_gait.formulation.display import find_hull
+from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
+from nlp_gait.gaits.biped.rest_of_phase import BEYOND, EDGES, FOOT, HIP_PLACES, HIP_RATES, OUTSIDE, make_rest_of_phase
+from nlp_gait.simulation.plan import SIDES, STANDING, Plan
+from nlp_gait.simulation.sensors import Sensing, SensorValues, TorsoSensor
+
+FREE = ("length", "width", "time")
+LAST_S = 0.04  # a phase with less left is not planned again: its state at the end is fixed by then
+# Whole phases, where times are free: double support may last longer but not end before the load has passed.
+FASTEST_S: dict[PhaseName, float] = {"ssp": 0.25, "dsp": math.inf}
+SLOWEST = 1.5  # longest phase, relative to the planned one
+STEPS, TIME_LIMIT_S = 10, 3600.0  # of each plan; the limit of time only keeps the replanner from using IPOPT
+MOST_OUTSIDE_M, MOST_BEYOND = 0.05, 0.1  # of the ZMP and the joints: a worse plan is not followed
+SAFETY_M = 0.005  # from the soles' edges, within which the ZMP is planned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replanning(Sensing):
+    """Planning again after each measurement."""
+
+    free: str = "length,width,time"  # what of the next step may change, separated by commas
+    speed_factor: float = 1.0  # on the length of the steps in the second half of the walk
+
+    def __post_init__(self) -> None:
+        Sensing.__post_init__(self)
+        if not set(self.free.split(",")) <= {*FREE, ""}:
+            raise InputError(f"free must be some of {','.join(FREE)}, separated by commas, got {self.free!r}")
+
+
+class State(NamedTuple):
+    """State of a plan in the axes of the standing foot: places [m] with velocities [m/s], angles [rad] with rates [rad/s]."""
+
+    hip: Array  # (3,)
+    hip_rate: Array
+    foot: Array  # (2,) the other ankle
+    foot_rate: Array
+    arms: Array  # (k,)
+    arms_rate: Array
+
+
+class PlannedPhase(NamedTuple):
+    """A phase of the planned walk, seen from the foot that stands at its start: mirrored where that is the right one."""
+
+    name: PhaseName
+    stance: int  # number of this foot in ``SIDES``
+    duration_s: float
+    start: State
+    end: State
+    height: float  # of the swing [m]
+
+
+class Pursuit(NamedTuple):
+    """The plan that the drives follow: the rest of a phase."""
+
+    phase: PlannedPhase
+    began_s: float
+    share: float  # of the phase that is done where it begins
+    duration_s: float
+    start: State
+    end: State
+    values: dict[str, float]  # parameters of the problem
+    x: Array  # (n,) its variables
+
+    def share_at(self, t: float) -> float:
+        """Return the share of the phase that is done at a time of the walk [s]."""
+        return self.share + (1.0 - self.share) * min(max((t - self.began_s) / self.duration_s, 0.0), 1.0)
+
+    def at(self, t: float) -> State:
+        """Return the state at a time of the walk [s]: cubics, as in the problem."""
+        s, found = min(max((t - self.began_s) / self.duration_s, 0.0), 1.0), []
+        for k in range(0, len(self.start), 2):
+            start, rise = self.start[k], self.end[k] - self.start[k]
+            v0, v1 = self.start[k + 1] * self.duration_s, self.end[k + 1] * self.duration_s
+            c2, c3 = 3 * rise - 2 * v0 - v1, v0 + v1 - 2 * rise
+            found += [start + s * (v0 + s * (c2 + s * c3)), (v0 + s * (2 * c2 + 3 * s * c3)) / self.duration_s]
+        return State(*found)
+
+
+class RestPlanner:
+    """Planner of the rest of one kind of phase of a robot; its replanner is built when it is first used."""
+
+    def __init__(self, body: Body, name: PhaseName) -> None:
+        self.problem = make_rest_of_phase(body, name)
+        self.names = self.problem.names
+        self._own = [parameter.name for parameter in self.problem.own_parameters]
+        x, p, t = SX.sym("x", len(self.names)), SX.sym("p", len(self._own)), SX.sym("t")
+        at_time = self.problem.display.at_time
+        assert at_time is not None  # phases have it
+        found = at_time(InstantPoint.of(x, p, self.names, self._own), t)
+        self._at_time = ca.Function("now", [x, p, t], [found[each] for each in ("q", "qd", "tau")])
+        self._replanner: Replanner | None = None
+
+    def prepare(self, plan: Pursuit) -> Replanner:
+        """Return the replanner, built from the optimum of a plan; raises InputError without DAQP."""
+        if self._replanner is None:
+            problem = self.problem.with_values(**plan.values)
+            self._replanner = replanner(problem, near=solve(problem, x0=plan.x, workers=1))
+        return self._replanner
+
+    def evaluate(self, plan: Pursuit, t: float) -> list[Array]:
+        """Return q [rad], qd [rad/s] and tau [Nm], (J,) each, at a time of the walk [s]."""
+        p = [plan.values.get(name, self.problem.value(name)) for name in self._own]
+        return [np.asarray(part).ravel() for part in self._at_time(plan.x, p, t - plan.began_s)]
+
+
+@lru_cache(maxsize=4)
+def make_planners(body: Body) -> dict[PhaseName, RestPlanner]:
+    """Return the planners of both kinds of phases; one robot's are made once."""
+    return {name: RestPlanner(body, name) for name in TIMES}
+
+
+class StepPlanner:
+    """Controller of one simulation; ``shift`` gives the set-points (J,) from q, qd and tau (J,)."""
+
+    def __init__(self, settings: Replanning, plan: Plan, shift: Callable[..., Array], model: Any) -> None:
+        """Raise InputError for a plan whose phases cannot be planned again."""
+        body = plan.body
+        if body is None or plan.planar or plan.ground or plan.slope_rad or "attitude" in plan.signals.arrays:
+            raise InputError(
+                "planning again is for upright walks of NAO and humanoids on the flat; use --feedback torso-spring"
+            )
+        self._body, self._shift, self._settings = body, shift, settings
+        self._sensor = TorsoSensor(settings, plan, model)
+        self._tick = max(1, round(settings.period_s / self._sensor.step_s))
+        self._steps, self._k = 0, 0
+        self._planners, self._phases = make_planners(body), list_phases(plan, body)
+        self._used: set[PhaseName] = set()
+        #: of each plan: time, wall time [s], whether it converged and whether it was followed
+        self.plans: list[tuple[float, float, bool, bool]] = []
+        self._now = self._make(0.0, 0.0, self._phases[0].start)
+        self._guess, self._guess_s = self._now.x, 0.0  # where the next plan starts
+        self._from = self._to = self._find_set_points(0.0)
+
+    def correct(self, command: Array, data: Any) -> Array:
+        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
+        t, seen, into = self._steps * self._sensor.step_s, self._sensor.read(data), self._steps % self._tick
+        if into == 0:
+            self._change_phase(t)
+        if seen is not None:
+            self._plan_again(seen)
+        if into == 0:
+            self._from, self._to = self._to, self._find_set_points(t + self._tick * self._sensor.step_s)
+        self._steps += 1
+        return self._from + into / self._tick * (self._to - self._from)
+
+    def _change_phase(self, t: float) -> None:
+        """Go to the next phase where the present one ends; the last one's end is held."""
+        now, left_y = self._now, self._body.feet_y[0]
+        end_s = now.began_s + now.duration_s
+        if t < end_s or self._k + 1 == len(self._phases):
+            return
+        self._k += 1
+        state, phase = now.at(end_s), self._phases[self._k]
+        if phase.stance != now.phase.stance:  # seen from the other foot
+            mirror, (x, y) = np.array([1.0, -1.0, 1.0]), state.foot
+            hip = mirror * state.hip + [-x, y + left_y, 0.0]
+            state = State(hip, mirror * state.hip_rate, np.array([-x, y]), -state.foot_rate, *phase.start[4:])
+        self._now = self._make(end_s, 0.0, state)
+        self._guess, self._guess_s = self._now.x, end_s
+
+    def _plan_again(self, seen: SensorValues) -> None:
+        now, t = self._now, seen.step * self._sensor.step_s
+        if t < now.began_s or now.began_s + now.duration_s - t < LAST_S:
+            return
+        name, stance, planned = now.phase.name, now.phase.stance, now.at(t)
+        (x, y, _), (vx, vy, _) = seen.places[stance], seen.velocity
+        side = 1.0 - 2.0 * stance
+        state = planned._replace(
+            hip=np.array([x, side * y + self._body.feet_y[0], planned.hip[2]]),
+            hip_rate=np.array([vx, side * vy, planned.hip_rate[2]]),
+        )
+        trial, planner = self._make(t, now.share_at(t), state), self._planners[name]
+        solver = planner.prepare(trial)
+        if name not in self._used:
+            solver.restart()
+            self._used.add(name)
+        problem, x0 = planner.problem.with_values(**trial.values), self._guess.copy()
+        x0[planner.names.index(TIMES[name])] -= t - self._guess_s
+        started = time.perf_counter()
+        found = solver.solve(
+            trial.values, np.clip(x0, problem.lower, problem.upper), iterations=STEPS, time_limit_s=TIME_LIMIT_S
+        )
+        at = dict(zip(planner.names, found.x.tolist(), strict=True))
+        is_followed = found.feasible and at[OUTSIDE] <= MOST_OUTSIDE_M and at[BEYOND] <= MOST_BEYOND
+        self.plans.append((t, time.perf_counter() - started, found.converged, is_followed))
+        self._guess, self._guess_s = (found.x, t) if is_followed else (trial.x, t)
+        if is_followed:
+            hip, rate = (np.array([at[each] for each in names]) for names in (HIP_PLACES, HIP_RATES))
+            foot = np.array([at.get(each, value) for each, value in zip(FOOT, trial.end.foot, strict=True)])
+            end = trial.end._replace(hip=hip, hip_rate=rate, foot=foot)
+            self._now = trial._replace(x=found.x, end=end, duration_s=at[TIMES[name]])
+
+    def _make(self, t: float, share: float, state: State) -> Pursuit:
+        """Return the rest of the present phase to its planned end, from a state at a time [s]."""
+        phase, left_y = self._phases[self._k], self._body.feet_y[0]
+        name, end, duration = phase.name, phase.end, TIMES[phase.name]
+        factor = self._settings.speed_factor if self._k >= len(self._phases) / 2 else 1.0
+        faster = np.array([factor, 1.0, 1.0])
+        left = (1.0 - share) * phase.duration_s
+        place, rate, foot = faster * end.hip, faster * end.hip_rate, faster[:2] * end.foot
+        values = {f"{duration}.planned": left, **dict(_pair(HIP_PLACES, place, ".planned"))}
+        values |= {**_pair(HIP_RATES, rate, ".planned"), **_pair(("x", "y", "z"), state.hip, "_start_m", "hip_")}
+        values |= _pair(("x", "y", "z"), state.hip_rate, "_start_m_s", "hip_v")
+        angles = self._body.angle_names(name)
+        for numbers, kind in ((state.arms, "start"), (end.arms, "end"), (state.arms_rate, "start_rate")):
+            values |= _pair(angles, numbers, f"_{kind}")
+        values |= _pair(angles, end.arms_rate, "_end_rate")
+        free = self._settings.free.split(",")
+        times = (min(FASTEST_S[name] * (1.0 - share), left), SLOWEST * left) if "time" in free else (left, left)
+        values |= {f"{duration}.lower": times[0], f"{duration}.upper": times[1]}
+        if name == "ssp":
+            values |= {**_pair(FOOT, foot, ".planned"), "swing_share_start": share, "swing_height_m": phase.height}
+            values |= _pair(("x", "y"), state.foot, "_start_m", "foot_")
+            values |= _pair(("x", "y"), state.foot_rate, "_start_m_s", "foot_v")
+            for each, what, value in zip(FOOT, FREE, foot.tolist(), strict=False):
+                if what not in free:
+                    values |= {f"{each}.lower": value, f"{each}.upper": value}
+        else:
+            foot = state.foot
+            values |= _pair(FOOT, foot)
+        values |= self._list_edges([np.array([0.0, left_y])] + [foot] * (name == "dsp"))
+        ends = State(place + [*foot, 0.0], rate, foot, np.zeros(2), end.arms, end.arms_rate)
+        named = {duration: left, **_pair(HIP_PLACES, ends.hip), **_pair(HIP_RATES, rate), **_pair(FOOT, foot)}
+        x = np.array([named.get(each, 0.0) for each in self._planners[name].names])
+        return Pursuit(phase, t, share, left, state, ends, values, x)
+
+    def _list_edges(self, ankles: list[Array]) -> dict[str, float]:
+        """Return the edges of the hull of soles, whose ankles (2,) are given; edges that are left over are far away."""
+        foot = self._body.robot.feet["left"]
+        along, across = ((-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m))
+        corners = [ankle + [x, y] for ankle in ankles for x in along for y in across]
+        hull = find_hull(np.array(corners))
+        assert hull is not None  # soles have an area
+        edges = np.roll(hull, -1, axis=0) - hull
+        normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / np.linalg.norm(edges, axis=1)[:, None]
+        distances = (normals * hull).sum(axis=1) - SAFETY_M
+        values: dict[str, float] = {}
+        for k in range(EDGES):
+            row = (*normals[k], distances[k]) if k < len(hull) else (1.0, 0.0, 1.0)
+            values |= {f"edge_{k}_{what}": float(value) for what, value in zip("xym", row, strict=True)}
+        return values
+
+    def _find_set_points(self, t: float) -> Array:
+        parts = self._planners[self._now.phase.name].evaluate(self._now, t)
+        if self._now.phase.stance:
+            columns, signs = self._body.mirror
+            parts = [signs * part[columns] for part in parts]
+        return self._shift(*parts)
+
+
+def _pair(names: tuple[str, ...], numbers: Array, after: str = "", before: str = "") -> dict[str, float]:
+    return {f"{before}{name}{after}": value for name, value in zip(names, numbers.tolist(), strict=True)}
+
+
+def list_phases(plan: Plan, body: Body) -> list[PlannedPhase]:
+    """Return the phases of a planned walk on the flat; the hip's place at the end is that over the other foot."""
+    t = plan.signals.arrays["t"]
+    moved = np.stack([np.abs(np.diff(plan.signals.arrays[f"{side}_foot"], axis=0)).max(axis=1) for side in SIDES])
+    lifted = np.where(moved.max(axis=0) > STANDING, moved.argmax(axis=0), -1)  # between two samples
+    switches = [0, *(np.flatnonzero(np.diff(lifted)) + 1).tolist(), len(t) - 1]
+    found = []
+    for first, last in zip(switches[:-1], switches[1:], strict=True):
+        swings, feet = int(lifted[first]), [plan.at(f"{side}_foot", t[[first, last]]) for side in SIDES]
+        stance = 1 - swings if swings >= 0 else int(feet[1][0, 0] < feet[0][0, 0])
+        name: PhaseName = "ssp" if swings >= 0 else "dsp"
+        mirror, origin = np.array([1.0, 1.0 - 2.0 * stance, 1.0]), np.array([0.0, body.feet_y[0], 0.0])
+        height = float(plan.signals.arrays[f"{SIDES[swings]}_foot"][first:last, 2].max()) if swings >= 0 else 0.0
+        arms = [body.joints.index(angle) for angle in body.angle_names(name)]
+        columns, signs = body.mirror if stance else (list(range(len(body.joints))), np.ones(len(body.joints)))
+        states = []
+        for i, at in enumerate((t[[first]], t[[last]])):
+            other, hip = (mirror * (place - feet[stance][i]) for place in (feet[1 - stance][i], plan.at("hip", at)[0]))
+            q, qd = ((signs * plan.at(kind, at)[0][columns])[arms] for kind in ("q", "qd"))
+            other, hip = (other + origin)[:2], hip + origin
+            states.append(State(hip, mirror * plan.rate("hip", at)[0], other, np.zeros(2), q, qd))
+        start, end = states
+        end = end._replace(hip=end.hip - [*end.foot, 0.0])
+        found.append(PlannedPhase(name, stance, float(t[last] - t[first]), start, end, height))
+    return found
