@@ -167,6 +167,6 @@ def test_the_commands_take_feedback_and_conditions(plan: Plan, tmp_path: Path) -
 
     assert torques("--feedback", "torso-spring", "--feedback-noise", "0") < torques()
     refused = CliRunner().invoke(app, ["simulate", str(result), "--feedback", "telepathy"])
-    assert refused.exit_code == 1 and "torso-spring" in refused.stderr
+    assert refused.exit_code == 1 and "unknown feedback 'telepathy'" in refused.stderr
     refused = CliRunner().invoke(app, ["simulate", str(result), "--push", "1"])
     assert refused.exit_code == 1 and "--push takes two numbers X,Y, got '1'" in refused.stderr
