@@ -304,7 +304,7 @@ def _print_planning(trace: Simulation) -> None:
 
 def _print_course(walk: Walk, *, open_loop: bool) -> None:
     if walk.walked_m is None or walk.drift_m is None or walk.heading_deg is None:
-        remedy = "; with --feedback torso-spring it may stay up" if open_loop else ""
+        remedy = "; --feedback torso-spring, larger margins or a lower speed may keep it up" if open_loop else ""
         stdout.print(f"{walk.steps_done} of {walk.steps} steps completed before the fall{remedy}")
         return
     stdout.print(
