@@ -40,11 +40,11 @@ def draw_change(problem: GaitProblem, rng: np.random.Generator) -> dict[str, flo
     return {q.name: float(np.clip(moved[q.name], q.minimum, q.maximum)) for q in problem.own_parameters}
 
 
-def measure(name: str, changes: int, starts: int, seed: int) -> None:
+def measure(name: str, changes: int, starts: int, seed: int, *, predict: bool) -> None:
     """Print one problem's times and shares."""
     problem = nlp_gait.load(name)
     solution = nlp_gait.solve(problem, starts=starts, solver=nlp_gait.IpoptSettings(compiled=True), workers=1)
-    plan = nlp_gait.replanner(problem, near=solution)
+    plan = nlp_gait.replanner(problem, near=solution, predict=predict)
     near = min(solution.starts, key=lambda outcome: outcome.rank)
     rng = np.random.default_rng(seed)
     drawn = [draw_change(problem, rng) for _ in range(changes)]
@@ -145,6 +145,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=5, help="of IPOPT for the first optimum")
     parser.add_argument("--cold", type=int, default=0, metavar="N", help="random starts of the comparison with IPOPT")
     parser.add_argument("--c", action="store_true", help="compare the planner in C with Python's")
+    parser.add_argument("--predict", action="store_true", help="start from points predicted by sensitivities")
     parser.add_argument("--seed", type=int, default=1, help="of the changes")
     arguments = parser.parse_args()
     if arguments.c:
@@ -154,7 +155,7 @@ def main() -> None:
         if arguments.cold:
             measure_cold(name, arguments.cold)
         else:
-            measure(name, arguments.changes, arguments.starts, arguments.seed)
+            measure(name, arguments.changes, arguments.starts, arguments.seed, predict=arguments.predict)
 
 
 if __name__ == "__main__":

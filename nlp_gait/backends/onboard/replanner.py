@@ -13,6 +13,8 @@ from threadpoolctl import ThreadpoolController
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
 from nlp_gait.backends.onboard.reduced_qp import LEAST_DAMPING, StepSolver
+from nlp_gait.backends.optima.optimum import find_optimum
+from nlp_gait.backends.optima.sensitivities import parameter_sensitivities
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
@@ -52,7 +54,12 @@ class Replan:
 
 
 def replanner(
-    problem: GaitProblem | str, *, near: Solution | None = None, starts: int | None = None, seed: int = 0
+    problem: GaitProblem | str,
+    *,
+    near: Solution | None = None,
+    starts: int | None = None,
+    seed: int = 0,
+    predict: bool = False,
 ) -> Replanner:
     """Return a solver for one problem with changing parameters; it is built once, and continues from its last optimum.
 
@@ -61,21 +68,23 @@ def replanner(
         near: solution by IPOPT to begin from; None to solve the problem.
         starts: number of start points for that; None for the problem's default.
         seed: of the start points.
+        predict: whether to start from the first optimum moved by its derivatives by the parameters, instead of the last result;
+            saves steps only where the same bounds stay active.
 
     Raises:
-        InputError: DAQP is not installed, ``near`` has no multipliers, or no start converges.
+        InputError: DAQP is not installed, ``near`` has no multipliers, or no start converges; ``predict``, but no derivatives.
     """
     problem = load(problem) if isinstance(problem, str) else problem
     if near is None:
         count = problem.hints.starts if starts is None else starts
         near = solve(problem, starts=count, seed=seed)
-    return Replanner(problem, min(near.starts, key=lambda outcome: outcome.rank))
+    return Replanner(problem, min(near.starts, key=lambda outcome: outcome.rank), predict=predict)
 
 
 class Replanner:
     """Steps of sequential quadratic programming from the last optimum and its multipliers; made by ``replanner``."""
 
-    def __init__(self, problem: GaitProblem, near: Outcome) -> None:
+    def __init__(self, problem: GaitProblem, near: Outcome, *, predict: bool = False) -> None:
         """Use ``replanner`` instead."""
         if near.guess is None or not near.converged:
             raise InputError(
@@ -89,6 +98,7 @@ class Replanner:
         self._scale = self._exact.row_scales[: len(self._functions.model.row_names)]
         self._threads = ThreadpoolController()
         self._near, self._first = near, near
+        self._slopes = parameter_sensitivities(find_optimum(problem, near)) if predict else None
         self.restart()
 
     def restart(self) -> None:
@@ -115,7 +125,7 @@ class Replanner:
 
         Args:
             p: values by name, others as in the replanner's problem; or all of them (k,), in the order of ``problem.parameters``.
-            x0: start point; None for the last result.
+            x0: start point; None for the last result, or the predicted point.
             iterations: limit of steps; IPOPT is not limited by it.
             time_limit_s: limit of wall time, checked after each step; with a limit IPOPT is not used.
             judge: whether the exact functions judge x, which takes about a millisecond.
@@ -126,6 +136,9 @@ class Replanner:
         started = time.perf_counter()
         problem = self._change(p)
         guess = self._guess
+        if x0 is None and self._slopes is not None:
+            slopes = np.where(self._slopes.defined, self._slopes.x, 0.0)
+            x0 = np.clip(self._first.x + slopes @ (problem.p - self.problem.p), problem.lower, problem.upper)
         if x0 is not None:
             primal = self._functions.model.start(problem, problem.check_x(x0), guess.width)
             guess = replace(guess, primal=primal)

@@ -31,6 +31,15 @@ def test_a_corner_follows_its_limit_across_a_change_of_sign() -> None:
         np.testing.assert_allclose(found.x, max(1.0, limit), atol=1e-8)
 
 
+def test_a_predicted_start_is_the_optimum_where_the_same_bounds_stay_active() -> None:
+    """Where limit > 1, the optimum is (limit, limit): one step confirms it."""
+    plan = replanner(toy(corner, limit=1.5), starts=3, predict=True)
+    for limit, most in ((1.9, 1), (1.2, 1), (0.7, 20)):
+        found = plan.solve({"limit": limit})
+        assert found.converged and found.solver == "sqp" and found.iterations <= most
+        np.testing.assert_allclose(found.x, max(1.0, limit), atol=1e-8)
+
+
 def test_a_limit_that_nothing_satisfies_is_named_with_its_amount() -> None:
     """min(x, y) >= 5 with x <= 2: the row misses its bound by at least 3."""
     found = replanner(toy(corner), starts=3).solve({"limit": 5.0})
