@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from nlp_gait.backends.functions.compiled_function import CompiledFunction, compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
     from nlp_gait.backends.onboard.replanner import Replan, Replanner, replanner
+    from nlp_gait.backends.optima.gait_library import GaitLibrary, LibraryGait, load_library
     from nlp_gait.backends.plan_walk import WalkPlan, plan_walk
     from nlp_gait.backends.solve import solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -39,6 +40,9 @@ _LAZY = {
     "WalkPlan": "nlp_gait.backends.plan_walk:WalkPlan",
     "plan_walk": "nlp_gait.backends.plan_walk:plan_walk",
     "solve": "nlp_gait.backends.solve:solve",
+    "GaitLibrary": "nlp_gait.backends.optima.gait_library:GaitLibrary",
+    "LibraryGait": "nlp_gait.backends.optima.gait_library:LibraryGait",
+    "load_library": "nlp_gait.backends.optima.gait_library:load_library",
     "Replan": "nlp_gait.backends.onboard.replanner:Replan",
     "Replanner": "nlp_gait.backends.onboard.replanner:Replanner",
     "replanner": "nlp_gait.backends.onboard.replanner:replanner",
@@ -75,8 +79,10 @@ __all__ = [
     "CompiledFunction",
     "CompiledObjective",
     "GaitError",
+    "GaitLibrary",
     "GaitProblem",
     "IpoptSettings",
+    "LibraryGait",
     "Replan",
     "Replanner",
     "Solution",
@@ -84,6 +90,7 @@ __all__ = [
     "compile_function",
     "compile_objective",
     "load",
+    "load_library",
     "plan_walk",
     "problem_names",
     "replanner",

@@ -84,7 +84,8 @@ def name_in_words(name: str, unit: str) -> str:
 def units_of(problem: GaitProblem) -> dict[str, str]:
     """Return the units of a problem's variables and parameters by name."""
     variables = {variable.name: variable.unit for variable in problem.variables}
-    return variables | {parameter.name: parameter.unit for parameter in problem.parameters}
+    units = variables | {parameter.name: parameter.unit for parameter in problem.parameters}
+    return {name.removesuffix(".lower"): unit for name, unit in units.items()} | units
 
 
 class NaturalStep(NamedTuple):

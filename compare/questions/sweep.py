@@ -58,12 +58,6 @@ def parse_axis(text: str) -> Axis:
     return Axis(name=name, values=tuple(numbers))
 
 
-def place(problem: GaitProblem, at: Mapping[str, float]) -> GaitProblem:
-    """Return the problem at one point of the grid: with these parameter values and fixed variables."""
-    fixed = {name: value for name, value in at.items() if name in problem.names}
-    return problem.with_values(**{name: at[name] for name in at if name not in fixed}).fix(**fixed)
-
-
 @dataclass(frozen=True, kw_only=True)
 class SweepPoint:
     """Result at one point of the grid."""
@@ -166,7 +160,7 @@ class Sweep(Question[list[SweepPoint]]):
     @cached_property
     def _tasks(self) -> list[Task]:
         stop = Stop(evaluations=self.evaluations)
-        problems = [ProblemSpec(name=place(self.problem, at)) for at in self._path]
+        problems = [ProblemSpec(name=self.problem.place(at)) for at in self._path]
         return [Task(problem=problem, solver=self.algorithm, stop=stop, seed=self.seed) for problem in problems]
 
     def report(self, findings: list[SweepPoint]) -> Answer:
@@ -178,7 +172,7 @@ class Sweep(Question[list[SweepPoint]]):
                 *(f"{value:g}" for value in point.at.values()),
                 with_unit(point.objective if point.feasible else None, objective.unit),
                 point.status,
-                _describe_known(place(problem, point.at)),
+                _describe_known(problem.place(point.at)),
             )
             for point in findings
         ]

@@ -188,6 +188,15 @@ class GaitProblem:
             bounds |= {f"{name}.lower": value, f"{name}.upper": value}
         return self.with_values(**bounds)
 
+    def place(self, at: Mapping[str, float]) -> GaitProblem:
+        """Return the same problem at a point of a grid: parameters, variables and other bounded quantities have a value."""
+        fixed = {name: value for name, value in at.items() if name in self.names}
+        values: dict[str, float] = {}
+        for name in at.keys() - fixed:
+            bounds = {f"{name}.lower", f"{name}.upper"}  # of a quantity that follows from the variables
+            values |= dict.fromkeys(bounds if bounds <= self.parameter_values.keys() else {name}, at[name])
+        return self.with_values(**values).fix(**fixed)
+
     def dense(self, factor: int) -> GaitProblem | None:
         """Return the same problem with ``factor`` times as many intervals; None if it cannot be refined."""
         refine = self.refine

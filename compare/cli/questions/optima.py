@@ -192,7 +192,8 @@ def capabilities(*, starts: int = 3, seed: int = 0, problem: AnyCycle, output: O
 @command
 def walk(
     *,
-    over: str | None = None,
+    over: list[str] | None = None,
+    library: bool = False,
     engine: bool = False,
     steps: int | None = None,
     baseline: list[str] | None = None,
@@ -207,21 +208,32 @@ def walk(
     The problem is nao-cycle, or humanoid-cycle, with the power as its objective; each point starts from its neighbours.
     Simulations are open loop unless a feedback is named. Rerun the command to continue after an interruption.
 
+    With `--library` the gaits over one or more axes are written with their derivatives, for `nlp_gait.load_library`, and the
+    gaits between them are judged.
+
     Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
+    `nlp-gait walk --library --over speed_m_s=0.03:0.08:6 --over step_length_m=0.05:0.08:4`,
     `nlp-gait walk --baseline cart-table --baseline least-torque --engine`,
     `nlp-gait walk humanoid-cycle --robot my.urdf --over speed_m_s=0.05 --baseline cart-table`,
     `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
     """
     from compare.questions.sweep import parse_axis
+    from compare.questions.walk.gait_library import LibraryOfGaits
     from compare.questions.walk.walk import CheapestWalk, check_cycle, default_speeds
     from compare.study.simulations import STEPS
 
     check_cycle(problem.name)
     cycle = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name).load()
+    axes = [parse_axis(text) for text in over or [default_speeds(cycle)]]
+    if library:
+        output.answer(LibraryOfGaits(problem=cycle, axes=axes, starts=starts, seed=seed))
+        return
+    if len(axes) > 1:
+        raise InputError("walk has one axis, except with --library; leave out the others")
     output.answer(
         CheapestWalk(
             problem=cycle,
-            axis=parse_axis(over or default_speeds(cycle)),
+            axis=axes[0],
             starts=starts,
             seed=seed,
             steps=(STEPS if engine else 0) if steps is None else steps,

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from compare.questions.question import Work
-from compare.questions.sweep import SweepPoint, place
+from compare.questions.sweep import SweepPoint
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.formulation import GaitProblem, Result
@@ -46,7 +46,7 @@ class Gait:
 
 def make_gait(problem: GaitProblem, point: SweepPoint) -> Gait:
     """Return the gait of a point of the axis."""
-    placed = place(problem, point.at)
+    placed = problem.place(point.at)
     x = placed.check_x(point.x)
     indexes = build_exact_model(placed).at(x, placed.p).indexes
     return Gait(point=point, result=Result(problem=placed, x=x), indexes=indexes)
