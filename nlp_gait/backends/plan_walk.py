@@ -277,7 +277,10 @@ def describe_violation(row: ConstraintValue, steps: int) -> str:
         prefix = next(begin for begin in begins if row.name.startswith(begin))
         where = begins[prefix].format(steps=steps, inner=f"steps 2 to {steps - 1}" if steps > 3 else "step 2")
     stem, _, label = row.name.removeprefix(prefix).partition("[")
-    words, remedy = next(found for begin, found in SENTENCES["constraints"].items() if stem.startswith(begin))
+    begin = next(begin for begin in SENTENCES["constraints"] if stem.startswith(begin))
+    words, remedy = SENTENCES["constraints"][begin]
+    if prefix.startswith("stand_"):
+        remedy = SENTENCES["standing"].get(begin, remedy)
     owner = label.rstrip("]").split(",")[0].strip()
     what = f"{stem} {words}" if not owner or owner.isdigit() else f"{owner} {words}"
     return f"{where}: {what} by {row.violation:.3g} {row.unit} ({row.name}); {remedy}"

@@ -223,6 +223,10 @@ def test_a_violation_names_its_step() -> None:
     assert describe_violation(value, 5).startswith("step 3, single support: RKneePitch exceeds its limit by 0.1 rad")
     value = replace(value, name="step3_speed", unit="m/s")
     assert describe_violation(value, 5).startswith("step 3: speed of the inner steps is not reached by 0.1 m/s")
+    told = describe_violation(replace(value, name="stand_effort[LAnkleRoll, 0]", unit="Nm"), 5)
+    assert (
+        told.startswith("standing: LAnkleRoll torque exceeds its limit by 0.1 Nm") and "raise the joint's limit" in told
+    )
 
 
 def test_every_inner_step_has_its_speed() -> None:
