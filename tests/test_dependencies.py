@@ -108,6 +108,7 @@ def layer(name: str) -> int | None:
 
 
 ALL = [m for package in PACKAGES for m in modules(package)]
+LAYERED = set(ALL) - set(ENTRIES)
 
 
 def wrong_imports(module: str) -> Iterator[str]:
@@ -116,7 +117,7 @@ def wrong_imports(module: str) -> Iterator[str]:
         if module not in ENTRIES:
             yield "is in no layer"
         return
-    named = (name for name in named_modules(module) if {name, name.rpartition(".")[0]} & set(ALL) - set(ENTRIES))
+    named = (name for name in named_modules(module) if {name, name.rpartition(".")[0]} & LAYERED)
     for name in (*imports(module), *named):
         if within(name, *PACKAGES):
             imported = layer(name)

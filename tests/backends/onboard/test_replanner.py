@@ -59,6 +59,7 @@ def test_every_change_of_the_parameters_leads_to_ipopts_optimum(nao: Replanner) 
         assert found.objective == pytest.approx(sharp.objective, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_disturbed_robot_plans_from_the_state_where_it_is() -> None:
     plan = replanner(nlp_gait.load("nao-dsp", trajectory="measured", intervals=4), starts=1)
     state = {"hip_x_start_m": 0.002, "hip_y_start_m": -0.003, "hip_z_start_m": -0.002, "hip_vx_start_m_s": 0.01}

@@ -44,6 +44,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> StudySettings:
     )
 
 
+@pytest.mark.slow
 def test_a_tuned_search_is_better_and_the_same_again(
     settings: StudySettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

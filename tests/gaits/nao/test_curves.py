@@ -120,17 +120,6 @@ def test_what_only_a_spline_can_break_is_a_limit(curve: str, value: float, row: 
 
 
 @pytest.mark.slow
-def test_a_quintic_needs_less_than_a_cubic_from_its_optimum() -> None:
-    cubic, quintic = (
-        load("nao-dsp", trajectory=order, intervals=5, samples_per_interval=2) for order in ("cubic", "quintic")
-    )
-    first = solve(cubic, starts=1, seed=1, solver=SOLVER)
-    second = solve(quintic, starts=1, solver=SOLVER, x0=np.array([*first.x.values(), *np.zeros(14)]))
-    assert first.converged and second.converged
-    assert second.objective < 0.9 * first.objective
-
-
-@pytest.mark.slow
 def test_least_jerk_has_less_jerk_and_more_power_than_least_power() -> None:
     power, jerk = (load("nao-dsp", objective=name, intervals=5) for name in ("power", "jerk"))
     assert (jerk.objective.name, jerk.objective.unit) == ("joint_jerk", "rad^2/s^6")
