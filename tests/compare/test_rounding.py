@@ -43,6 +43,7 @@ def test_random_points_of_the_box_agree(printed: str) -> None:
         assert any(feasible) and not all(feasible)
 
 
+@pytest.mark.slow
 def test_digits_make_the_box_within_the_bounds() -> None:
     found = evaluate_rounded(WALK, ["0.130", " 1.13e-1", "0.0010", "1e-2"])
     box = np.array(list(found.box.values()))

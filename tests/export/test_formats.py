@@ -61,6 +61,7 @@ def test_every_time_history_of_every_problem_has_its_unit(name):
         assert expected.keys() <= units.keys()
 
 
+@pytest.mark.slow
 def test_json_can_be_simulated_again(result, tmp_path):
     path = tmp_path / "gait.json"
     write_as("json", path, result, 200)

@@ -79,6 +79,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Replanner, 
     yield plan, InC(problem, solution.starts[0], tmp_path_factory.mktemp("planner"))
 
 
+@pytest.mark.slow
 def test_c_finds_the_optima_of_python(both: tuple[Replanner, InC]) -> None:
     """A second solve at the same parameters removes what the tolerance of the first left."""
     plan, in_c = both
@@ -95,6 +96,7 @@ def test_c_finds_the_optima_of_python(both: tuple[Replanner, InC]) -> None:
         np.testing.assert_allclose(in_c.x, expected.x, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_every_bound_is_a_function_of_the_parameters(both: tuple[Replanner, InC]) -> None:
     plan, in_c = both
     model, problem = build_nlp(plan.problem), plan.problem
@@ -112,6 +114,7 @@ def test_every_bound_is_a_function_of_the_parameters(both: tuple[Replanner, InC]
     assert in_c.solve(wrong)[0] == "wrong parameters"
 
 
+@pytest.mark.slow
 def test_the_motion_at_a_time_is_that_of_the_signals(both: tuple[Replanner, InC]) -> None:
     plan, in_c = both
     signals = plan.problem.signals(in_c.x)
@@ -125,6 +128,7 @@ def test_the_motion_at_a_time_is_that_of_the_signals(both: tuple[Replanner, InC]
     np.testing.assert_allclose(q, signals["q"][-1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_example_plans_recorded_values_of_a_users_problem(tmp_path: Path) -> None:
     """|x - 1| + 2 |y - 1| with min(x, y) >= limit is 0 at (1, 1) up to limit 1, then 3 (limit - 1); x <= 2."""
     problem = toy(corner, limit=0.5)

@@ -173,6 +173,7 @@ def test_footholds_are_read_from_a_file(tmp_path: Path) -> None:
         read_footholds(path)
 
 
+@pytest.mark.slow
 def test_the_sharpest_turn_names_its_limit(body: Humanoid) -> None:
     sharpest = find_sharpest_turn(body, 0.04)
     assert "passes over the standing one" in sharpest.stopped_by and 10.0 < sharpest.turn_deg < 90.0
@@ -236,6 +237,7 @@ def test_a_violation_names_its_step() -> None:
     )
 
 
+@pytest.mark.slow
 def test_every_inner_step_has_its_speed() -> None:
     """What both feet advance on average, by the time between lift-offs; NAO's feet stay parallel."""
     straight = list_arc(0.0, STEPS, LENGTH_M, make_nao("nao-v5").feet_y)

@@ -45,6 +45,7 @@ def step() -> Plan:
     return make_plan(Result(problem=problem, x=problem.check_x(CHEAPEST)), 1)
 
 
+@pytest.mark.slow
 def test_without_disturbance_the_plan_is_that_of_the_walk(step: Plan) -> None:
     found = simulate_plan(step, None, Drive(feedback=QUIET))
     assert found.fell_at_s is None and found.plans is not None
@@ -56,6 +57,7 @@ def test_without_disturbance_the_plan_is_that_of_the_walk(step: Plan) -> None:
     assert np.abs(found.set_points[during] - step.at("q", found.t[during])).max() < 0.2
 
 
+@pytest.mark.slow
 def test_a_push_moves_the_next_foothold_only_if_that_is_free(step: Plan) -> None:
     def land(free: str) -> float:
         pushed = Conditions(push=Push(impulse_Ns=(0.8, 0.0), start_s=0.05))

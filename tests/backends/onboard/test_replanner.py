@@ -71,6 +71,7 @@ def test_a_disturbed_robot_plans_from_the_state_where_it_is() -> None:
     assert set(values).isdisjoint(plan.problem.names)
 
 
+@pytest.mark.slow
 def test_parameters_in_order_and_a_start_give_the_same_result(nao: Replanner) -> None:
     by_name = nao.solve({"dbm_y_mean_limit_m": nao.problem.value("dbm_y_mean_limit_m")})
     in_order = nao.solve(nao.problem.p.tolist(), x0=dict(zip(nao.problem.names, by_name.x, strict=True)))
@@ -78,6 +79,7 @@ def test_parameters_in_order_and_a_start_give_the_same_result(nao: Replanner) ->
     assert in_order.iterations <= by_name.iterations
 
 
+@pytest.mark.slow
 def test_a_limit_of_time_or_steps_returns_the_best_feasible_point(nao: Replanner) -> None:
     optimum = nao.solve()
     far = nao.solve(x0=(nao.problem.lower + nao.problem.upper) / 2, time_limit_s=1e-9)
@@ -87,6 +89,7 @@ def test_a_limit_of_time_or_steps_returns_the_best_feasible_point(nao: Replanner
     assert again.feasible and again.objective == pytest.approx(optimum.objective, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_not_allowed_is_named(nao: Replanner) -> None:
     with pytest.raises(UnknownNameError, match="no_such"):
         nao.solve({"no_such": 1.0})

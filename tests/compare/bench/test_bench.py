@@ -102,6 +102,7 @@ def test_no_shipped_run_is_better_than_the_best_known() -> None:
         assert best >= instance.best_known - 1e-5 * abs(instance.best_known), id
 
 
+@pytest.mark.slow
 def test_places_follow_from_expected_running_times() -> None:
     """A solver that has the best one's runs at half of the cost takes the first place; its twin shares all ranks."""
     ids = ("walk12-w015", "ssp-v5")

@@ -68,6 +68,7 @@ def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp
     assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
 
 
+@pytest.mark.slow
 def test_parquet_has_the_same_runs(records: list[RunRecord], tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
     (path,) = FurtherFiles(parquet=True).write(tmp_path, compare_problems(records))

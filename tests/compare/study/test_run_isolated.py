@@ -57,6 +57,7 @@ def test_without_a_time_limit_it_is_waited_for(task: Task) -> None:
     assert status(endless, lambda: time.sleep(0.3) or "late") == "late"
 
 
+@pytest.mark.slow
 def test_after_its_time_limit_it_is_killed(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
     impatient = replace(task, stop=IMPATIENT)
     monkeypatch.setattr(module, "GRACE_S", 0.1)

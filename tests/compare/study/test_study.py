@@ -285,6 +285,7 @@ def test_leftovers_of_a_killed_process_go(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {new.name, record.name, *others}
 
 
+@pytest.mark.slow
 def test_an_interrupt_that_a_solver_swallows_ends_the_study_without_a_record(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

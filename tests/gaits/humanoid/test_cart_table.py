@@ -73,6 +73,7 @@ def oracles(walk: Result, signals: Signals, samples: Array) -> list[Standing]:
     return found
 
 
+@pytest.mark.slow
 def test_torques_and_zmp_are_pinocchios(walk: Result, signals: Signals) -> None:
     """On one foot all of it; on both feet the ZMP, which both halves of the robot together must have."""
     samples = np.arange(0, len(signals.arrays["t"]), 5)
@@ -87,6 +88,7 @@ def test_torques_and_zmp_are_pinocchios(walk: Result, signals: Signals) -> None:
             assert error < TORQUE_TOLERANCE
 
 
+@pytest.mark.slow
 def test_the_whole_bodys_zmp_is_the_planned_one(walk: Result, signals: Signals) -> None:
     """Under the middle of the left sole, then straight to that of the right one."""
     robot = walk.problem.display.simulation_model.robot  # type: ignore[union-attr]

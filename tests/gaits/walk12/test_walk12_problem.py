@@ -168,6 +168,7 @@ def test_stability_condition_at_the_papers_most_stable_gait() -> None:
 
 
 @given(x=st.lists(st.floats(-1e3, 1e3), min_size=4, max_size=4))
+@pytest.mark.slow
 def test_every_point_has_finite_values(x: list[float]) -> None:
     f, violation, _ = values(DEFAULT, x)
     assert math.isfinite(f)
