@@ -50,7 +50,7 @@ class GaitView {
     this.charts = { power: "mechanical power [W]", margin: "balance margin [mm]" };
     for (const [key, y] of Object.entries(this.charts))
       this.charts[key] = this.gaits.some((gait) => gait[key]) ? new Chart(curves, { label: y, x: "time [s]", y, height: 200 }) : null;
-    new IntersectionObserver(([entry]) => { this.visible = entry.isIntersecting; }).observe(this.canvas);
+    new IntersectionObserver((entries) => { this.visible = entries.at(-1).isIntersecting; }).observe(this.canvas); // the last is the latest
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.select();
     requestAnimationFrame((now) => this.tick(now));
