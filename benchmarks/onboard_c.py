@@ -8,8 +8,6 @@ start state.
 
 from __future__ import annotations
 
-import ctypes
-import os
 import subprocess
 import tempfile
 import time
@@ -20,7 +18,6 @@ import numpy as np
 
 import nlp_gait
 from nlp_gait.backends.kernel.compiler import lane_flags
-from nlp_gait.export.solver import export_solver
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.result import Result
 from nlp_gait.formulation.solution import Outcome, Solution
@@ -28,6 +25,7 @@ from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan
+from tests.export.exported_planner import ExportedPlanner
 
 PROBLEMS = ("nao-ssp", "nao-dsp", "humanoid-ssp", "humanoid-dsp", "nao-cycle", "stairs-plan", "walk12")
 RECORDED = ("nao-ssp", "humanoid-ssp")
@@ -41,45 +39,10 @@ HEADER = (
 )
 
 
-class Report(ctypes.Structure):
-    """Result of ``solve``, as in the header."""
-
-    _fields_ = (
-        ("steps", ctypes.c_int),
-        ("cost", ctypes.c_double),
-        ("violation", ctypes.c_double),
-        ("worst_row", ctypes.c_int),
-        ("worst", ctypes.c_double),
-    )
-
-
-class Planner:
-    """An exported planner, continuing from its last result."""
-
-    def __init__(self, folder: Path, name: str, near: Outcome) -> None:
-        prefix = f"{name.replace('-', '_')}_nlp_"
-        library = ctypes.CDLL(str(folder / f"lib{prefix}planner.so"))
-        count = library[f"{prefix}planner_bytes"]
-        count.restype = ctypes.c_longlong
-        self.bytes, self._solve = int(count()), library[f"{prefix}solve"]
-        self._memory = ctypes.create_string_buffer(self.bytes)
-        library[f"{prefix}planner_prepare"](self._memory)
-        assert near.guess is not None
-        self.x, self.multipliers = near.x.copy(), near.guess.rows.copy()
-
-    def solve(self, p: Array) -> tuple[bool, Report]:
-        """Return whether it converged, and the report."""
-        report = Report()
-        numbers = [array.ctypes.data_as(ctypes.c_void_p) for array in (p, self.x, self.multipliers)]
-        return self._solve(self._memory, *numbers, 20, ctypes.byref(report)) == 0, report
-
-
-def build(problem: GaitProblem, near: Outcome, folder: Path, lanes: int) -> None:
+def build(problem: GaitProblem, near: Outcome, folder: Path, lanes: int) -> ExportedPlanner:
     """Export and build a planner."""
-    export_solver(problem, folder, near=near)
     flags = " ".join(lane_flags(lanes))
-    words = {"CFLAGS": flags, "CXXFLAGS": f"{flags} -DLANES={lanes}"}
-    subprocess.run(["sh", str(folder / "build.sh")], check=True, env=os.environ | words)
+    return ExportedPlanner(problem, near, folder, {"CFLAGS": flags, "CXXFLAGS": f"{flags} -DLANES={lanes}"})
 
 
 def compare(problem: GaitProblem, solution: Solution, changes: Sequence[Mapping[str, float]]) -> None:
@@ -87,9 +50,7 @@ def compare(problem: GaitProblem, solution: Solution, changes: Sequence[Mapping[
     plan = nlp_gait.replanner(problem, near=solution)
     near = min(solution.starts, key=lambda outcome: outcome.rank)
     with tempfile.TemporaryDirectory() as fast, tempfile.TemporaryDirectory() as plain:
-        build(problem, near, Path(fast), LANES)
-        build(problem, near, Path(plain), 1)
-        in_c = [Planner(Path(folder), problem.name, near) for folder in (fast, plain)]
+        in_c = [build(problem, near, Path(folder), lanes) for folder, lanes in ((fast, LANES), (plain, 1))]
         points = [problem.with_values(**change).p for change in changes]
         plan.solve(changes[0])
         for planner in in_c:
@@ -105,12 +66,12 @@ def compare(problem: GaitProblem, solution: Solution, changes: Sequence[Mapping[
                 for planner in in_c:
                     reports.append(planner.solve(p))
                     began.append(time.thread_time())
-                cost, (is_converged, report) = problem.objective.sign * found.objective, reports[0]
+                cost, (status, report) = problem.objective.sign * found.objective, reports[0]
                 apart[repeat, k] = abs(report.cost - cost) / abs(cost)
                 if repeat == 0:
                     used[:, k] = np.diff(began)
                     steps.append(report.steps)
-                    converged += is_converged
+                    converged += status == "optimal"
     times = [f"{1e3 * np.median(each):.2f} / {1e3 * np.percentile(each, 99):.2f} ms" for each in used]
     equal = [(int(np.sum(each <= SAME)), int(np.sum(each <= NEAR))) for each in apart]
     print(

@@ -3,7 +3,7 @@
     python -m benchmarks.faults.attacks [--seed 100] [--only CLASS]
 
 The inputs are drawn by the seed, differently from those of the tests. An attack succeeds if it changes a file that must stay,
-runs code that was not named, writes what cannot be read, gives a wrong verdict, takes more than 60 s or 4 GiB, or ends in
+runs code that was not named, writes what cannot be read, gives a wrong verdict, takes more than 60 s or 2 GiB, or ends in
 anything but an answer or one sentence. The exit status is the number of classes with a success.
 """
 
@@ -55,7 +55,7 @@ from tests.robots.custom import humanoid
 ROOT = Path(__file__).parents[2]
 PROGRAM = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from compare.__main__ import main; main()"
 COMPARE = "compare walk12 --algorithms random --starts 0 --evaluations 60 --out"
-TIME_LIMIT_S, MEMORY_KIB = 60.0, 4 * 2**20
+TIME_LIMIT_S, MEMORY_KIB = 60.0, 2 * 2**20
 STARTING_S = 10.0  # of the program, on a busy machine
 
 Attack = Iterator[str | None]  # for each input None, or what succeeded
@@ -298,7 +298,7 @@ def attack_seeds(draw: random.Random, folder: Path) -> Attack:
 
 
 def attack_robots(draw: random.Random, folder: Path) -> Attack:
-    """Read hostile robot files: within 60 s and 4 GiB, accepted or one sentence."""
+    """Read hostile robot files: within 60 s and 2 GiB, accepted or one sentence."""
     worst = [0.0, 0.0]
     for file in write_hostile_robots(folder, draw.randrange(10**6)):
         began = time.monotonic()

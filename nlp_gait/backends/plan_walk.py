@@ -100,7 +100,7 @@ def plan_walk(
         steps: swings of a foot, both half steps included; None for 10, or for as many as the distance takes.
         speed_m_s: of the inner steps; None for the cheapest.
         speeds_m_s: of the inner steps one by one, between which it changes evenly if there are more steps; all have the same
-            length, two thirds of the robot's usual one without a distance.
+            length, without a distance the robot's usual one.
         distance_m: that the feet advance; None for the cheapest steps.
         slope_deg: by which the ground rises forward; the distance is along it.
         stairs: ``RISExRUN:N``, a flight of N treads of these sizes [m]; every step climbs one, and the walk ends on the last.
@@ -128,7 +128,9 @@ def plan_walk(
         steps, more = treads + 1, {"stair_rise_m": rise, "stair_run_m": run}
     if turn_deg or footholds is not None or len(speeds_m_s):
         if (speed_m_s, stairs, slope_deg) != (None, "", 0.0):
-            raise InputError("a walk whose steps differ is on a level floor; leave out speed_m_s, slope and stairs")
+            raise InputError(
+                "a walk whose steps differ has no single speed and is on a level floor; leave out speed_m_s, slope and stairs"
+            )
         if footholds is not None and (turn_deg, steps, distance_m) != (0.0, None, None):
             raise InputError("footholds determine steps, distance and turn; leave out steps, distance and turn")
         if steps is None and len(speeds_m_s):

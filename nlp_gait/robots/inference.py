@@ -100,14 +100,14 @@ def find_legs(robot: str, links: Records, joints: Records, feet: Mapping[str, Ma
     )
     if not found:
         _, fault, pair = min(others_m, default=(0.0, "", ("", "")))
-        lowest_pair = (
+        hint = (
             f"the lowest pair, {pair[0]!r} and {pair[1]!r}, {fault}; if other links are the feet, "
             if fault
             else "no links are mirror images; if z is not up in the root's axes, join a turned link to it, else "
         )
         raise RobotDataError(
             f"robot {robot!r}: no feet found: two links, mirror images of each other (z is up), with {LEG_JOINT_COUNT} turning "
-            f"joints each below the link where both legs meet; {lowest_pair}{remedy}"
+            f"joints each below the link where both legs meet; {hint}{remedy}"
         )
     found.sort(key=lambda item: (item[0], item[1].feet))
     lowest, *others = [legs for height, legs in found if height < found[0][0] + CLEARLY_LOWER_M]

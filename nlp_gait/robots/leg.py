@@ -132,7 +132,9 @@ class Leg:
 def find_bend(low: float, high: float) -> float:
     """Return the sign of a knee's clearly larger range on both sides of its straight angle, 0 if they are alike."""
     larger, smaller = max(high, -low), min(high, -low)
-    return 0.0 if larger < CLEAR_RANGE * smaller else 1.0 if high >= -low else -1.0
+    if larger < CLEAR_RANGE * smaller:
+        return 0.0
+    return 1.0 if high >= -low else -1.0
 
 
 def make_leg(robot: Robot, side: str) -> Leg:

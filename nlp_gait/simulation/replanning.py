@@ -22,11 +22,12 @@ from nlp_gait.backends.onboard.replanner import Replanner, replanner
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint
-from nlp_gait.formulation.display import find_hull
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
+from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
 from nlp_gait.gaits.biped.rest_of_phase import BEYOND, EDGES, FOOT, HIP_PLACES, HIP_RATES, OUTSIDE, make_rest_of_phase
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
 from nlp_gait.simulation.sensors import Sensing, SensorValues, TorsoSensor
+from nlp_gait.symbolic.trajectories import cubic
 
 FREE = ("length", "width", "time")
 LAST_S = 0.04  # a phase with less left is not planned again: its state at the end is fixed by then
@@ -91,12 +92,10 @@ class Pursuit(NamedTuple):
 
     def at(self, t: float) -> State:
         """Return the state at a time of the walk [s]: cubics, as in the problem."""
-        s, found = min(max((t - self.began_s) / self.duration_s, 0.0), 1.0), []
+        s, found = min(max((t - self.began_s) / self.duration_s, 0.0), 1.0), list[Any]()
         for k in range(0, len(self.start), 2):
-            start, rise = self.start[k], self.end[k] - self.start[k]
-            v0, v1 = self.start[k + 1] * self.duration_s, self.end[k + 1] * self.duration_s
-            c2, c3 = 3 * rise - 2 * v0 - v1, v0 + v1 - 2 * rise
-            found += [start + s * (v0 + s * (c2 + s * c3)), (v0 + s * (2 * c2 + 3 * s * c3)) / self.duration_s]
+            ends: list[Any] = [self.start[k], self.end[k], self.start[k + 1], self.end[k + 1], self.duration_s, s]
+            found += cubic(*ends)[:2]  # of numbers
         return State(*found)
 
 
@@ -250,19 +249,11 @@ class StepPlanner:
 
     def _list_edges(self, ankles: list[Array]) -> dict[str, float]:
         """Return the edges of the hull of soles, whose ankles (2,) are given; edges that are left over are far away."""
-        foot = self._body.robot.feet["left"]
-        along, across = ((-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m))
-        corners = [ankle + [x, y] for ankle in ankles for x in along for y in across]
-        hull = find_hull(np.array(corners))
-        assert hull is not None  # soles have an area
-        edges = np.roll(hull, -1, axis=0) - hull
-        normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / np.linalg.norm(edges, axis=1)[:, None]
-        distances = (normals * hull).sum(axis=1) - SAFETY_M
-        values: dict[str, float] = {}
-        for k in range(EDGES):
-            row = (*normals[k], distances[k]) if k < len(hull) else (1.0, 0.0, 1.0)
-            values |= {f"edge_{k}_{what}": float(value) for what, value in zip("xym", row, strict=True)}
-        return values
+        feet = (self._body.robot.feet[side] for side in SIDES)
+        soles = [Foothold(x, y, 0.0).outline(foot) for (x, y), foot in zip(ankles, feet, strict=False)]
+        sides = find_support_sides(soles) - [0.0, 0.0, SAFETY_M]
+        rows = [*sides.tolist(), *[(1.0, 0.0, 1.0)] * (EDGES - len(sides))]
+        return {f"edge_{k}_{what}": value for k, row in enumerate(rows) for what, value in zip("xym", row, strict=True)}
 
     def _find_set_points(self, t: float) -> Array:
         parts = self._planners[self._now.phase.name].evaluate(self._now, t)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -17,70 +15,32 @@ from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.onboard.replanner import Replanner, replanner
 from nlp_gait.errors import InputError
 from nlp_gait.export.solver import export_solver
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome
 from tests.backends.toys import corner, toy
 from tests.compare.cli.calls import one_sentence
+from tests.export.exported_planner import ExportedPlanner
 
 pytest.importorskip("daqp")
 pytestmark = pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
-STATUS = ("optimal", "feasible", "violated", "wrong parameters")
 
 
-class Report(ctypes.Structure):
-    _fields_ = (
-        ("steps", ctypes.c_int),
-        ("cost", ctypes.c_double),
-        ("violation", ctypes.c_double),
-        ("worst_row", ctypes.c_int),
-        ("worst", ctypes.c_double),
-    )
-
-
-class InC:
-    """Calls of the exported library."""
-
-    def __init__(self, problem: GaitProblem, near: Outcome, folder: Path) -> None:
-        export_solver(problem, folder, near=near)
-        flags = {"CFLAGS": "-O0 -Wall -Wextra -Wno-unused-parameter -Werror", "CXXFLAGS": "-O0"}
-        subprocess.run(["sh", str(folder / "build.sh")], check=True, env=os.environ | flags, timeout=300)
-        assert near.guess is not None
-        self.folder, self._prefix = folder, f"{problem.name.replace('-', '_')}_nlp_"
-        self._library = ctypes.CDLL(str(folder / f"lib{self._prefix}planner.so"))
-        count = self._find("planner_bytes")
-        count.restype = ctypes.c_longlong
-        self._memory = ctypes.create_string_buffer(count())
-        self.call("planner_prepare")
-        self.x, self.multipliers = near.x.copy(), near.guess.rows.copy()
-
-    def _find(self, name: str) -> ctypes._NamedFuncPointer:
-        return self._library[self._prefix + name]
-
-    def call(self, name: str, *arguments: Array | float) -> int:
-        """Call a function with the memory, pointers of arrays, and numbers."""
-        words = [
-            ctypes.c_double(each) if isinstance(each, float) else each.ctypes.data_as(ctypes.c_void_p)
-            for each in arguments
-        ]
-        return int(self._find(name)(self._memory, *words))
-
-    def solve(self, p: Array, steps: int = 20) -> tuple[str, Report]:
-        report = Report()
-        numbers = (array.ctypes.data_as(ctypes.c_void_p) for array in (p, self.x, self.multipliers))
-        found = self._find("solve")(self._memory, *numbers, steps, ctypes.byref(report))
-        return STATUS[found], report
+def make_in_c(problem: GaitProblem, near: Outcome, folder: Path) -> ExportedPlanner:
+    """Export and build a planner, without optimisation and with all warnings."""
+    flags = {"CFLAGS": "-O0 -Wall -Wextra -Wno-unused-parameter -Werror", "CXXFLAGS": "-O0"}
+    return ExportedPlanner(problem, near, folder, flags)
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Replanner, InC]]:
+def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Replanner, ExportedPlanner]]:
     problem = nlp_gait.load("nao-dsp", trajectory="measured", intervals=4)
     solution = nlp_gait.solve(problem, starts=1)
     plan = replanner(problem, near=solution)
-    yield plan, InC(problem, solution.starts[0], tmp_path_factory.mktemp("planner"))
+    yield plan, make_in_c(problem, solution.starts[0], tmp_path_factory.mktemp("planner"))
 
 
 @pytest.mark.slow
-def test_c_finds_the_optima_of_python(both: tuple[Replanner, InC]) -> None:
+def test_c_finds_the_optima_of_python(both: tuple[Replanner, ExportedPlanner]) -> None:
     """A second solve at the same parameters removes what the tolerance of the first left."""
     plan, in_c = both
     problem = plan.problem
@@ -97,7 +57,7 @@ def test_c_finds_the_optima_of_python(both: tuple[Replanner, InC]) -> None:
 
 
 @pytest.mark.slow
-def test_every_bound_is_a_function_of_the_parameters(both: tuple[Replanner, InC]) -> None:
+def test_every_bound_is_a_function_of_the_parameters(both: tuple[Replanner, ExportedPlanner]) -> None:
     plan, in_c = both
     model, problem = build_nlp(plan.problem), plan.problem
     moved = problem.with_values(**{q.name: q.default * 1.01 for q in problem.own_parameters if q.default > 0.0})
@@ -115,7 +75,7 @@ def test_every_bound_is_a_function_of_the_parameters(both: tuple[Replanner, InC]
 
 
 @pytest.mark.slow
-def test_the_motion_at_a_time_is_that_of_the_signals(both: tuple[Replanner, InC]) -> None:
+def test_the_motion_at_a_time_is_that_of_the_signals(both: tuple[Replanner, ExportedPlanner]) -> None:
     plan, in_c = both
     signals = plan.problem.signals(in_c.x)
     count = len(signals.joints)
@@ -133,7 +93,7 @@ def test_the_example_plans_recorded_values_of_a_users_problem(tmp_path: Path) ->
     """|x - 1| + 2 |y - 1| with min(x, y) >= limit is 0 at (1, 1) up to limit 1, then 3 (limit - 1); x <= 2."""
     problem = toy(corner, limit=0.5)
     solution = nlp_gait.solve(problem, starts=3)
-    in_c = InC(problem, min(solution.starts, key=lambda outcome: outcome.rank), tmp_path)
+    in_c = make_in_c(problem, min(solution.starts, key=lambda outcome: outcome.rank), tmp_path)
     limits = (1.5, 1.2, 0.7, 1.05, 5.0)
     (tmp_path / "states.csv").write_text("limit\n" + "".join(f"{limit}\n" for limit in limits), encoding="utf-8")
     run = [str(tmp_path / "plan"), str(tmp_path / "states.csv"), "0"]

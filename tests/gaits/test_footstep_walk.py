@@ -211,8 +211,14 @@ def test_footholds_that_cannot_be_walked_are_refused(footholds: str, words: str)
     ("options", "words"),
     [
         ({"turn_deg": 90.0}, "robot 'nao-v5' does not turn: NAO has one motor for both hip yaw-pitch joints"),
-        ({"turn_deg": 90.0, "speed_m_s": 0.05}, "whose steps differ is on a level floor; leave out speed_m_s"),
-        ({"turn_deg": 90.0, "slope_deg": 2.0}, "whose steps differ is on a level floor; leave out speed_m_s"),
+        (
+            {"turn_deg": 90.0, "speed_m_s": 0.05},
+            "whose steps differ has no single speed and is on a level floor; leave out speed_m_s",
+        ),
+        (
+            {"turn_deg": 90.0, "slope_deg": 2.0},
+            "whose steps differ has no single speed and is on a level floor; leave out speed_m_s",
+        ),
         ({"speeds_m_s": [0.05, -1.0]}, r"speeds_m_s must be finite numbers > 0, got \[0.05, -1.0\]"),
         (
             {"speeds_m_s": [0.05] * 5, "steps": 6},

@@ -226,6 +226,10 @@ def walk(
     cycle = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name).load()
     axes = [parse_axis(text) for text in over or [default_speeds(cycle)]]
     if library:
+        if engine or steps or baseline:
+            raise InputError(
+                "--library simulates nothing and compares no planners; leave out --engine, --steps and --baseline"
+            )
         output.answer(LibraryOfGaits(problem=cycle, axes=axes, starts=starts, seed=seed))
         return
     if len(axes) > 1:

@@ -15,7 +15,7 @@ from compare.questions.question import Answer, Question, Work, make_table
 from compare.questions.sweep import Axis, Sweep, SweepPoint
 from compare.study.task import describe_problem
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.backends.optima.gait_library import GaitLibrary, LibraryPoint, make_library
+from nlp_gait.backends.optima.gait_library import LibraryGait, LibraryPoint, make_library
 from nlp_gait.backends.optima.sensitivities import SensitivityTable, tabulate_sensitivities
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
@@ -50,9 +50,21 @@ class LibraryOfGaits(Question[FoundLibrary]):
     starts: int = 5  #: random starts of IPOPT at both ends of the path through the grid
     seed: int = 0  #: of these starts
 
+    def __post_init__(self) -> None:
+        """Validate the grid before the work; raises InputError for values that do not increase, and as ``Sweep``."""
+        make_library(self.problem, self._values, [])
+        self._make_sweep()
+
+    @property
+    def _values(self) -> dict[str, tuple[float, ...]]:
+        return {axis.name: axis.values for axis in self.axes}
+
+    def _make_sweep(self) -> Sweep:
+        return Sweep(problem=self.problem, axes=self.axes, starts=self.starts, seed=self.seed)
+
     @property
     def inputs(self) -> dict[str, Any]:
-        return {**super().inputs, "axes": {axis.name: list(axis.values) for axis in self.axes}}
+        return {**super().inputs, "axes": {name: list(values) for name, values in self._values.items()}}
 
     @property
     def total(self) -> int:
@@ -60,31 +72,29 @@ class LibraryOfGaits(Question[FoundLibrary]):
         return 3 * points + cells
 
     def find(self, work: Work) -> Iterator[FoundLibrary]:
-        sweep = Sweep(problem=self.problem, axes=self.axes, starts=self.starts, seed=self.seed)
-        *_, grid = sweep.find(work)
+        *_, grid = self._make_sweep().find(work)
         found = FoundLibrary([], [])
         for point in grid:
             placed = self.problem.place(point.at)
-            inputs = {**fingerprint(placed), "x": list(point.x.values()), "axes": [axis.name for axis in self.axes]}
+            inputs = {**fingerprint(placed), "x": list(point.x.values()), "axes": list(self._values)}
             differentiate = partial(_differentiate, self.problem, point, inputs["axes"])
             found.points.append(work.compute(LibraryPoint, "slopes-{key}", inputs, differentiate))
             work.progress("")
             yield found
-        library = make_library(self.problem, {axis.name: axis.values for axis in self.axes}, found.points)
+        library = make_library(self.problem, self._values, found.points)
         middles = [[(a + b) / 2 for a, b in itertools.pairwise(values)] for values in library.axes.values()]
         for values in itertools.product(*middles):
             at = dict(zip(library.axes, values, strict=True))
-            inputs = {**fingerprint(self.problem.place(at)), "points": [asdict(point) for point in found.points]}
-            try:
-                found.judged.append(work.compute(JudgedGait, "middle-{key}", inputs, partial(_judge, library, at)))
-            except InputError:  # next to a point without an optimum
-                pass
+            if library.covers(**at):
+                gait = library.interpolate(**at)
+                inputs = {**fingerprint(gait.result.problem), "x": gait.result.x.tolist()}
+                found.judged.append(work.compute(JudgedGait, "middle-{key}", inputs, partial(_judge, gait, at)))
             work.progress("")
             yield found
 
     def report(self, findings: FoundLibrary) -> Answer:
         points, judged = findings
-        unit, axes = self.problem.objective.unit, [axis.name for axis in self.axes]
+        unit, axes = self.problem.objective.unit, list(self._values)
         at: dict[str, Callable[[Any], str]] = {axis: partial(_format_place, axis) for axis in axes}
         optima: dict[str, Callable[[LibraryPoint], str]] = {
             **at,
@@ -116,7 +126,7 @@ class LibraryOfGaits(Question[FoundLibrary]):
             ],
             data={
                 **describe_problem(self.problem),
-                "axes": {axis.name: list(axis.values) for axis in self.axes},
+                "axes": self._values,
                 "points": [asdict(point) for point in points],
                 "judged": [asdict(gait) for gait in judged],
             },
@@ -161,8 +171,7 @@ def _read_slope(table: SensitivityTable, name: str, axis: str) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _judge(library: GaitLibrary, at: dict[str, float]) -> JudgedGait:
-    gait = library.interpolate(**at)
+def _judge(gait: LibraryGait, at: dict[str, float]) -> JudgedGait:
     solution = solve(gait.result.problem, x0=gait.result.x, workers=1)
     worst = gait.violated[0] if gait.violated else None
     return JudgedGait(

@@ -36,7 +36,7 @@ class GaitLibrary:
 
     problem: GaitProblem
     axes: Mapping[str, tuple[float, ...]]  #: increasing values by name, in the order of the grid's axes
-    x: Array  #: (m1, m2, ..., n) optima; NaN where there is none
+    x: Array  #: (m1, m2, ..., n) optima; NaN without one
     slopes: Array  #: (m1, m2, ..., n, k) their change per unit of each axis; 0 where there is no derivative
 
     def interpolate(self, **at: float) -> LibraryGait:
@@ -51,31 +51,38 @@ class GaitLibrary:
         Raises:
             UnknownNameError, InputError: another axis, a value beyond the grid, or a corner without an optimum.
         """
-        for name in at:
-            if name not in self.axes:
-                raise unknown("axis", name, self.axes)
-        if missing := [name for name in self.axes if name not in at]:
-            raise InputError(f"a value of every axis is needed; {', '.join(missing)} is missing")
-        sides = [self._find_cell(name, at[name]) for name in self.axes]
-        x = np.zeros(len(self.problem.names))
-        for corner in itertools.product(*sides):
-            weight = math.prod(share for _, share, _ in corner)
-            if weight:
-                index, way = tuple(i for i, _, _ in corner), np.array([distance for *_, distance in corner])
-                x += weight * (self.x[index] + self.slopes[index] @ way / 2)
+        x = self._average(at)
         if not np.isfinite(x).all():
             values = ", ".join(f"{name} = {value:g}" for name, value in at.items())
             raise InputError(f"the library has no optimum next to {values}; choose other values, or a finer grid")
         problem = self.problem.place(at)
         x = np.clip(x, problem.lower, problem.upper)
         model = build_exact_model(problem)
-        values_at = model.at(x, problem.p)
+        found = model.at(x, problem.p)
         return LibraryGait(
             result=Result(problem=problem, x=x),
-            objective=problem.objective.sign * values_at.cost,
-            feasible=bool(values_at.violation <= FEASIBILITY_TOLERANCE) and math.isfinite(values_at.cost),
-            violated=model.find_violated(values_at),
+            objective=problem.objective.sign * found.cost,
+            feasible=bool(found.violation <= FEASIBILITY_TOLERANCE) and math.isfinite(found.cost),
+            violated=model.find_violated(found),
         )
+
+    def covers(self, **at: float) -> bool:
+        """Return whether there is an optimum at all corners around a value of every axis; raises as ``interpolate``."""
+        return bool(np.isfinite(self._average(at)).all())
+
+    def _average(self, at: Mapping[str, float]) -> Array:
+        """Return x (n,) at a value of every axis; NaN next to a corner without an optimum."""
+        for name in at:
+            if name not in self.axes:
+                raise unknown("axis", name, self.axes)
+        if missing := [name for name in self.axes if name not in at]:
+            raise InputError(f"a value of every axis is needed; {', '.join(missing)} is missing")
+        x = np.zeros(len(self.problem.names))
+        for corner in itertools.product(*(self._find_cell(name, at[name]) for name in self.axes)):
+            weight = math.prod(share for _, share, _ in corner)
+            index, way = tuple(i for i, _, _ in corner), np.array([distance for *_, distance in corner])
+            x += weight * (self.x[index] + self.slopes[index] @ way / 2)
+        return x
 
     def _find_cell(self, name: str, value: float) -> list[tuple[int, float, float]]:
         """Return the neighbours of a value on an axis: number, weight and distance from it to the value."""
@@ -129,8 +136,11 @@ def make_library(
     problem: GaitProblem, axes: Mapping[str, tuple[float, ...]], points: Iterable[LibraryPoint]
 ) -> GaitLibrary:
     """Return the library of optima at all points of a grid; raises InputError for values that are not on its axes."""
-    if not axes or not all(values and all(a < b for a, b in pairwise(values)) for values in axes.values()):
-        raise InputError("each axis of a library must have increasing values")
+    if not axes:
+        raise InputError("a library has at least one axis")
+    for name, values in axes.items():
+        if not values or any(a >= b for a, b in pairwise(values)):
+            raise InputError(f"axis {name} of a library must have increasing values, got {list(values)}")
     x = np.full((*map(len, axes.values()), len(problem.names)), np.nan)
     slopes = np.zeros((*x.shape, len(axes)))
     for point in points:

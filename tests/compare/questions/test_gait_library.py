@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from compare.questions.sweep import Axis
 from compare.questions.walk.gait_library import FoundLibrary, LibraryOfGaits
 from nlp_gait.backends.optima.gait_library import GaitLibrary, make_library
 from nlp_gait.errors import InputError, UnknownNameError
+from tests.compare.cli.calls import one_sentence
 
 LENGTHS = (0.06, 0.09, 0.12)
 
@@ -63,6 +65,20 @@ def test_values_beyond_the_library_are_refused(
     (tmp_path / "other.json").write_text('{"problem": "walk12"}', encoding="utf-8")
     with pytest.raises(InputError, match="`nlp-gait walk --library` writes a valid one"):
         nlp_gait.load_library(tmp_path / "other.json")
+
+
+def test_a_grid_is_checked_before_the_work(question: LibraryOfGaits) -> None:
+    for name, values, error in (
+        ("step_length_m", (0.12, 0.06), "increasing values"),
+        ("step_lenght_m", LENGTHS, "did you mean 'step_length_m"),
+    ):
+        with pytest.raises((InputError, UnknownNameError), match=error):
+            replace(question, axes=[Axis(name=name, values=values)])
+
+
+def test_a_library_takes_no_options_that_it_would_ignore(tmp_path: Path) -> None:
+    message = one_sentence("walk", "--library", "--engine", "--out", tmp_path)
+    assert "leave out --engine, --steps and --baseline" in message
 
 
 def test_quadratic_functions_of_one_axis_are_met(question: LibraryOfGaits) -> None:
