@@ -1,15 +1,17 @@
-"""Feedback by planning again: the rest of each phase, with the place and the time of the next foothold, from the measured state.
+"""Feedback by planning again: the rest of each phase, with the place and the time of the next foothold, as the state demands.
 
-At each measurement the place and velocity of the torso over the standing foot are the start of the rest of the present phase
-(``gaits.biped.rest_of_phase``), which the replanner solves. The drives then follow the new plan. The swinging foot, the height of
-the torso and the arms continue from the last plan. At touch-down and lift-off the next phase begins at the last plan's end.
+At each measurement the replanner solves the rest of the present phase (``gaits.biped.rest_of_phase``). The motion goes on from
+where the drives were told to be, so that they keep their stiffness; the distance from there to the measured divergent component
+of motion, of a pendulum under the torso, decides where and when the foot lands, and when it lifts off. Where the robot leans, the
+swinging foot is turned and raised to the floor as it is under the leaning robot. At touch-down and lift-off the next phase
+begins at the last plan's end.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -24,7 +26,21 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
-from nlp_gait.gaits.biped.rest_of_phase import BEYOND, EDGES, FOOT, HIP_PLACES, HIP_RATES, OUTSIDE, make_rest_of_phase
+from nlp_gait.gaits.biped.rest_of_phase import (
+    BEYOND,
+    EDGES,
+    FOOT,
+    HIP_PLACES,
+    HIP_RATES,
+    MISS,
+    OUTSIDE,
+    RATE,
+    REACH,
+    RISE,
+    make_rest_of_phase,
+)
+from nlp_gait.robots import Joint
+from nlp_gait.simulation.feedback import to_rotation_vector
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
 from nlp_gait.simulation.sensors import Sensing, SensorValues, TorsoSensor
 from nlp_gait.symbolic.trajectories import cubic
@@ -32,8 +48,10 @@ from nlp_gait.symbolic.trajectories import cubic
 FREE = ("length", "width", "time")
 LAST_S = 0.04  # a phase with less left is not planned again: its state at the end is fixed by then
 # Whole phases, where times are free: double support may last longer but not end before the load has passed.
-FASTEST_S: dict[PhaseName, float] = {"ssp": 0.25, "dsp": math.inf}
+FASTEST_S: dict[PhaseName, float] = {"ssp": 0.2, "dsp": math.inf}
 SLOWEST = 1.5  # longest phase, relative to the planned one
+NOTICED = 3.0  # a distance of the DCM that is larger by this factor than its noise is noticed
+UPRIGHT_AGAIN_S = 0.15  # after touch-down, until the foot is placed as under an upright robot
 STEPS, TIME_LIMIT_S = 10, 3600.0  # of each plan; the limit of time only keeps the replanner from using IPOPT
 MOST_OUTSIDE_M, MOST_BEYOND = 0.05, 0.1  # of the ZMP and the joints: a worse plan is not followed
 SAFETY_M = 0.005  # from the soles' edges, within which the ZMP is planned
@@ -120,9 +138,10 @@ class RestPlanner:
             self._replanner = replanner(problem, near=solve(problem, x0=plan.x, workers=1))
         return self._replanner
 
-    def evaluate(self, plan: Pursuit, t: float) -> list[Array]:
-        """Return q [rad], qd [rad/s] and tau [Nm], (J,) each, at a time of the walk [s]."""
-        p = [plan.values.get(name, self.problem.value(name)) for name in self._own]
+    def evaluate(self, plan: Pursuit, t: float, rise: Mapping[str, float]) -> list[Array]:
+        """Return q [rad], qd [rad/s] and tau [Nm], (J,) each, at a time of the walk [s], on a floor that rises."""
+        values = plan.values | rise
+        p = [values.get(name, self.problem.value(name)) for name in self._own]
         return [np.asarray(part).ravel() for part in self._at_time(plan.x, p, t - plan.began_s)]
 
 
@@ -150,12 +169,20 @@ class StepPlanner:
         self._used: set[PhaseName] = set()
         #: of each plan: time, wall time [s], whether it converged and whether it was followed
         self.plans: list[tuple[float, float, bool, bool]] = []
+        self._lean = np.zeros(3)  # of the torso, about the axes of the floor [rad]
+        self._began_s = 0.0  # the present phase
+        self._ankles = [find_ankle_joints(body, side) for side in SIDES]
+        self._height, self._mass_height = float(plan.at("hip", np.zeros(1))[0, 2]), 0.0  # of the torso and of the mass
+        pitch_Nm = min(sum(abs(each.axis[1]) * each.torque_limit_Nm for each in ankle) for ankle in self._ankles)
+        self._reach_m = pitch_Nm / body.weight  # of the ZMP from an ankle under the whole weight
         self._now = self._make(0.0, 0.0, self._phases[0].start)
         self._guess, self._guess_s = self._now.x, 0.0  # where the next plan starts
         self._from = self._to = self._find_set_points(0.0)
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
+        if self._steps == 0:
+            self._mass_height = float(data.subtree_com[0][2])
         t, seen, into = self._steps * self._sensor.step_s, self._sensor.read(data), self._steps % self._tick
         if into == 0:
             self._change_phase(t)
@@ -172,7 +199,7 @@ class StepPlanner:
         end_s = now.began_s + now.duration_s
         if t < end_s or self._k + 1 == len(self._phases):
             return
-        self._k += 1
+        self._k, self._began_s = self._k + 1, end_s
         state, phase = now.at(end_s), self._phases[self._k]
         if phase.stance != now.phase.stance:  # seen from the other foot
             mirror, (x, y) = np.array([1.0, -1.0, 1.0]), state.foot
@@ -183,16 +210,25 @@ class StepPlanner:
 
     def _plan_again(self, seen: SensorValues) -> None:
         now, t = self._now, seen.step * self._sensor.step_s
-        if t < now.began_s or now.began_s + now.duration_s - t < LAST_S:
+        if t < now.began_s:
             return
-        name, stance, planned = now.phase.name, now.phase.stance, now.at(t)
+        if now.phase.name == "ssp":
+            self._lean = to_rotation_vector(seen.attitude) + seen.tilt_error
+        if now.began_s + now.duration_s - t < LAST_S:
+            return
+        name, stance, told = now.phase.name, now.phase.stance, now.at(t)
         (x, y, _), (vx, vy, _) = seen.places[stance], seen.velocity
         side = 1.0 - 2.0 * stance
-        state = planned._replace(
-            hip=np.array([x, side * y + self._body.feet_y[0], planned.hip[2]]),
-            hip_rate=np.array([vx, side * vy, planned.hip_rate[2]]),
+        place, rate = np.array([x, side * y + self._body.feet_y[0]]), np.array([vx, side * vy])
+        growth = math.sqrt(self._body.gravity / self._mass_height)
+        # The robot turns about its ankles, so its mass is displaced by less than its torso.
+        miss = self._mass_height / self._height * (place - told.hip[:2] + (rate - told.hip_rate[:2]) / growth)
+        noise = math.hypot(self._settings.position_noise_m, self._settings.velocity_noise_m_s / growth)
+        miss -= np.clip(miss, -NOTICED * noise, NOTICED * noise)
+        trial, planner = self._make(t, now.share_at(t), told), self._planners[name]
+        trial = trial._replace(
+            values=trial.values | {**_pair(MISS, miss), RATE: growth, REACH: self._reach_m, **self._find_rise(t)}
         )
-        trial, planner = self._make(t, now.share_at(t), state), self._planners[name]
         solver = planner.prepare(trial)
         if name not in self._used:
             solver.restart()
@@ -220,7 +256,8 @@ class StepPlanner:
         factor = self._settings.speed_factor if self._k >= len(self._phases) / 2 else 1.0
         faster = np.array([factor, 1.0, 1.0])
         left = (1.0 - share) * phase.duration_s
-        place, rate, foot = faster * end.hip, faster * end.hip_rate, faster[:2] * end.foot
+        rate, foot = faster * end.hip_rate, faster[:2] * end.foot if name == "ssp" else state.foot
+        place = faster * end.hip + [*foot, 0.0]
         values = {f"{duration}.planned": left, **dict(_pair(HIP_PLACES, place, ".planned"))}
         values |= {**_pair(HIP_RATES, rate, ".planned"), **_pair(("x", "y", "z"), state.hip, "_start_m", "hip_")}
         values |= _pair(("x", "y", "z"), state.hip_rate, "_start_m_s", "hip_v")
@@ -239,13 +276,22 @@ class StepPlanner:
                 if what not in free:
                     values |= {f"{each}.lower": value, f"{each}.upper": value}
         else:
-            foot = state.foot
             values |= _pair(FOOT, foot)
         values |= self._list_edges([np.array([0.0, left_y])] + [foot] * (name == "dsp"))
-        ends = State(place + [*foot, 0.0], rate, foot, np.zeros(2), end.arms, end.arms_rate)
+        ends = State(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
         named = {duration: left, **_pair(HIP_PLACES, ends.hip), **_pair(HIP_RATES, rate), **_pair(FOOT, foot)}
         x = np.array([named.get(each, 0.0) for each in self._planners[name].names])
         return Pursuit(phase, t, share, left, state, ends, values, x)
+
+    def _find_lean(self, t: float) -> Array:
+        """Return the lean (3,) of the torso for which the swinging foot, or the one that has landed, is placed [rad]."""
+        since = 0.0 if self._now.phase.name == "ssp" else t - self._began_s
+        return self._lean * max(0.0, 1.0 - since / UPRIGHT_AGAIN_S)
+
+    def _find_rise(self, t: float) -> dict[str, float]:
+        """Return how the floor rises under the leaning robot."""
+        x, y, _ = self._find_lean(t).tolist()
+        return {RISE[0]: y, RISE[1]: -x * (1.0 - 2.0 * self._now.phase.stance)}
 
     def _list_edges(self, ankles: list[Array]) -> dict[str, float]:
         """Return the edges of the hull of soles, whose ankles (2,) are given; edges that are left over are far away."""
@@ -256,11 +302,22 @@ class StepPlanner:
         return {f"edge_{k}_{what}": value for k, row in enumerate(rows) for what, value in zip("xym", row, strict=True)}
 
     def _find_set_points(self, t: float) -> Array:
-        parts = self._planners[self._now.phase.name].evaluate(self._now, t)
-        if self._now.phase.stance:
+        now = self._now
+        parts = self._planners[now.phase.name].evaluate(now, t, self._find_rise(t))
+        if now.phase.stance:
             columns, signs = self._body.mirror
             parts = [signs * part[columns] for part in parts]
+        lean = self._find_lean(t) * (min(1.0, 2.0 * now.share_at(t)) if now.phase.name == "ssp" else 1.0)
+        for joint in self._ankles[1 - now.phase.stance]:
+            parts[0][self._body.joints.index(joint.name)] -= np.dot(joint.axis, lean)
         return self._shift(*parts)
+
+
+def find_ankle_joints(body: Body, side: str) -> list[Joint]:
+    """Return the last two joints of a leg."""
+    below = {joint.child: joint for joint in body.robot.joints.values()}
+    last = below[body.robot.feet[side].link]
+    return [below[last.parent], last]
 
 
 def _pair(names: tuple[str, ...], numbers: Array, after: str = "", before: str = "") -> dict[str, float]:

@@ -1,15 +1,17 @@
-"""The rest of a support phase from a measured state: where the hip goes, and where and when the swinging foot lands.
+"""The rest of a support phase of a disturbed robot: where the hip goes, and where and when the swinging foot lands.
 
 The left foot stands at x = 0, as in a cycle. In single support the right foot swings on from where it is to a place that is
-free; in double support it stands ahead. The hip moves on a cubic from its measured place and velocity to a free state, the ZMP
-stays within a polygon of up to ``EDGES`` edges, and what is minimised is the distance from the planned state at the end of the
-phase, which is relative to the foot that stands then. The state at the next lift-off or touch-down is the planned one if the
-place of the next foothold makes up for the disturbance.
+free; in double support it stands ahead. The hip moves on a cubic from where the drives were told to hold it to a free state.
+
+The robot is elsewhere: its divergent component of motion (DCM) misses the told one by e, which grows with rate w and is reduced
+by a constant shift d of the ZMP: at the end of the phase, after T, e exp(w T) + d (1 - exp(w T)). The shifted ZMP stays within a
+polygon of up to ``EDGES`` edges. What is minimised is the distance from the planned end of the phase; a foothold that is moved
+by as much as the DCM misses then costs nothing, and in double support what is left of the miss costs.
 
 Source:
     Khadiv, Herzog, Moosavian, Righetti (2020), "Walking control based on step timing adaptation": place and time of the next
-    step as variables, and the distances from the planned ones as cost; here with the whole body's ZMP and reach instead of a
-    pendulum.
+    step and the offset of the DCM from it as variables, and the distances from the planned ones as cost; here with the whole
+    body's ZMP and reach, and with a ZMP that may be anywhere within the sole.
 """
 
 from __future__ import annotations
@@ -33,10 +35,18 @@ from nlp_gait.formulation import (
 )
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, JointLimits, Limit, Reach, RowsAndIndexes, make_rows_at_samples
+from nlp_gait.gaits.biped.limits import (
+    REACH_MARGIN,
+    JointLimits,
+    Limit,
+    Reach,
+    RowsAndIndexes,
+    make_rows,
+    make_rows_at_samples,
+)
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.samples import Instant, Samples
+from nlp_gait.gaits.biped.samples import Instant, Samples, time_mean
 from nlp_gait.gaits.biped.single_support import make_single_support_loads
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack
@@ -44,12 +54,13 @@ from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack
 INTERVALS = 8
 EDGES = 6  # of the hull of two soles that point forward
 OUTSIDE, BEYOND = "zmp_outside_m", "beyond_reach"
+MISS, MISS_END = ("dcm_miss_x_m", "dcm_miss_y_m"), ("dcm_miss_x_end_m", "dcm_miss_y_end_m")
+RATE, RISE, REACH = "dcm_rate_per_s", ("floor_rise_x", "floor_rise_y"), "zmp_reach_m"
 FOOT = ("foot_x_end_m", "foot_y_end_m")
 HIP_PLACES = tuple(f"hip_{axis}_end_m" for axis in "xyz")
 HIP_RATES = tuple(f"hip_v{axis}_end_m_s" for axis in "xyz")
-# Distances from the planned end that cost 1: of the hip's place over the foot that stands then, of its velocity, of both along z,
-# of the foothold and the time.
-UNITS = {"place": 0.01, "velocity": 0.06, "height": 0.01, "rise": 0.02, "foot": 0.03, "time": 0.1}
+# Distances from the planned end that cost 1: of the hip's place and velocity, of both along z, of the foothold and the time.
+UNITS = {"place": 0.01, "velocity": 0.06, "height": 0.01, "rise": 0.02, "foot": 0.03, "time": 0.1, "shift": 0.2}
 # A ZMP outside its polygon costs OUTSIDE_COST for each of these units.
 OUTSIDE_UNIT, OUTSIDE_COST, BEYOND_COST = 0.001, 10.0, 3000.0
 
@@ -70,10 +81,18 @@ class PlannedEnd(Goal):
         cost = (miss(self.time) / UNITS["time"]) ** 2 + OUTSIDE_COST * at[OUTSIDE] / OUTSIDE_UNIT
         cost += BEYOND_COST * at[BEYOND]
         cost += (miss(HIP_PLACES[2]) / UNITS["height"]) ** 2 + (miss(HIP_RATES[2]) / UNITS["rise"]) ** 2
-        for place, rate, foot in zip(HIP_PLACES, HIP_RATES, FOOT, strict=False):
-            cost += ((miss(place) - at[foot]) / UNITS["place"]) ** 2 + (miss(rate) / UNITS["velocity"]) ** 2
-            cost += (miss(foot) / UNITS["foot"]) ** 2 if self.swings else MX(0.0)
-        return cost, {}, {}
+        for place, rate, foot, left in zip(HIP_PLACES, HIP_RATES, FOOT, MISS_END, strict=False):
+            cost += (miss(place) / UNITS["place"]) ** 2 + (miss(rate) / UNITS["velocity"]) ** 2
+            moved = miss(foot) if self.swings else MX(0.0)
+            cost += ((moved - at[left]) / UNITS["foot"]) ** 2
+        return cost + ca.sumsqr(compute_shift(at, self.time) / UNITS["shift"]), {}, {}
+
+
+def compute_shift(at: Point, time: str) -> MX:
+    """Return the shift (2,) of the ZMP that changes the miss of the DCM to the one at the end of the phase [m]."""
+    growth = ca.exp(at[RATE] * at[time])
+    now, left = (ca.vertcat(*(at[name] for name in names)) for names in (MISS, MISS_END))
+    return (now * growth - left) / (growth - 1.0)
 
 
 class SoftReach(Limit):
@@ -95,23 +114,41 @@ class SoftReach(Limit):
 
 
 class ZmpPolygon(Limit):
-    """ZMP on the inner side of every edge, where normal (x, y) times ZMP is at most a distance, or outside by a variable."""
+    """ZMP, and its shifted mean, on the inner side of each edge: normal (x, y) times it is at most a distance.
 
-    parameters = tuple(
-        Parameter(name=f"edge_{k}_{what}", unit=unit, default=value, description=f"edge {k} of the polygon: {words}")
-        for k in range(EDGES)
-        for what, unit, value, words in (
-            ("x", "1", 1.0, "its normal's x"),
-            ("y", "1", 0.0, "its normal's y"),
-            ("m", "m", 1.0, "distance from the origin"),
-        )
+    The shifted mean is also no further ahead of an ankle, or behind one, than the ankles' torques allow. A variable is how far
+    both may be outside.
+    """
+
+    parameters = (
+        Parameter(name=REACH, unit="m", default=1.0, description="of the shifted ZMP from an ankle, ahead and behind"),
+        *(
+            Parameter(
+                name=f"edge_{k}_{what}", unit=unit, default=value, description=f"edge {k} of the polygon: {words}"
+            )
+            for k in range(EDGES)
+            for what, unit, value, words in (
+                ("x", "1", 1.0, "its normal's x"),
+                ("y", "1", 0.0, "its normal's y"),
+                ("m", "m", 1.0, "distance from the origin"),
+            )
+        ),
     )
 
+    def __init__(self, time: str, *, swings: bool) -> None:
+        self._time, self._swings = time, swings
+
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        x, y = samples.zmp[0, :], samples.zmp[1, :]
+        shifted = time_mean(samples.zmp) + compute_shift(at, self._time)
+        x, y = ca.vertsplit(ca.horzcat(samples.zmp, shifted))
         rows = [at[f"edge_{k}_x"] * x + at[f"edge_{k}_y"] * y - at[f"edge_{k}_m"] - at[OUTSIDE] for k in range(EDGES)]
         names = [f"edge_{k}" for k in range(EDGES)]
-        return [make_rows_at_samples("zmp", "m", ca.vertcat(*rows), names, None, MX(0.0))], {}
+        ahead = shifted[0] - (MX(0.0) if self._swings else ca.fmax(at[FOOT[0]], 0.0))
+        reach = ca.vertcat(ahead, -shifted[0]) - at[REACH] - at[OUTSIDE]
+        return [
+            make_rows_at_samples("zmp", "m", ca.vertcat(*rows), names, None, MX(0.0)),
+            make_rows("ankles", "m", reach, None, MX(0.0), ("ahead", "behind")),
+        ], {}
 
 
 def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
@@ -123,8 +160,8 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
     def read_foot(at: InstantPoint, s: SX) -> Motion:
         time = read_duration(at, name)
         if not swings:
-            place = ca.vertcat(at[FOOT[0]], at[FOOT[1]], right_height)
-            return Motion(place, SX(3, 1), SX(3, 1))
+            level = at[RISE[0]] * at[FOOT[0]] + at[RISE[1]] * (at[FOOT[1]] - body.feet_y[0])
+            return Motion(ca.vertcat(at[FOOT[0]], at[FOOT[1]], right_height + level), SX(3, 1), SX(3, 1))
         begun, left_over = at["swing_share_start"], 1 - at["swing_share_start"]
         x, y = (
             cubic(at[f"foot_{axis}_start_m"], at[end], at[f"foot_v{axis}_start_m_s"], SX(0), time, s)
@@ -132,7 +169,8 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         )
         done = cubic(SX(0), SX(1), SX(0), SX(0), time / left_over, begun + left_over * s)
         rise = parabola_lift(done, 0.0, 1.0, at["swing_height_m"])
-        return stack(x, y, rise._replace(position=rise.position + right_height))
+        level = at[RISE[0]] * x.position + at[RISE[1]] * (y.position - body.feet_y[0])
+        return stack(x, y, rise._replace(position=rise.position + right_height + level * done.position))
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
         time = read_duration(at, name)
@@ -157,7 +195,7 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         plan=plan,
         loads=make_single_support_loads(body) if swings else LoadSharing(body, "lever").loads,
         grid=Grid(intervals=INTERVALS, samples_per_interval=1, refined_by="samples_per_interval"),
-        limits=(SoftReach(body), ZmpPolygon()),
+        limits=(SoftReach(body), ZmpPolygon(TIMES[name], swings=swings)),
         goal=PlannedEnd(objective=Objective(name="deviation", unit="1"), time=TIMES[name], swings=swings),
         state=_list_state(body, name),
     )
@@ -203,6 +241,7 @@ def _list_variables(body: Body, name: PhaseName) -> tuple[Variable, ...]:
             else []
         ),
         (TIMES[name], "s", 0.005, 4.0, "left of the phase"),
+        *((left, "m", -0.3, 0.3, "by which the DCM misses the told one at the end") for left in MISS_END),
         (OUTSIDE, "m", 0.0, 0.3, "of the ZMP beyond its polygon"),
         (BEYOND, "1", 0.0, 1.0, "of joints beyond their limits [rad] and cosines of knees beyond theirs"),
     ]
@@ -226,6 +265,7 @@ def _list_state(body: Body, name: PhaseName) -> tuple[Parameter, ...]:
         rows += [("swing_share_start", "1", 0.0), ("swing_height_m", "m", 0.015)]
     else:
         rows += [(FOOT[0], "m", body.step_length_m), (FOOT[1], "m", right_y)]
+    rows += [(MISS[0], "m", 0.0), (MISS[1], "m", 0.0), (RATE, "1/s", 6.0), (RISE[0], "rad", 0.0), (RISE[1], "rad", 0.0)]
     return tuple(
         Parameter(name=each, unit=unit, default=value, description=each.replace("_", " ")) for each, unit, value in rows
     )
