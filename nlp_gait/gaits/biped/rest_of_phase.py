@@ -59,8 +59,18 @@ RATE, RISE, REACH = "dcm_rate_per_s", ("floor_rise_x", "floor_rise_y"), "zmp_rea
 FOOT = ("foot_x_end_m", "foot_y_end_m")
 HIP_PLACES = tuple(f"hip_{axis}_end_m" for axis in "xyz")
 HIP_RATES = tuple(f"hip_v{axis}_end_m_s" for axis in "xyz")
-# Distances from the planned end that cost 1: of the hip's place and velocity, of both along z, of the foothold and the time.
-UNITS = {"place": 0.01, "velocity": 0.06, "height": 0.01, "rise": 0.02, "foot": 0.03, "time": 0.1, "shift": 0.2}
+# Distances from the planned end that cost 1: of the hip's place and velocity, of both along z, of the time, the foothold, and the
+# DCM from what the foothold makes up for; and the shift of the ZMP.
+UNITS = {
+    "place": 0.01,
+    "velocity": 0.06,
+    "height": 0.01,
+    "rise": 0.02,
+    "time": 0.1,
+    "foot": 0.3,
+    "miss": 0.03,
+    "shift": 0.2,
+}
 # A ZMP outside its polygon costs OUTSIDE_COST for each of these units.
 OUTSIDE_UNIT, OUTSIDE_COST, BEYOND_COST = 0.001, 10.0, 3000.0
 
@@ -75,16 +85,15 @@ class PlannedEnd(Goal):
     def evaluate(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
         """Return the objective; there are no other indexes."""
 
-        def miss(name: str) -> MX:
-            return at[name] - at[f"{name}.planned"]
+        def differ(name: str, unit: str) -> MX:
+            return ((at[name] - at[f"{name}.planned"]) / UNITS[unit]) ** 2
 
-        cost = (miss(self.time) / UNITS["time"]) ** 2 + OUTSIDE_COST * at[OUTSIDE] / OUTSIDE_UNIT
-        cost += BEYOND_COST * at[BEYOND]
-        cost += (miss(HIP_PLACES[2]) / UNITS["height"]) ** 2 + (miss(HIP_RATES[2]) / UNITS["rise"]) ** 2
+        cost = differ(self.time, "time") + OUTSIDE_COST * at[OUTSIDE] / OUTSIDE_UNIT + BEYOND_COST * at[BEYOND]
+        cost += differ(HIP_PLACES[2], "height") + differ(HIP_RATES[2], "rise")
         for place, rate, foot, left in zip(HIP_PLACES, HIP_RATES, FOOT, MISS_END, strict=False):
-            cost += (miss(place) / UNITS["place"]) ** 2 + (miss(rate) / UNITS["velocity"]) ** 2
-            moved = miss(foot) if self.swings else MX(0.0)
-            cost += ((moved - at[left]) / UNITS["foot"]) ** 2
+            cost += differ(place, "place") + differ(rate, "velocity")
+            moved = at[foot] - at[f"{foot}.planned"] if self.swings else MX(0.0)
+            cost += ((moved - at[left]) / UNITS["miss"]) ** 2 + (moved / UNITS["foot"]) ** 2
         return cost + ca.sumsqr(compute_shift(at, self.time) / UNITS["shift"]), {}, {}
 
 
