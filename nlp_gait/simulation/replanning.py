@@ -159,7 +159,8 @@ class StepPlanner:
         body = plan.body
         if body is None or plan.planar or plan.ground or plan.slope_rad or "attitude" in plan.signals.arrays:
             raise InputError(
-                "planning again is for upright walks of NAO and humanoids on the flat; use --feedback torso-spring"
+                "planning again is for walks on the flat whose torso stays upright, such as those of nao-cycle; "
+                "use --feedback torso-spring"
             )
         self._body, self._shift, self._settings = body, shift, settings
         self._sensor = TorsoSensor(settings, plan, model)
@@ -171,8 +172,9 @@ class StepPlanner:
         self.plans: list[tuple[float, float, bool, bool]] = []
         self._lean = np.zeros(3)  # of the torso, about the axes of the floor [rad]
         self._began_s = 0.0  # the present phase
+        # Heights at the start [m]; that of the centre of mass is known when the engine has begun.
+        self._torso_height, self._mass_height = float(plan.at("hip", np.zeros(1))[0, 2]), 1.0
         self._ankles = [find_ankle_joints(body, side) for side in SIDES]
-        self._height, self._mass_height = float(plan.at("hip", np.zeros(1))[0, 2]), 0.0  # of the torso and of the mass
         pitch_Nm = min(sum(abs(each.axis[1]) * each.torque_limit_Nm for each in ankle) for ankle in self._ankles)
         self._reach_m = pitch_Nm / body.weight  # of the ZMP from an ankle under the whole weight
         self._now = self._make(0.0, 0.0, self._phases[0].start)
@@ -222,7 +224,7 @@ class StepPlanner:
         place, rate = np.array([x, side * y + self._body.feet_y[0]]), np.array([vx, side * vy])
         growth = math.sqrt(self._body.gravity / self._mass_height)
         # The robot turns about its ankles, so its mass is displaced by less than its torso.
-        miss = self._mass_height / self._height * (place - told.hip[:2] + (rate - told.hip_rate[:2]) / growth)
+        miss = self._mass_height / self._torso_height * (place - told.hip[:2] + (rate - told.hip_rate[:2]) / growth)
         noise = math.hypot(self._settings.position_noise_m, self._settings.velocity_noise_m_s / growth)
         miss -= np.clip(miss, -NOTICED * noise, NOTICED * noise)
         trial, planner = self._make(t, now.share_at(t), told), self._planners[name]

@@ -69,10 +69,18 @@ def test_a_push_moves_the_next_foothold_only_if_that_is_free(step: Plan) -> None
     assert land("length,width,time") > land("") + 0.01
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("push", [(1.8, 0.0), (0.0, -1.8)], ids=["forward", "right"])
+def test_a_push_under_which_open_loop_falls_is_survived(step: Plan, push: tuple[float, float]) -> None:
+    pushed = Conditions(push=Push(impulse_Ns=push, start_s=0.05))
+    assert simulate_plan(step, pushed).fell_at_s is not None
+    assert simulate_plan(step, pushed, Drive(feedback=QUIET)).fell_at_s is None
+
+
 def test_what_cannot_be_planned_again_is_refused(plan: Plan) -> None:
     with pytest.raises(InputError, match="free must be some of length,width,time"):
         Replanning(free="height")
     with pytest.raises(InputError, match="period_s of a feedback must be"):
         Replanning(period_s=0.0)
-    with pytest.raises(InputError, match="planning again is for upright walks"):
+    with pytest.raises(InputError, match="planning again is for walks on the flat whose torso stays upright"):
         simulate_plan(replace(plan, body=None), None, Drive(feedback=QUIET))

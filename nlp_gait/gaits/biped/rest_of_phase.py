@@ -46,7 +46,7 @@ from nlp_gait.gaits.biped.limits import (
 )
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.samples import Instant, Samples, time_mean
+from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.biped.single_support import make_single_support_loads
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack
@@ -123,9 +123,9 @@ class SoftReach(Limit):
 
 
 class ZmpPolygon(Limit):
-    """ZMP, and its shifted mean, on the inner side of each edge: normal (x, y) times it is at most a distance.
+    """ZMP, and its shifted weighted mean, on the inner side of each edge: normal (x, y) times it is at most a distance.
 
-    The shifted mean is also no further ahead of an ankle, or behind one, than the ankles' torques allow. A variable is how far
+    That mean is also no further ahead of an ankle, or behind one, than the ankles' torques allow. A variable is how far
     both may be outside.
     """
 
@@ -148,7 +148,10 @@ class ZmpPolygon(Limit):
         self._time, self._swings = time, swings
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        shifted = time_mean(samples.zmp) + compute_shift(at, self._time)
+        # The sooner the ZMP is shifted, the more it counts for the DCM at the end.
+        weights = ca.exp(-at[RATE] * samples.duration * ca.linspace(0.0, 1.0, samples.steps + 1))
+        weights[[0, -1]] /= 2.0
+        shifted = samples.zmp @ weights / ca.sum1(weights) + compute_shift(at, self._time)
         x, y = ca.vertsplit(ca.horzcat(samples.zmp, shifted))
         rows = [at[f"edge_{k}_x"] * x + at[f"edge_{k}_y"] * y - at[f"edge_{k}_m"] - at[OUTSIDE] for k in range(EDGES)]
         names = [f"edge_{k}" for k in range(EDGES)]
