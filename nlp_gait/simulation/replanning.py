@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -138,7 +138,7 @@ class RestPlanner:
             self._replanner = replanner(problem, near=solve(problem, x0=plan.x, workers=1))
         return self._replanner
 
-    def evaluate(self, plan: Pursuit, t: float, rise: Mapping[str, float]) -> list[Array]:
+    def evaluate(self, plan: Pursuit, t: float, rise: dict[str, float]) -> list[Array]:
         """Return q [rad], qd [rad/s] and tau [Nm], (J,) each, at a time of the walk [s], on a floor that rises."""
         values = plan.values | rise
         p = [values.get(name, self.problem.value(name)) for name in self._own]
