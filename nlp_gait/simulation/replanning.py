@@ -1,6 +1,6 @@
 """Feedback by planning again: the rest of each phase, with the place and the time of the next foothold, as the state demands.
 
-At each measurement the replanner solves the rest of the present phase (``gaits.biped.rest_of_phase``). The motion goes on from
+At each measurement the replanner solves the rest of the present phase (``gaits.biped.rest_of_phase``). The motion continues from
 where the drives were told to be, so that they keep their stiffness; the distance from there to the measured divergent component
 of motion, of a pendulum under the torso, decides where and when the foot lands, and when it lifts off. Where the robot leans, the
 swinging foot is turned and raised to the floor as it is under the leaning robot. At touch-down and lift-off the next phase
