@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import LINKS, centres, points
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, centres, points, toe_foot_biped
 from nlp_gait.symbolic.contact import (
     CREEP_SPEED,
     YIELD_DEPTH,
@@ -56,15 +55,14 @@ WEIGHT_TOLERANCE = 1e-5  # a contact 1.3 mm deep has faded in but for 1e-6 of it
 @pytest.mark.parametrize("names", [*((name,) for name in TOUCHING), TOUCHING], ids="".join)
 def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> None:
     """On each contact point alone, and on all six; its weight is what the springs then carry."""
-    rods = toe_foot_biped().rods
     q, v = SX.sym("q", 11), SX.sym("v", 11)  # stance ankle and nine angles: nothing is fixed
-    found = points(rods, q[2:], q[:2])
+    found = points(q[2:], q[:2])
     middles = centres(found)
     kinetic, potential = SX(0), SX(0)
     for i, link in enumerate(LINKS):
-        rod = rods[link]
-        kinetic += (rod.mass * ca.sumsqr(ca.jtimes(middles[link], q, v)) + rod.inertia * v[2 + i] ** 2) / 2
-        potential += rod.mass * GRAVITY * middles[link][1]
+        rod = toe_foot_biped().link(link)
+        kinetic += (rod.mass_kg * ca.sumsqr(ca.jtimes(middles[link], q, v)) + rod.inertia_kgm2 * v[2 + i] ** 2) / 2
+        potential += rod.mass_kg * GRAVITY * middles[link][1]
     motion = equations_of_motion(kinetic, potential, q, v)
     contacts = [
         Contact(found[name][1], ca.jacobian(found[name][1], q).T, ca.jacobian(found[name][0], q).T) for name in names

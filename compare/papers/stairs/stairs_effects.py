@@ -17,8 +17,7 @@ from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec, me
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, centres, points
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, centres, points, rod, toe_foot_biped
 
 INERTIAS = (0.0, 1.0, 2.0)  # as multiples of those of slender rods
 SETBACKS = (0.0, 0.03, 0.09)  # of edges behind the ankle that stands on the step [m]
@@ -92,7 +91,7 @@ def _change_inertia(arrays: Mapping[str, Array], share: float) -> tuple[float, f
     The equations of motion are in absolute link angles: an inertia acts on the acceleration of its own link only.
     """
     robot = toe_foot_biped()
-    inertias = np.array([robot.rods[link].inertia for link in MOVING])
+    inertias = np.array([robot.link(link).inertia_kgm2 for link in MOVING])
     extra = (share - 1) * inertias * arrays["link_qdd"] @ np.linalg.inv(JOINT_RATES)
     power = np.abs((arrays["tau"] + extra) * arrays["qd"]).sum(axis=1)
     pressure = arrays["stance_pressure"][:, 0] - extra[:, 0] / arrays["stance_force"][:, 1]
@@ -119,9 +118,9 @@ def measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
 
 def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
     """Return how far the centre of gravity of all links is below the hip at the start of a plan [mm]."""
-    rods, angles = toe_foot_biped().rods, move(findings, what, case)[0].arrays["link_q"][0]
-    place = points(rods, ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
-    moment = sum(rods[link].mass * float(middle[1]) for link, middle in centres(place).items())
+    angles = move(findings, what, case)[0].arrays["link_q"][0]
+    place = points(ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
+    moment = sum(rod(link).mass_kg * float(middle[1]) for link, middle in centres(place).items())
     return 1e3 * (float(place["H"][1]) - moment / toe_foot_biped().mass_kg)
 
 

@@ -16,8 +16,7 @@ from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings, roll_o
 from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import ANGLES, measure_joints
-from nlp_gait.gaits.stairs.planar_biped import LINKS
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
 from nlp_gait.gaits.stairs.stair import SETBACK
 
 if TYPE_CHECKING:

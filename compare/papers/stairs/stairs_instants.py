@@ -14,8 +14,8 @@ import numpy as np
 from metaheuristics import minimize
 from metaheuristics.interface import Algorithm
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaits.stairs.bodies import JOINTS, rigid_bodies
 from nlp_gait.gaits.stairs.closed_loop import GIVEN, QUANTUM, TORSO, ClosedLoop, N
+from nlp_gait.gaits.stairs.display import JOINTS, rigid_bodies
 from nlp_gait.gaits.stairs.track import LARGEST_STATE, support_polygon
 from nlp_gait.symbolic.nonsmooth import Exact
 

@@ -23,9 +23,9 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.leg_network import ONLINE
 from nlp_gait.gaits.stairs.plan import SAMPLING_RESERVE
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, rod, toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import PHASES
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK
+from nlp_gait.gaits.stairs.stair import SETBACK
 
 
 def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
@@ -296,8 +296,7 @@ def _check_jerk_terms(_: StairsFindings) -> Check:
 
 
 def _check_torso_mass(_: StairsFindings) -> Check:
-    rods = toe_foot_biped().rods
-    torso, total = rods["UH"].mass, sum(rod.mass for rod in rods.values())
+    torso, total = rod("UH").mass_kg, toe_foot_biped().mass_kg
     return decide(torso > total / 2, torso=torso, total=total, share=100 * torso / total)
 
 

@@ -21,8 +21,7 @@ from compare.study.task import IPOPT, ProblemSpec, Task
 from nlp_gait.formulation import Array, Result, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.plan import ZMP_OF_STANDING
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, toe_foot_biped
 
 PLANS = {"jerk": "rad/s^3", "plan": "J"}  # of least jerk, of least energy; unit of what is least
 INDEXES = {"jerk": "peak_jerk_rad_s3", "plan": "energy_J"}

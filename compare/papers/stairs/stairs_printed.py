@@ -8,8 +8,8 @@ import numpy as np
 
 from compare.papers.stairs.stairs_paper import TABLE_3, Case
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, toe_foot_biped
+from nlp_gait.gaits.stairs.stair import SETBACK
 
 
 def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:

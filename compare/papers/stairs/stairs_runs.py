@@ -26,8 +26,7 @@ from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.formulation import Array, Assembly, Point
 from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkPath, NetworkSettings, leg_vector, network_angles
 from nlp_gait.gaits.stairs.leg_network import PRINTED as PRINTED_NETWORK
-from nlp_gait.gaits.stairs.planar_biped import LINKS
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
 from nlp_gait.gaits.stairs.track import PLAN
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 

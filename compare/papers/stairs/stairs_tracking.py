@@ -20,8 +20,8 @@ from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec, Task
-from nlp_gait.gaits.stairs.bodies import rigid_bodies
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop
+from nlp_gait.gaits.stairs.display import rigid_bodies
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 
 FOLLOWED_RAD = 0.1

@@ -13,10 +13,18 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED, solve_legs_by_network
-from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, biped_dynamics, centres, points
+from nlp_gait.gaits.stairs.planar_biped import (
+    GRAVITY,
+    LEAST_LOAD,
+    LINKS,
+    biped_dynamics,
+    centres,
+    points,
+    rod,
+    toe_foot_biped,
+)
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, posture, stair_height
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import (
@@ -175,7 +183,7 @@ class ClosedLoop:
     def find_stance_ankle(self, rollout: Rollout) -> MX:
         """Return its place (2, m) in a rollout [m]."""
         q, place = SX.sym("q", N), SX.sym("place", 2)
-        found = points(toe_foot_biped().rods, q, place, self.base_point)["A'"]
+        found = points(q, place, self.base_point)["A'"]
         return ca.Function("ankle", [q, place], [found]).map(self.quanta)(rollout.state[:N, :], rollout.place)
 
     @cached_property
@@ -189,11 +197,11 @@ class ClosedLoop:
 
     def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
         """Return the equations of the acceleration within one quantum."""
-        (q, v), rods = state, toe_foot_biped().rods
+        q, v = state
         place, speed, push = ca.vertsplit(parts["base"], [0, 2, 4, 6])
-        found = points(rods, q, place, self.base_point)
-        motion = biped_dynamics(rods, GRAVITY, q, v, q, self.base_point)
-        momentum = sum((rods[link].mass * middle for link, middle in centres(found).items()), SX(2, 1))
+        found = points(q, place, self.base_point)
+        motion = biped_dynamics(q, v, q, self.base_point)
+        momentum = sum((rod(link).mass_kg * middle for link, middle in centres(found).items()), SX(2, 1))
         stair = Stair(parts["size"][0], parts["size"][1])
         contacts = [
             Contact(
@@ -217,22 +225,21 @@ class ClosedLoop:
         """Function of (state, next state, given, tuned) to torques (9,) and ZMP, with a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
-        rods, base = toe_foot_biped().rods, self.base_point
-        G = biped_dynamics(rods, GRAVITY, state.q, state.v, state.q, base).G
+        G = biped_dynamics(state.q, state.v, state.q, self.base_point).G
         acted = following if self.scheme == "implicit" else state
         torque = controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
         place, push = parts["base"][:2], parts["base"][4:]
-        for link, middle in centres(points(rods, state.q, place, base)).items():
-            rod = rods[link]
+        for link, middle in centres(points(state.q, place, self.base_point)).items():
+            mass = rod(link).mass_kg
             velocity = ca.jtimes(middle, state.q, state.v)
             a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
             spin = parts["spin"] * acceleration[LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
-            weight += rod.mass * (a[1] + GRAVITY)
-            pull += rod.mass * a[0]
-            moment += rod.mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod.inertia * spin
+            weight += mass * (a[1] + GRAVITY)
+            pull += mass * a[0]
+            moment += mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod(link).inertia_kgm2 * spin
         least = LEAST_LOAD * toe_foot_biped().mass_kg * GRAVITY
         zmp = moment / ca.fmax(weight - parts["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
@@ -261,9 +268,7 @@ def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)
-    step = posture(
-        toe_foot_biped().rods, plan, Stair(size[0], size[1]), GRAVITY, s, passing / plan.durations, margin, ops, kind
-    )
+    step = posture(plan, Stair(size[0], size[1]), s, passing / plan.durations, margin, ops, kind)
     given = ca.vertcat(values, size, margin)
     angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
     motion = [*angles, step.hip.position, step.hip.velocity]

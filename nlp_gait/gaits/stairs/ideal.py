@@ -30,7 +30,6 @@ from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simula
 from nlp_gait.gaits.stairs.ideal_model import AXES, Ends, IdealModel
 from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact
 
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
@@ -212,7 +211,5 @@ def _angles() -> ca.Function:
     """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
     size, s = SX.sym("size", 2), SX.sym("s", 4)
     plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
-    found = posture(
-        toe_foot_biped().rods, plan, Stair(size[0], size[1]), stair.GRAVITY, s, SX(4, 1), SX(REACH_MARGIN), Exact()
-    )
+    found = posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
     return ca.Function("angles", [size, s], [found.q.position])

@@ -13,10 +13,17 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Assembly, Constraint, Point
 from nlp_gait.formulation.blocks import Layout
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, MOVING, StanceLoads, link_angles, loads, points
+from nlp_gait.gaits.stairs.planar_biped import (
+    JOINT_RATES,
+    MOVING,
+    StanceLoads,
+    link_angles,
+    loads,
+    points,
+    toe_foot_biped,
+)
 from nlp_gait.gaits.stairs.planned_motion import Stair, stair_height
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GRAVITY, SETBACK, grip, knee_limits, read_stair, rows, stance_load, stance_zmp
+from nlp_gait.gaits.stairs.stair import SETBACK, grip, knee_limits, read_stair, rows, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 EDGE_WIDTH = 0.012  # of the sigmoid that replaces an edge of the stair [m]
@@ -75,14 +82,14 @@ class IdealModel:
     def _interval(self) -> ca.Function:
         q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
         toe, sole = SX.sym("toe", 2), SX.sym("sole", 2)
-        found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe, "S": sole})
+        found = loads(q, qd, qdd, {"T": toe, "S": sole})
         return ca.Function("loads", [q, qd, qdd, toe, sole], ca.cse(list(found)))
 
     @cached_property
     def _instant(self) -> ca.Function:
         """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
-        found = points(toe_foot_biped().rods, link_angles(q), SX(2, 1))
+        found = points(link_angles(q), SX(2, 1))
         toe, sole, ankle, hip = (found[name] for name in "TSAH")
         stair = Stair(size[0], size[1])
         heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]

@@ -17,8 +17,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.planar_biped import LINKS
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, rod
 
 LEAST_KNEE_SINE = 1e-3
 
@@ -157,7 +156,7 @@ def solve_legs_by_network(desired: MX, settings: NetworkSettings = ONLINE) -> MX
     columns = desired.shape[1]
     rows = ca.vertsplit(desired)
     for thigh, shank in LEGS:
-        lengths = toe_foot_biped().link(thigh).length_m, toe_foot_biped().link(shank).length_m
+        lengths = rod(thigh).length_m, rod(shank).length_m
         at = [LINKS.index(thigh), LINKS.index(shank)]
         at += [len(LINKS) + i for i in at]
         q, v, velocity = SX.sym("q", 2), SX.sym("v", 2), SX.sym("velocity", 2)

@@ -45,9 +45,8 @@ from nlp_gait.gaits.stairs.plan_samples import (
     grid_at,
     reach_function,
 )
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Minimise = Literal["energy", "jerk", "knot-jerk"]

@@ -13,8 +13,7 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Array, Point
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, link_angles, loads, points
 from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind, posture, stair_height
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
-from nlp_gait.gaits.stairs.stair import GOVERNING, GRAVITY, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.gaits.stairs.support import compute_balance
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -135,7 +134,7 @@ def _dynamics() -> ca.Function:
     """Function of (q, qd, qdd, force on the rear toe) to ``loads``; the same in every interpretation."""
     q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
     toe = SX.sym("toe", 2)
-    found = loads(toe_foot_biped().rods, GRAVITY, q, qd, qdd, {"T": toe})
+    found = loads(q, qd, qdd, {"T": toe})
     return ca.Function("loads", [q, qd, qdd, toe], list(found))
 
 
@@ -166,7 +165,7 @@ def balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
     inputs, plan, stair, step = _make_symbols(ops, kind)
     s, passing, *_ = inputs
-    found = compute_balance(toe_foot_biped().rods, GRAVITY, step, plan, s, passing, _slope(stair, kind), kind)
+    found = compute_balance(step, plan, s, passing, _slope(stair, kind), kind)
     torque, power, *ground = found
     outputs = _list_outputs(inputs, plan, step, torque[: len(JOINTS)], power, *ground)
     return ca.Function("sample", inputs, ca.cse(outputs))
@@ -185,7 +184,7 @@ def _slope(stair: Stair[SX], kind: StepKind) -> SX:
 def clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``balanced_function``."""
     inputs, _, stair, step = _make_symbols(ops, kind)
-    found = points(toe_foot_biped().rods, link_angles(step.q.position), step.stance_ankle.position)
+    found = points(link_angles(step.q.position), step.stance_ankle.position)
     heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind) for name in "TSA"]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
@@ -208,5 +207,5 @@ def _make_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, 
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = make_stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = posture(toe_foot_biped().rods, plan, stair, GRAVITY, s, rates, margin, ops, kind)
+    step = posture(plan, stair, s, rates, margin, ops, kind)
     return [s, passing, values, size, margin], plan, stair, step

@@ -1,4 +1,4 @@
-"""Planar biped with toes: points, dynamics and loads from absolute link angles (Bhardwaj et al., eqs. 35-42).
+"""Planar biped with toes that climbs stairs: nine slender rods, their points, dynamics and loads (Bhardwaj et al., eqs. 35-42).
 
 All angles are absolute. Those of legs and feet turn clockwise from the forward axis x (a leg that hangs down has pi / 2), that of
 the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is the base.
@@ -6,15 +6,25 @@ the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
 from casadi import DM, SX
 
+from nlp_gait.decoding import read_dataclass
+from nlp_gait.errors import RobotDataError
+from nlp_gait.robots.robot import check_numbers
 from nlp_gait.symbolic.dynamics import EquationsOfMotion, equations_of_motion
 
+DEFAULT_FILE = resources.files("nlp_gait.gaits.stairs") / "biped.json"
+GRAVITY = 9.81  # [m/s^2]
 # Order of the angles, as in the paper's Table I: thigh, shank of both legs, torso, sole and toe of both feet.
 LINKS = ("HK", "KA", "HK'", "K'A'", "UH", "AS", "ST", "A'S'", "S'T'")
 # Ends of every link.
@@ -41,12 +51,77 @@ _PATHS: Mapping[str, tuple[tuple[str, int], ...]] = {
 V = TypeVar("V", SX, np.ndarray)
 
 
-class Rod(NamedTuple):
-    """Link with its mass in the middle: length [m], mass [kg], moment of inertia about the middle [kg m^2]."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanarLink:
+    """Slender rod."""
 
-    length: float
-    mass: float
-    inertia: float
+    name: str  # its two ends, for example ``"HK"``
+    length_m: float  # between the ends
+    mass_kg: float  # uniformly distributed
+
+    def __post_init__(self) -> None:
+        check_numbers(f"link {self.name!r}", self, positive=("length_m", "mass_kg"))
+
+    @property
+    def inertia_kgm2(self) -> float:
+        """Moment of inertia about the middle."""
+        return self.mass_kg * self.length_m**2 / 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToeFootBiped:
+    """Two legs of thigh, shank, sole and toe, and a torso.
+
+    Source:
+        Bhardwaj, Mishra, Sukavanam, Balasubramanian, Table I. The paper gives no moments of inertia: m l^2 / 12.
+    """
+
+    name: str  # of the robot
+    source: str  # of the numbers
+    inertia: str  # formula of the moments of inertia
+    links: tuple[PlanarLink, ...]  # in the order of ``LINKS``; both legs are equal
+
+    def __post_init__(self) -> None:
+        names = tuple(link.name for link in self.links)
+        if names != LINKS:
+            raise RobotDataError(f"robot {self.name!r}: links must be {', '.join(LINKS)}, got {', '.join(names)}")
+        for swing, stance in (("HK", "HK'"), ("KA", "K'A'"), ("AS", "A'S'"), ("ST", "S'T'")):
+            a, b = self.link(swing), self.link(stance)
+            if (a.length_m, a.mass_kg) != (b.length_m, b.mass_kg):
+                raise RobotDataError(f"robot {self.name!r}: links {swing} and {stance} must be equal")
+
+    def link(self, name: str) -> PlanarLink:
+        return self.links[LINKS.index(name)]
+
+    @property
+    def mass_kg(self) -> float:
+        return math.fsum(link.mass_kg for link in self.links)
+
+    @property
+    def sole_m(self) -> float:
+        """Ankle to sole joint."""
+        return self.link("AS").length_m
+
+    @property
+    def toe_m(self) -> float:
+        """Sole joint to tip of the toe."""
+        return self.link("ST").length_m
+
+    @property
+    def foot_m(self) -> float:
+        """Ankle to tip of the toe, flat."""
+        return self.sole_m + self.toe_m
+
+
+@cache
+def toe_foot_biped(path: str = "") -> ToeFootBiped:
+    """Read a robot from a JSON file with the fields of ``ToeFootBiped``, by default the paper's; raises RobotDataError."""
+    return read_dataclass(ToeFootBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)
+
+
+def rod(link: str) -> PlanarLink:
+    """Return a link of the paper's robot."""
+    return toe_foot_biped().link(link)
 
 
 def direction(link: str, angle: SX) -> SX:
@@ -55,12 +130,12 @@ def direction(link: str, angle: SX) -> SX:
     return ca.vertcat(ca.cos(angle), upward * ca.sin(angle))
 
 
-def points(rods: Mapping[str, Rod], q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
+def points(q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
     """Return positions of all joints and ends by name, (2,) each [m], from nine angles [rad] and the place of the base (2,) [m].
 
     The base is the stance ankle A', the tip of the stance toe T' or the hip H.
     """
-    return sum_along_links(base, place, lambda link: rods[link].length * direction(link, q[LINKS.index(link)]))
+    return sum_along_links(base, place, lambda link: rod(link).length_m * direction(link, q[LINKS.index(link)]))
 
 
 def sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str, V]:
@@ -72,13 +147,12 @@ def sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str,
     return found
 
 
-def _couplings(rods: Mapping[str, Rod], base: str) -> np.ndarray:
+def _couplings(base: str) -> np.ndarray:
     """(9, 9) W [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, where u_i are the directions."""
-    arms = sum_along_links(
-        base, np.zeros(len(LINKS)), lambda link: rods[link].length * np.eye(len(LINKS))[LINKS.index(link)]
-    )
+    unit = dict(zip(LINKS, np.eye(len(LINKS)), strict=True))
+    arms = sum_along_links(base, np.zeros(len(LINKS)), lambda link: rod(link).length_m * unit[link])
     middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])
-    return middles.T @ np.diag([rods[link].mass for link in LINKS]) @ middles
+    return middles.T @ np.diag([rod(link).mass_kg for link in LINKS]) @ middles
 
 
 def centres(found: Mapping[str, SX]) -> dict[str, SX]:
@@ -86,21 +160,19 @@ def centres(found: Mapping[str, SX]) -> dict[str, SX]:
     return {link: (found[a] + found[b]) / 2 for link, (a, b) in ENDS.items()}
 
 
-def biped_dynamics(
-    rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, angles: SX, base: str = "A'"
-) -> EquationsOfMotion:
+def biped_dynamics(q: SX, qd: SX, angles: SX, base: str = "A'") -> EquationsOfMotion:
     """Return the equations of motion about a fixed base (``points``), with link angles (9,) [rad] as a function of q (n,)."""
     spins = ca.jtimes(angles, q, qd)
     velocities = [ca.jtimes(direction(link, angles[i]), q, qd) for i, link in enumerate(LINKS)]
-    middles = centres(points(rods, angles, SX(2, 1), base))
-    kinetic, potential, couplings = SX(0), SX(0), _couplings(rods, base)
+    middles = centres(points(angles, SX(2, 1), base))
+    kinetic, potential, couplings = SX(0), SX(0), _couplings(base)
     for i, link in enumerate(LINKS):
         moving = 0.5 * couplings[i, i] * ca.sumsqr(velocities[i])
-        kinetic += 0.5 * rods[link].inertia * spins[i] ** 2 + moving  # (eqs. 36, 37)
+        kinetic += 0.5 * rod(link).inertia_kgm2 * spins[i] ** 2 + moving  # (eqs. 36, 37)
         for j in range(i):
             if couplings[i, j] != 0.0:
                 kinetic += couplings[i, j] * ca.dot(velocities[i], velocities[j])
-        potential += rods[link].mass * gravity * middles[link][1]  # (eq. 38)
+        potential += rod(link).mass_kg * GRAVITY * middles[link][1]  # (eq. 38)
     return equations_of_motion(kinetic, potential, q, qd)
 
 
@@ -140,24 +212,24 @@ def link_angles(q: SX) -> SX:
     return ca.vertcat(q, 0, 0)
 
 
-def loads(rods: Mapping[str, Rod], gravity: float, q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
+def loads(q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
     """Return the inverse dynamics of the moving links, q (7,) [rad], with given forces (2,) [N] on points of the rear foot.
 
     Derivatives are taken with respect to q and qd, which are symbols. The centre of pressure follows from the moment balance of
     the flat stance foot.
     """
-    motion = biped_dynamics(rods, gravity, q, qd, link_angles(q))
-    found = points(rods, link_angles(q), SX(2, 1))
+    motion = biped_dynamics(q, qd, link_angles(q))
+    found = points(link_angles(q), SX(2, 1))
     generalised = motion.M @ qdd + motion.C @ qd + motion.G  # (eq. 42)
     for point, force in rear.items():
         generalised -= ca.jacobian(found[point], q).T @ force  # (eq. 35)
     torque = DM(np.linalg.inv(JOINT_RATES.T)) @ generalised
 
     middles = centres(found)
-    mass = sum(rod.mass for rod in rods.values())
-    momentum = sum((rods[link].mass * ca.jtimes(middles[link], q, qd) for link in LINKS), SX(2, 1))
-    force = ca.jtimes(momentum, q, qd) + ca.jtimes(momentum, qd, qdd) + ca.vertcat(0, mass * gravity)
+    weight = toe_foot_biped().mass_kg * GRAVITY
+    momentum = sum((rod(link).mass_kg * ca.jtimes(middles[link], q, qd) for link in LINKS), SX(2, 1))
+    force = ca.jtimes(momentum, q, qd) + ca.jtimes(momentum, qd, qdd) + ca.vertcat(0, weight)
     stance = force - sum(rear.values(), SX(2, 1))
-    foot = sum((rods[link].mass * gravity * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
-    load = ca.fmax(stance[1], LEAST_LOAD * mass * gravity)
+    foot = sum((rod(link).mass_kg * GRAVITY * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
+    load = ca.fmax(stance[1], LEAST_LOAD * weight)
     return StanceLoads(torque, stance, (foot - torque[0]) / load)

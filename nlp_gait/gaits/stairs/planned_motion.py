@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import Rod
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, rod
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
@@ -62,13 +61,6 @@ class StairPlan(NamedTuple):
         return ca.fmax(ends[1:] - ends[:-1], LEAST_DURATION)
 
 
-class ToeFoot(NamedTuple):
-    """Lengths of a foot: ankle to sole joint, sole joint to tip of the toe [m]."""
-
-    sole: float
-    toe: float
-
-
 def stair_height(x: SX, stair: Stair[SX], setback: float, width: float, step: StepKind = "next") -> SX:
     """Return the height of the ground under a point at x, relative to the stance ankle [m].
 
@@ -100,12 +92,11 @@ def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
 
 
-def ankle_on_toe(foot: ToeFoot, sole: SX, toe: SX) -> SX:
+def ankle_on_toe(sole: SX, toe: SX) -> SX:
     """Return the ankle (2,) relative to its position with a flat foot [m], while the tip of the toe stands still."""
-    return ca.vertcat(
-        foot.sole * (1 - ca.cos(sole)) + foot.toe * (1 - ca.cos(toe)),  # (eq. 1)
-        foot.sole * ca.sin(sole) + foot.toe * ca.sin(toe),  # (eq. 2)
-    )
+    sole_m, toe_m = rod("AS").length_m, rod("ST").length_m
+    ahead = sole_m * (1 - ca.cos(sole)) + toe_m * (1 - ca.cos(toe))  # (eq. 1)
+    return ca.vertcat(ahead, sole_m * ca.sin(sole) + toe_m * ca.sin(toe))  # (eq. 2)
 
 
 def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
@@ -125,7 +116,7 @@ def landing_share(plan: StairPlan, s: SX) -> SX:
     return (first * (1 - s[0]) + second * (1 - s[1])) / first
 
 
-def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
+def ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
     Source:
@@ -134,8 +125,8 @@ def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
         cycloid ends so far ahead that the foot, once flat, stands exactly two treads on. Where pi r is less than the distance
         the printed foot slides along the ground first, into the edge of the step; here the cycloid is stretched instead.
     """
-    rising = ankle_on_toe(foot, *foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
-    lift_off = ankle_on_toe(foot, SX(0), plan.toe_angle)
+    rising = ankle_on_toe(*foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
+    lift_off = ankle_on_toe(SX(0), plan.toe_angle)
     radius = stair.rise  # half of the double rise
     distance = 2 * stair.tread
     # A stair flatter than 2 / pi stretches the cycloid over the whole distance.
@@ -162,7 +153,7 @@ def ankle(plan: StairPlan, stair: Stair[SX], foot: ToeFoot, s: SX) -> SX:
     return rising + (bridge - p1) + (cycloid(angle) - p4)
 
 
-def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX, step: StepKind = "next") -> SX:
+def hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next") -> SX:
     """(2,) position of the hip [m], from the fractions s (4,) of the phases.
 
     In the first step it stays level ("no change in hip altitude"), starts above the planned ZMP, where it can stand still,
@@ -173,7 +164,7 @@ def hip(plan: StairPlan, stair: Stair[SX], gravity: float, s: SX, step: StepKind
         not pass through its own ends.
     """
     t = ca.dot(plan.durations, s)
-    rate = ca.sqrt(gravity / plan.hip_height)  # (eq. 24)
+    rate = ca.sqrt(GRAVITY / plan.hip_height)  # (eq. 24)
     first, last, zmp_last = plan.hip_start, plan.hip_start + stair.tread, stair.tread + plan.zmp_end
     if step == "first":
         first, last, zmp_last = plan.zmp_start, plan.hip_start, plan.zmp_end
@@ -231,15 +222,7 @@ class Posture(NamedTuple):
 
 
 def posture(
-    rods: Mapping[str, Rod],
-    plan: StairPlan,
-    stair: Stair[SX],
-    gravity: float,
-    s: SX,
-    rates: SX,
-    margin: SX,
-    ops: Nonsmooth,
-    step: StepKind = "next",
+    plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin: SX, ops: Nonsmooth, step: StepKind = "next"
 ) -> Posture:
     """Return the posture at fractions s (4,) of the phases, symbols; their rates (4,) are 1 / duration now, else 0 [1/s].
 
@@ -249,31 +232,25 @@ def posture(
     climbed = stair  # half of the swing foot's way
     if step == "first":
         stance, climbed = SX(2, 1), Stair(stair.tread / 2, stair.rise / 2)
-    foot = ToeFoot(rods["AS"].length, rods["ST"].length)
-    at_hip = in_time(hip(plan, stair, gravity, s, step) - stance, s, rates)
-    at_ankle = in_time(ankle(plan, climbed, foot, s) - stance, s, rates)
+    at_hip = in_time(hip(plan, stair, s, step) - stance, s, rates)
+    at_ankle = in_time(ankle(plan, climbed, s) - stance, s, rates)
     stance_foot = stance_ankle = Motion(SX(2, 1), SX(2, 1), SX(2, 1))
     if step == "landing":
         stance_foot = in_time(ca.vertcat(*landed_angles(plan, s)), s, rates)
-        stance_ankle = in_time(ankle_on_toe(foot, *landed_angles(plan, s)), s, rates)
-    swing, swing_reach = _leg(rods, at_hip, at_ankle, margin, ops)
-    support, support_reach = _leg(rods, at_hip, stance_ankle, margin, ops)
+        stance_ankle = in_time(ankle_on_toe(*landed_angles(plan, s)), s, rates)
+    swing, swing_reach = _leg(at_hip, at_ankle, margin, ops)
+    support, support_reach = _leg(at_hip, stance_ankle, margin, ops)
     feet = in_time(ca.vertcat(*foot_angles(plan, s)), s, rates)
     torso = constant_motion(0.0)._replace(position=plan.torso_pitch)
     reach = ca.vertcat(swing_reach, support_reach)
     return Posture(stack(swing, support, torso, feet), reach, at_hip, at_ankle, stance_foot, stance_ankle)
 
 
-def _leg(rods: Mapping[str, Rod], at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:
+def _leg(at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:
     """Absolute angles of thigh and shank, and the cosine of the knee."""
-    forward_up = [ankle_part - hip_part for ankle_part, hip_part in zip(at_ankle, at_hip, strict=True)]
-    leg = leg_angles(
-        Motion(*(ca.vertcat(part[0], 0, part[1]) for part in forward_up)),
-        rods["HK"].length,
-        rods["KA"].length,
-        margin,
-        ops,
-    )
+    forward_up = (ankle_part - hip_part for ankle_part, hip_part in zip(at_ankle, at_hip, strict=True))
+    hip_to_ankle = Motion(*(ca.vertcat(part[0], 0, part[1]) for part in forward_up))
+    leg = leg_angles(hip_to_ankle, rod("HK").length_m, rod("KA").length_m, margin, ops)
     _, pitch, knee, _, _ = (Motion(*(part[i] for part in leg.joints)) for i in range(5))
     upright = constant_motion(ca.pi / 2)  # a leg that hangs down
     return stack(add_motions(pitch, upright), add_motions(add_motions(pitch, knee), upright)), leg.reach

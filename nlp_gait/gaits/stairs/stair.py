@@ -11,11 +11,9 @@ from casadi import MX, SX
 
 from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, parameters, vector_columns
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
 
-GRAVITY = 9.81  # [m/s^2]
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
 SETBACK = 0.06  # distance of an edge behind the ankle that stands on the step [m]
 

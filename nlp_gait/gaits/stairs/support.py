@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import LEAST_LOAD, LINKS, Rod, centres, direction, sum_along_links
+from nlp_gait.gaits.stairs.planar_biped import (
+    GRAVITY,
+    LEAST_LOAD,
+    LINKS,
+    centres,
+    direction,
+    rod,
+    sum_along_links,
+    toe_foot_biped,
+)
 from nlp_gait.gaits.stairs.planned_motion import Posture, StairPlan, StepKind, landing_share
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -38,27 +46,18 @@ class Balance(NamedTuple):
     support: SX  # (2,) rear and front end of the contact points [m]
 
 
-def compute_balance(
-    rods: Mapping[str, Rod],
-    gravity: float,
-    step: Posture,
-    plan: StairPlan,
-    s: SX,
-    passing: SX,
-    slope: SX,
-    kind: StepKind,
-) -> Balance:
+def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: SX, kind: StepKind) -> Balance:
     """Return ZMP, contact points and torques at fractions s (4,) of the phases, of which one is ``passing`` (4,).
 
     Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
     the forces on them are parallel. In the first step the swing foot carries nothing.
     """
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
-    place, middles = _move_points(rods, Motion(q, v, a), step.stance_ankle)
-    push = {link: rods[link].mass * (middles[link][1] + ca.vertcat(0, gravity)) for link in LINKS}
-    turn = {link: rods[link].inertia * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(LINKS)}
+    place, middles = _move_points(Motion(q, v, a), step.stance_ankle)
+    push = {link: rod(link).mass_kg * (middles[link][1] + ca.vertcat(0, GRAVITY)) for link in LINKS}
+    turn = {link: rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(LINKS)}
     force = sum(push.values(), SX(2, 1))
-    load = ca.fmax(force[1], LEAST_LOAD * gravity * sum(rod.mass for rod in rods.values()))
+    load = ca.fmax(force[1], LEAST_LOAD * GRAVITY * toe_foot_biped().mass_kg)
     points = sum((_moment(middles[link][0], push[link]) for link in LINKS), SX(0))
     moment = points + sum(turn.values(), SX(0))
 
@@ -91,16 +90,16 @@ def compute_balance(
     )
 
 
-def _move_points(rods: Mapping[str, Rod], q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tuple[SX, SX]]]:
+def _move_points(q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tuple[SX, SX]]]:
     """Return places of all points, and places and accelerations of the links' centres."""
 
     def position(link: str) -> SX:
-        return rods[link].length * direction(link, q.position[LINKS.index(link)])
+        return rod(link).length_m * direction(link, q.position[LINKS.index(link)])
 
     def acceleration(link: str) -> SX:
         angle, rate, change = (part[LINKS.index(link)] for part in q)
         normal = direction(link, angle + ca.pi / 2)
-        return rods[link].length * (change * normal - rate**2 * direction(link, angle))
+        return rod(link).length_m * (change * normal - rate**2 * direction(link, angle))
 
     place = sum_along_links("A'", ankle.position, position)
     pushed = centres(sum_along_links("A'", ankle.acceleration, acceleration))

@@ -40,9 +40,8 @@ from nlp_gait.gaits.stairs.closed_loop import (
     Scheme,
 )
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
-from nlp_gait.gaits.stairs.planar_biped import LINKS
+from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import StepKind
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Gains = Literal["scalar", "per-joint"]

@@ -14,7 +14,7 @@ from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.stairs.robot import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import toe_foot_biped
 from nlp_gait.gaits.stairs.stair import CASES, PAPER_TIMES
 
 # Best of 20 starts, case 2 of Table IV.

@@ -8,19 +8,17 @@ import pytest
 from casadi import SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.bodies import toe_foot_biped
-from nlp_gait.gaits.stairs.planar_biped import ENDS, LINKS, link_angles, loads, points
+from nlp_gait.gaits.stairs.planar_biped import ENDS, LINKS, link_angles, loads, points, toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import StairPlan, foot_angles
 
 GRAVITY, STEP = 9.81, 1e-4
-RODS = toe_foot_biped().rods
 # Differences of positions along a parabola: the third derivative and rounding remain.
 TOLERANCE = 1e-5
 
 
 def positions() -> ca.Function:
     q = SX.sym("q", 7)
-    found = points(RODS, link_angles(q), SX(2, 1))
+    found = points(link_angles(q), SX(2, 1))
     return ca.Function("ends", [q], [ca.horzcat(*(ca.horzcat(found[a], found[b]) for a, b in ENDS.values()))])
 
 
@@ -29,14 +27,14 @@ def momenta(ends: ca.Function, q: Array, v: Array) -> tuple[Array, float, float]
     before, now, later = (np.array(ends(q + sign * STEP * v)) for sign in (-1, 0, 1))
     momentum, spin, weight = np.zeros(2), 0.0, 0.0
     for k, link in enumerate(ENDS):
-        rod = RODS[link]
+        rod = toe_foot_biped().link(link)
         middles = [(at[:, 2 * k] + at[:, 2 * k + 1]) / 2 for at in (before, now, later)]
         angles = [np.arctan2(*(at[:, 2 * k + 1] - at[:, 2 * k])[::-1]) for at in (before, later)]
         rate = (middles[2] - middles[0]) / (2 * STEP)
         turn = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
-        momentum += rod.mass * rate
-        spin += rod.mass * (middles[1][0] * rate[1] - middles[1][1] * rate[0]) + rod.inertia * turn / (2 * STEP)
-        weight -= rod.mass * GRAVITY * middles[1][0]
+        momentum += rod.mass_kg * rate
+        spin += rod.mass_kg * (middles[1][0] * rate[1] - middles[1][1] * rate[0]) + rod.inertia_kgm2 * turn / (2 * STEP)
+        weight -= rod.mass_kg * GRAVITY * middles[1][0]
     return momentum, spin, weight
 
 
@@ -46,9 +44,9 @@ def test_force_and_pressure_balance_all_momenta(moving: float) -> None:
     q = np.array([1.4, 1.9, 1.5, 1.4, 1.2, 0.1, 0.2])[: len(LINKS) - 2] + rng.uniform(-0.1, 0.1, 7)
     v, a = moving * rng.uniform(-1, 1, 7), moving * rng.uniform(-1, 1, 7)
     symbols = [SX.sym(name, 7) for name in ("q", "v", "a")]
-    found = loads(RODS, GRAVITY, *symbols, {})
+    found = loads(*symbols, {})
     force, pressure = map(np.array, ca.Function("loads", symbols, [found.stance_force, found.stance_pressure])(q, v, a))
-    ends, mass = positions(), sum(rod.mass for rod in RODS.values())
+    ends, mass = positions(), toe_foot_biped().mass_kg
     early, late = (momenta(ends, q + sign * STEP * v + a * STEP**2 / 2, v + sign * STEP * a) for sign in (-1, 1))
     _, _, weight = momenta(ends, q, v)
     assert force.ravel() == pytest.approx(

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.gaits.stairs.robot import DEFAULT_FILE, PlanarLink, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import DEFAULT_FILE, PlanarLink, toe_foot_biped
 
 
 def test_the_papers_robot() -> None:
     robot = toe_foot_biped()
     assert robot.mass_kg == pytest.approx(51.7)  # Table I
     assert robot.foot_m == pytest.approx(0.17)
-    assert robot.rods["HK"].inertia == pytest.approx(6.0 * 0.4**2 / 12)
+    assert robot.link("HK").inertia_kgm2 == pytest.approx(6.0 * 0.4**2 / 12)
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
