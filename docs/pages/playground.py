@@ -30,8 +30,8 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_goal
 from nlp_gait.gaits.biped.samples import BOTH_FEET
-from nlp_gait.gaits.biped.single_support import make_single_support_phase
 from nlp_gait.gaits.biped.skeleton import ON_GROUND, make_level_sole, place_links
+from nlp_gait.gaits.biped.support_phases import make_single_support_phase
 from nlp_gait.gaits.nao.body import connect_joints, make_nao
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics

@@ -80,6 +80,14 @@ def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Param
     )
 
 
+def variables(*table: tuple[str, str, float, float, str]) -> tuple[Variable, ...]:
+    """Return variables from a table of name, unit, lower and upper bound, and description."""
+    return tuple(
+        Variable(name=name, unit=unit, lower=lower, upper=upper, description=text)
+        for name, unit, lower, upper, text in table
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
     """Instants at which a problem evaluates its motion."""

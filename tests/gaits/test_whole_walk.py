@@ -15,7 +15,7 @@ from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, find_walk,
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
-from nlp_gait.gaits.biped.walk_start import start_from_cycle
+from nlp_gait.gaits.biped.walk_parts import start_from_cycle
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import Conditions
 from nlp_gait.symbolic.dynamics import tilt_gravity

@@ -14,6 +14,7 @@ from casadi import MX, SX, fmax
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
+from nlp_gait.formulation.assembly import variables
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
@@ -179,10 +180,7 @@ class Body(ABC):
             for end in ("start", "end"):
                 limits = self.scale_time(min(least, least * self.swing_speed)), self.scale_time(most * self.swing_speed)
                 rows.append((f"hip_v{axis}_{end}_m_s", "m/s", *limits, f"{word} velocity at the {end}"))
-        return tuple(
-            Variable(name=name, unit=unit, lower=lower, upper=upper, description=text)
-            for name, unit, lower, upper, text in rows
-        )
+        return variables(*rows)
 
     def split_hip(
         self, splines: Splines, along: tuple[float, float], across: tuple[float, float]
@@ -218,13 +216,8 @@ class Body(ABC):
         """Return the duration of a phase."""
         least, most = {"ssp": (0.4, 4.0), "dsp": (0.2, 2.0)}[phase]
         word = {"ssp": "from lift-off to touch-down", "dsp": "from touch-down to the next lift-off"}[phase]
-        return Variable(
-            name=TIMES[phase],
-            unit="s",
-            lower=self.scale_time(least / self.swing_speed),
-            upper=self.scale_time(most),
-            description=word,
-        )
+        lower, upper = self.scale_time(least / self.swing_speed), self.scale_time(most)
+        return Variable(name=TIMES[phase], unit="s", lower=lower, upper=upper, description=word)
 
     def narrow(self, variable: Variable) -> Variable:
         """Return a variable with the bounds in proportion to NAO's, between which gaits start."""
@@ -232,11 +225,8 @@ class Body(ABC):
             return replace(variable, lower=min(variable.lower * self.swing_speed, variable.upper))
         if variable.unit not in TIMED_UNITS:
             return variable
-        return replace(
-            variable,
-            lower=max(variable.lower, variable.lower / self.swing_speed),
-            upper=variable.upper / self.swing_speed,
-        )
+        lower = max(variable.lower, variable.lower / self.swing_speed)
+        return replace(variable, lower=lower, upper=variable.upper / self.swing_speed)
 
     @property
     def angle_variables(self) -> tuple[Variable, ...]:

@@ -27,7 +27,7 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import CLOSURE_M
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.samples import BOTH_FEET
-from nlp_gait.gaits.biped.single_support import swing_foot
+from nlp_gait.gaits.biped.support_phases import swing_foot
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact
 from nlp_gait.symbolic.trajectories import Motion
 

@@ -15,6 +15,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
+from nlp_gait.formulation.assembly import variables
 from nlp_gait.symbolic.trajectories import Motion, add_motions, count_coefficients, cubic, spline, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
@@ -58,20 +59,14 @@ class Splines:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Coefficients, curve by curve."""
-        return tuple(
-            Variable(
-                name=f"{curve}_{unit}[{k}]",
-                unit=unit,
-                lower=-self._bound(unit),
-                upper=self._bound(unit),
-                description=f"coefficient {k} of the spline on {curve}",
+        bounds = BOUNDS | {"m": BOUNDS["m"] * self.length_scale}
+        return variables(
+            *(
+                (f"{curve}_{unit}[{k}]", unit, -bounds[unit], bounds[unit], f"coefficient {k} of the spline on {curve}")
+                for curve, unit in self.units.items()
+                for k in range(self.count)
             )
-            for curve, unit in self.units.items()
-            for k in range(self.count)
         )
-
-    def _bound(self, unit: str) -> float:
-        return BOUNDS[unit] * (self.length_scale if unit == "m" else 1.0)
 
     def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
         """Return what each curve adds to its cubic."""
@@ -94,15 +89,16 @@ class Splines:
         return start
 
 
-def hip_motion(
+def hip_on_spline(
     at: InstantPoint,
+    more: Mapping[str, Motion],
     along: tuple[float, float],
     across: tuple[float, float],
     duration: SX,
     phase: SX,
     is_measured: bool = False,
 ) -> Motion:
-    """Return the hip's motion as cubics in x, y and z (3,) [m], ``along`` and ``across`` from end to end [m].
+    """Return the hip's motion (3,) [m]: the paper's cubics ``along`` and ``across`` from end to end, and what each curve adds.
 
     Height and velocities are the variables hip_height_m and hip_v<axis>_<end>_m_s. Measured, the place at the start is that of
     the parameters hip_<axis>_start_m.
@@ -114,26 +110,11 @@ def hip_motion(
     ends = {"x": (SX(along[0]), SX(along[1])), "y": (SX(across[0]), SX(across[1])), "z": (height, height)}
     if is_measured:
         ends = {axis: (at[f"hip_{axis}_start_m"], end) for axis, (_, end) in ends.items()}
-    return stack(
-        *(
-            cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
-            for axis, (start, end) in ends.items()
-        )
+    paper = (
+        cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
+        for axis, (start, end) in ends.items()
     )
-
-
-def hip_on_spline(
-    at: InstantPoint,
-    more: Mapping[str, Motion],
-    along: tuple[float, float],
-    across: tuple[float, float],
-    duration: SX,
-    phase: SX,
-    is_measured: bool = False,
-) -> Motion:
-    """Return the hip's motion (3,) [m]: the paper's (see ``hip_motion``), and what each curve adds."""
-    paper = hip_motion(at, along, across, duration, phase, is_measured)
-    return add_motions(paper, stack(*(more[curve] for curve in HIP_CURVES)))
+    return add_motions(stack(*paper), stack(*(more[curve] for curve in HIP_CURVES)))
 
 
 def make_grid(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:

@@ -32,13 +32,6 @@ from nlp_gait.formulation.assembly import parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
-from nlp_gait.gaits.biped.double_support import (
-    Box,
-    Point2,
-    compute_double_support_mean_margins,
-    compute_margins,
-    make_support_box,
-)
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import (
     BALANCE,
@@ -48,12 +41,19 @@ from nlp_gait.gaits.biped.joined_phases import (
     join_phases,
     list_rows_over_time,
 )
-from nlp_gait.gaits.biped.limits import Limit, Margins, make_rows
+from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, make_rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
-from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
+from nlp_gait.gaits.biped.support_phases import (
+    Box,
+    compute_margins,
+    limit_to_box,
+    limit_to_sole,
+    make_single_support_loads,
+    make_support_box,
+)
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"
@@ -188,7 +188,7 @@ def make_walking_cycle(
             plan=plan,
             loads=loads,
             grid=grid,
-            limits=(*make_phase_limits(body, *margins[name]), *body.motors.limits, *more),
+            limits=(*make_phase_limits(body, margins[name]), *body.motors.limits, *more),
             goal=goal,
         )
         for name, (plan, loads, more) in own.items()
@@ -196,8 +196,8 @@ def make_walking_cycle(
     return WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=at_given_speed)
 
 
-def make_cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
-    """Return the balance margins of each phase, and the default of the least mean ones in x and y [m]."""
+def make_cycle_margins(body: Body) -> dict[PhaseName, BalanceMargins]:
+    """Return the balance margins of each phase."""
     feet, (left_y, right_y) = body.robot.feet, body.feet_y
     usual = make_support_box(body.robot, {"L": (0.0, left_y), "R": (body.step_length_m, right_y)})
 
@@ -208,10 +208,7 @@ def make_cycle_margins(body: Body) -> dict[PhaseName, tuple[Margins, Point2]]:
         front = ca.fmax(feet["left"].front_m, step + feet["right"].front_m)
         return compute_margins(Box(back=back, front=front, right=usual.right, left=usual.left), zmp, ops)
 
-    return {
-        "ssp": (body.make_sole_margins((0.0, left_y)), compute_single_support_mean_margins(feet["left"])),
-        "dsp": (double, compute_double_support_mean_margins(usual)),
-    }
+    return {"ssp": limit_to_sole(body, (0.0, left_y)), "dsp": limit_to_box(usual, double)}
 
 
 def plan_cycle(body: Body, grid: Grid, objective: CycleObjective, sharing: LoadSharing) -> GaitProblem:

@@ -13,11 +13,12 @@ from typing import NamedTuple
 from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
+from nlp_gait.formulation.assembly import variables
 from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, PhaseName, read_duration
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
-from nlp_gait.gaits.biped.single_support import swing_foot
+from nlp_gait.gaits.biped.support_phases import swing_foot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, stack
 
@@ -79,16 +80,14 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     for c in body.coordinates:
         table.append((c.name, "rad", *c.bounds, c.words))
         table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
-    return [
-        Variable(
-            name=f"{what}_{name}_{SUFFIXES[unit]}",
-            unit=unit,
-            lower=lower,
-            upper=upper,
-            description=f"{words}, {at}",
+    return list(
+        variables(
+            *(
+                (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {at}")
+                for what, unit, lower, upper, words in table
+            )
         )
-        for what, unit, lower, upper, words in table
-    ]
+    )
 
 
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
@@ -150,9 +149,10 @@ def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -
 
 def between(start: State, end: State, duration: SX, phase: SX) -> tuple[Motion, tuple[Motion, ...]]:
     """Motion of the hip (3,) [m] and of every coordinate [rad] from state to state."""
-    ends = zip(*(vertsplit(part) for part in (start.hip, end.hip, start.hip_velocity, end.hip_velocity)), strict=True)
-    hip = stack(*(cubic(a, b, va, vb, duration, phase) for a, b, va, vb in ends))
-    angles = zip(
-        *(vertsplit(part) for part in (start.others, end.others, start.others_rate, end.others_rate)), strict=True
-    )
-    return hip, tuple(cubic(a, b, va, vb, duration, phase) for a, b, va, vb in angles)
+
+    def curves(*ends: SX) -> tuple[Motion, ...]:
+        columns = zip(*map(vertsplit, ends), strict=True)
+        return tuple(cubic(a, b, va, vb, duration, phase) for a, b, va, vb in columns)
+
+    hip = curves(start.hip, end.hip, start.hip_velocity, end.hip_velocity)
+    return stack(*hip), curves(start.others, end.others, start.others_rate, end.others_rate)

@@ -37,7 +37,7 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, R
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
-from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins
+from nlp_gait.gaits.biped.support_phases import compute_sole_means
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
 from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, make_phase_variables, make_pose_variables
 from nlp_gait.gaits.several_steps import join_steps
@@ -182,7 +182,7 @@ def make_stance_margins(body: Body, right: Foothold) -> BalanceMargins:
     """Return the limit of the ZMP to the hull of both soles; the mean margins are those of a single sole."""
     left, soles = Foothold(0.0, body.feet_y[0], 0.0), body.robot.feet
     sides = find_support_sides([left.outline(soles["left"]), right.outline(soles["right"])])
-    return BalanceMargins(make_polygon_margins(sides), compute_single_support_mean_margins(soles["left"]))
+    return BalanceMargins(make_polygon_margins(sides), compute_sole_means(soles["left"]))
 
 
 def make_polygon_margins(sides: Array) -> Margins:
@@ -249,7 +249,7 @@ def plan_footstep_walk(
     phases = make_walk_phases(body, (*others[:-1], *given), planners, sharing, grid, goal)
     sole, margins = body.robot.feet["left"], body.make_sole_margins((0.0, body.feet_y[0]))
     least = round((sole.back_m + sole.front_m) * LEAST_SHARE, 4), round((sole.left_m + sole.right_m) * LEAST_SHARE, 4)
-    single = BalanceMargins(margins, compute_single_support_mean_margins(sole), least)
+    single = BalanceMargins(margins, compute_sole_means(sole), least)
     phases["ssp"] = replace_margins(phases["ssp"], single)
     phases["dsp"] = replace_margins(phases["dsp"], make_stance_margins(body, feet[0]))
     variables = make_footstep_variables(body, steps)

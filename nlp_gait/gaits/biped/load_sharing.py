@@ -19,6 +19,7 @@ from casadi import MX, SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Point, Start, Variable
 from nlp_gait.formulation.assembly import parameters as table
+from nlp_gait.formulation.assembly import variables
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
@@ -125,17 +126,14 @@ class PlannedLoad(LoadSharing):
         weight = self._weight
         along, across = max(foot.front_m, foot.back_m), max(foot.left_m, foot.right_m)
         most = dict(zip(COMPONENTS, (0.5, 0.5, 2.0, across, along, across), strict=True))
-        return tuple(
-            Variable(
-                name=f"right_{component}_{unit}[{k}]",
-                unit=unit,
-                lower=-(weight if component == "force_z" else round(share * weight, 3)),
-                upper=round(share * weight, 3),
-                description=f"coefficient {k} of the ground's {component.replace('_', ' along ')} on the right sole",
-            )
-            for (component, unit), share in zip(COMPONENTS.items(), most.values(), strict=True)
-            for k in range(self._count)
-        )
+        rows: list[tuple[str, str, float, float, str]] = []
+        for component, unit in COMPONENTS.items():
+            upper = round(most[component] * weight, 3)
+            text = f"of the ground's {component.replace('_', ' along ')} on the right sole"
+            lower = -weight if component == "force_z" else -upper
+            for k in range(self._count):
+                rows.append((f"right_{component}_{unit}[{k}]", unit, lower, upper, f"coefficient {k} {text}"))
+        return variables(*rows)
 
     def add_to(self, plan: Planner) -> Planner:
         names = [variable.name for variable in self.variables]

@@ -35,7 +35,6 @@ from nlp_gait.gaits.biped.limits import (
     DriveLimits,
     JointLimits,
     Limit,
-    Margins,
     Reach,
     TorqueChange,
 )
@@ -63,13 +62,10 @@ def make_goal(body: Body, criterion: Criterion) -> Goal:
     return Goal(heat=heat) if motors.power is None else Goal(heat=heat, power=motors.power)
 
 
-def make_phase_limits(
-    body: Body, margins: Margins, mean_limits_m: tuple[float, float], *, solved: bool = True
-) -> tuple[Limit, ...]:
+def make_phase_limits(body: Body, balance: BalanceMargins, *, solved: bool = True) -> tuple[Limit, ...]:
     """Return the limits of every phase (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2), and those of the robot's drives.
 
-    Defaults of the least mean margins in x and y are in metres. ``solved`` says that the legs' angles are computed from their
-    feet.
+    ``solved`` says that the legs' angles are computed from their feet.
     """
     size = body.torque_scale
     return (
@@ -78,7 +74,7 @@ def make_phase_limits(
         *((Closure(),) if solved and not body.closed_form else ()),
         TorqueChange(size),
         *((DriveLimits(body.robot, size),) if body.drive_limits else ()),
-        BalanceMargins(margins, mean_limits_m),
+        balance,
     )
 
 

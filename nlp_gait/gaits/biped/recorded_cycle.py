@@ -29,11 +29,6 @@ from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
-from nlp_gait.gaits.biped.double_support import (
-    compute_double_support_mean_margins,
-    make_double_support_margins,
-    make_support_box,
-)
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
@@ -41,7 +36,12 @@ from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, Motion, make_instant_function
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader, Planner, Samples
-from nlp_gait.gaits.biped.single_support import compute_single_support_mean_margins, make_single_support_loads
+from nlp_gait.gaits.biped.support_phases import (
+    limit_to_box,
+    limit_to_sole,
+    make_single_support_loads,
+    make_support_box,
+)
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 MOVES = 1e-9  # [rad]; a joint that turns by less is held
@@ -264,13 +264,11 @@ def make_recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, gri
     left = body.support[:2]
     own: Limit
     if name == "ssp":
-        margins, means = body.make_sole_margins(left), compute_single_support_mean_margins(body.robot.feet["left"])
-        own = SwingLimits(motion, body.lift_variable)
+        balance, own = limit_to_sole(body, left), SwingLimits(motion, body.lift_variable)
     else:
         foot = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))
         x, y = (foot[:, :2].mean(axis=0) + (0.0, left[1])).tolist()
-        box = make_support_box(body.robot, {"L": left, "R": (x, y)})
-        margins, means = make_double_support_margins(box), compute_double_support_mean_margins(box)
+        balance = limit_to_box(make_support_box(body.robot, {"L": left, "R": (x, y)}))
         own = StandingLimits()
     phase = RecordedPhase(
         body=body,
@@ -278,7 +276,7 @@ def make_recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, gri
         duration=TIMES[name],
         loads=make_recorded_loads(body, "printed")[name],
         grid=grid,
-        limits=(*make_phase_limits(body, margins, means, solved=False), HipLimits(ends, ("start", "end")), own),
+        limits=(*make_phase_limits(body, balance, solved=False), HipLimits(ends, ("start", "end")), own),
         goal=Goal(heat=body.heat),
         recorded=motion,
     )
@@ -331,7 +329,7 @@ class RecordedCycles:
                 duration=TIMES[name],
                 loads=loads,
                 grid=grid,
-                limits=(*make_phase_limits(body, *margins[name], solved=False), *own[name]),
+                limits=(*make_phase_limits(body, margins[name], solved=False), *own[name]),
                 goal=Goal(heat=body.heat),
                 recorded=motions[name],
             )

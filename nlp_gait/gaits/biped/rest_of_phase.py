@@ -47,7 +47,7 @@ from nlp_gait.gaits.biped.limits import (
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Samples
-from nlp_gait.gaits.biped.single_support import make_single_support_loads
+from nlp_gait.gaits.biped.support_phases import make_single_support_loads
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack
 

@@ -43,11 +43,6 @@ from nlp_gait.gaits.biped.cycle_motion import (
     make_state_variables,
     read_state,
 )
-from nlp_gait.gaits.biped.double_support import (
-    compute_double_support_mean_margins,
-    make_double_support_margins,
-    make_support_box,
-)
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import (
@@ -63,7 +58,7 @@ from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Planner, Samples
-from nlp_gait.gaits.biped.single_support import make_single_support_loads
+from nlp_gait.gaits.biped.support_phases import limit_to_box, make_single_support_loads, make_support_box
 from nlp_gait.gaits.biped.walk_parts import (
     CYCLE_END,
     DURATION,
@@ -76,8 +71,8 @@ from nlp_gait.gaits.biped.walk_parts import (
     Part,
     make_phase_variables,
     make_walk_variables,
+    start_walk,
 )
-from nlp_gait.gaits.biped.walk_start import start_walk
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -263,7 +258,6 @@ def make_walk_phases(
     """Return the phases by kind; planners are those of a right foot that stands, and of one that swings."""
     margins = make_cycle_margins(body)
     box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
-    beside = make_double_support_margins(box), compute_double_support_mean_margins(box)
     return {
         kind: Phase(
             body=body,
@@ -272,10 +266,10 @@ def make_walk_phases(
             plan=planners[kind == "ssp"],
             loads=make_single_support_loads(body) if kind == "ssp" else sharing.loads,
             grid=grid,
-            limits=(*make_phase_limits(body, *own), *body.motors.limits),
+            limits=(*make_phase_limits(body, own), *body.motors.limits),
             goal=goal,
         )
-        for kind, own in {"ssp": margins["ssp"], "dsp": margins["dsp"], STAND: beside}.items()
+        for kind, own in {"ssp": margins["ssp"], "dsp": margins["dsp"], STAND: limit_to_box(box)}.items()
     }
 
 

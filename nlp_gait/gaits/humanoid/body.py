@@ -13,12 +13,13 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
+from nlp_gait.formulation.assembly import variables
 from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
-from nlp_gait.gaits.biped.single_support import make_nearest_edge_margins
+from nlp_gait.gaits.biped.support_phases import make_nearest_edge_margins
 from nlp_gait.gaits.humanoid.swing_time import GRAVITY, NAO_SWING_S, STEP_M, compare_swing
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped_model
@@ -72,16 +73,12 @@ class Humanoid(Body):
     @property
     def angle_variables(self) -> tuple[Variable, ...]:
         """Lean of the torso at both ends of a phase, where it is at rest."""
-        return tuple(
-            Variable(
-                name=f"{name}_{end}_rad",
-                unit="rad",
-                lower=-largest,
-                upper=largest,
-                description=f"{name.replace('_', ' ')} at the {end}",
+        return variables(
+            *(
+                (f"{name}_{end}_rad", "rad", -largest, largest, f"{name.replace('_', ' ')} at the {end}")
+                for name, largest in LARGEST_LEAN.items()
+                for end in ("start", "end")
             )
-            for name, largest in LARGEST_LEAN.items()
-            for end in ("start", "end")
         )
 
     def angle_names(self, phase: PhaseName) -> tuple[str, ...]:

@@ -8,14 +8,13 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
-from nlp_gait.gaits.biped.double_support import plan_double_support
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
-from nlp_gait.gaits.biped.single_support import plan_single_support
+from nlp_gait.gaits.biped.support_phases import plan_double_support, plan_single_support
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.humanoid.turning import check_turns

@@ -31,7 +31,7 @@ from nlp_gait.gaits.biped.limits import (
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FreeParts, locate_free_parts
 from nlp_gait.gaits.biped.samples import Instant, Samples
-from nlp_gait.gaits.biped.single_support import make_single_support_phase
+from nlp_gait.gaits.biped.support_phases import make_single_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
 from nlp_gait.robots import Robot

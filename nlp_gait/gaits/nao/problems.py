@@ -15,7 +15,6 @@ from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, PhaseTrajectory, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
-from nlp_gait.gaits.biped.double_support import hip_ends, make_double_support_phase, place_soles, plan_double_support
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.goals import Goal
@@ -29,7 +28,14 @@ from nlp_gait.gaits.biped.recorded_cycle import (
     make_refinable,
 )
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, make_places_function
-from nlp_gait.gaits.biped.single_support import place_stance, plan_single_support
+from nlp_gait.gaits.biped.support_phases import (
+    hip_ends,
+    make_double_support_phase,
+    place_soles,
+    place_stance,
+    plan_double_support,
+    plan_single_support,
+)
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase

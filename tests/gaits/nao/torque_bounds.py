@@ -16,8 +16,8 @@ from casadi import DM, SX
 import nlp_gait
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench.facts import load_facts
-from nlp_gait.gaits.biped.curves import hip_motion
-from nlp_gait.gaits.biped.single_support import place_stance, swing_foot
+from nlp_gait.gaits.biped.curves import HIP_CURVES, hip_on_spline
+from nlp_gait.gaits.biped.support_phases import place_stance, swing_foot
 from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, find_upright_links, make_nao, upright_plan
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
@@ -27,7 +27,7 @@ from nlp_gait.robots.tree import Body, tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
+from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic_of_sums, resting_point, stack
 
 STEP_M, PHASE, REACH_MARGIN = 0.06, 0.3, 0.01
 
@@ -164,7 +164,8 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
         ]
         hip = stack(parts[1], parts[2], parts[0])
     else:
-        hip = hip_motion(at, stance.hip_x, stance.hip_y, time, phase)
+        still = dict.fromkeys(HIP_CURVES, constant_motion(0.0))
+        hip = hip_on_spline(at, still, stance.hip_x, stance.hip_y, time, phase)
     path = (SX(end) for end in stance.swing_x)
     swing = swing_foot(*path, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], time, phase)
     ankles = {"L": resting_point((*stance.support_xy, foot.ankle_height_m)), "R": swing}

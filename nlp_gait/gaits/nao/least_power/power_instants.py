@@ -13,9 +13,8 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.biped.double_support import Point2, make_support_box
 from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
-from nlp_gait.gaits.biped.single_support import swing_foot
+from nlp_gait.gaits.biped.support_phases import Point2, make_support_box, swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power.world_frame import (

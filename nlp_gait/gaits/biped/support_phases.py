@@ -1,0 +1,271 @@
+"""Single support on the left foot, while the right one swings by two steps, and double support with the right one a step ahead.
+
+Phases of sections 3 and 4 of Gupta, Pratihar, Deb (2023), with the margins of the ZMP on a sole and around both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
+
+import casadi as ca
+from casadi import DM, MX, SX
+
+from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State, read_duration
+from nlp_gait.gaits.biped.curves import PhaseTrajectory, Splines, hip_on_spline
+from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Margins
+from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.phase import Derivatives, Phase
+from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
+from nlp_gait.robots import Foot, Robot
+from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import (
+    Motion,
+    add_motions,
+    constant_motion,
+    cubic,
+    parabola_lift,
+    resting_point,
+    stack,
+)
+
+# Least mean margins: 0.05 m and 0.02 m on NAO's sole of 0.15 m by 0.08 m (section 4.1); 0.08 m in the box of 0.21 m by 0.18 m
+# around both soles (section 4.2).
+SOLE_SHARES, BOX_SHARES = (1 / 3, 1 / 4), (8 / 21, 4 / 9)
+
+Point2: TypeAlias = tuple[float, float]
+Side = TypeVar("Side", float, MX)
+
+
+class Box(NamedTuple, Generic[Side]):
+    """Sides of a rectangle [m]."""
+
+    back: Side
+    front: Side
+    right: float
+    left: float
+
+
+def make_support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
+    """Return the rectangle around both soles, whose ankles are at ``soles`` by side [m]."""
+    feet = {side: robot.feet[foot] for side, foot in BOTH_FEET.items()}
+    return Box(
+        back=min(soles[side][0] - foot.back_m for side, foot in feet.items()),
+        front=max(soles[side][0] + foot.front_m for side, foot in feet.items()),
+        right=min(soles[side][1] - foot.right_m for side, foot in feet.items()),
+        left=max(soles[side][1] + foot.left_m for side, foot in feet.items()),
+    )
+
+
+def compute_margins(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
+    """Compute the distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
+    x, y = zmp[0, :].T, zmp[1, :].T
+    return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T
+
+
+def make_nearest_edge_margins(support_xy: Point2, foot: Foot) -> Margins:
+    """Return the distances of the ZMP to the nearer edges of one sole in x and in y, whose ankle is at ``support_xy`` [m]."""
+    sole = Box(back=-foot.back_m, front=foot.front_m, right=-foot.right_m, left=foot.left_m)
+    return lambda zmp, at, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
+
+
+def compute_mean_margins(shares: Point2, length: float, width: float) -> Point2:
+    """Return the least mean balance margins in x and y as shares of a support, to a tenth of a millimetre [m]."""
+    return round(shares[0] * length, 4), round(shares[1] * width, 4)
+
+
+def limit_to_sole(body: Body, support_xy: Point2) -> BalanceMargins:
+    """Return the limit of the ZMP on the left sole, whose ankle is at ``support_xy`` [m]."""
+    return BalanceMargins(body.make_sole_margins(support_xy), compute_sole_means(body.robot.feet["left"]))
+
+
+def compute_sole_means(foot: Foot) -> Point2:
+    """Return the least mean margins on one sole [m]."""
+    return compute_mean_margins(SOLE_SHARES, foot.back_m + foot.front_m, foot.left_m + foot.right_m)
+
+
+def limit_to_box(box: Box[float], margins: Margins | None = None) -> BalanceMargins:
+    """Return the limit of the ZMP in the box around both soles (Fig. 8 (b)); other margins may replace the box's own."""
+    return BalanceMargins(
+        margins or (lambda zmp, at, ops: compute_margins(box, zmp, ops)),
+        compute_mean_margins(BOX_SHARES, box.front - box.back, box.left - box.right),
+    )
+
+
+class Stance(NamedTuple):
+    """Place of the left foot, and paths of the right foot and of the hip [m]."""
+
+    support_xy: Point2
+    swing_x: Point2
+    swing_y: float
+    hip_x: Point2
+    hip_y: Point2
+
+
+def place_stance(body: Body, step_m: float) -> Stance:
+    """Place each foot below its own hip joint, and the hip halfway to the supporting one (section 4.1, Table 3)."""
+    left, right = body.feet_y
+    return Stance((step_m, left), (0.0, 2 * step_m), right, (step_m / 2, 1.5 * step_m), (left / 2, left / 2))
+
+
+def place_soles(body: Body, step_m: float) -> dict[str, Point2]:
+    """Place the ankles on the ground: the right foot a step ahead, each below its own hip joint (section 4.2) [m]."""
+    left, right = body.feet_y
+    return {"L": (step_m, left), "R": (2 * step_m, right)}
+
+
+def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
+    """Return the hip's place at both ends of double support in x and in y [m].
+
+    The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, and from halfway to the left
+    foot to halfway to the right one.
+    """
+    (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
+    sixth = (front_x - rear_x) / 6
+    return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)
+
+
+def plan_single_support(
+    body: Body,
+    step_m: float,
+    grid: Grid,
+    trajectory: PhaseTrajectory,
+    goal: Goal,
+    derivatives: Derivatives = "analytic",
+) -> GaitProblem:
+    """Return the problem of single support; for the options see ``gaits.nao``."""
+    splines = body.make_splines("ssp", trajectory)
+    phase = make_single_support_phase(body, step_m, splines, grid, goal, derivatives)
+    return make_phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
+
+
+def plan_double_support(
+    body: Body,
+    step_m: float,
+    grid: Grid,
+    trajectory: PhaseTrajectory,
+    goal: Goal,
+    sharing: LoadSharing,
+    derivatives: Derivatives = "analytic",
+) -> GaitProblem:
+    """Return the problem of double support; for the options see ``gaits.nao``."""
+    splines = body.make_splines("dsp", trajectory)
+    phase = make_double_support_phase(body, step_m, splines, sharing, grid, goal, derivatives)
+    start = sharing.start(phase.names, splines.start_of(phase.names))
+    return make_phase_problem("dsp", "double support: least mean power", phase, start=start)
+
+
+def make_single_support_phase(
+    body: Body, step_m: float, splines: Splines, grid: Grid, goal: Goal, derivatives: Derivatives = "analytic"
+) -> Phase:
+    """Return the phase from rest behind the standing foot to rest in front of it, with feet ``step_m`` apart."""
+    stance = place_stance(body, step_m)
+    hip, measured = body.split_hip(splines, stance.hip_x, stance.hip_y)
+    left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
+
+    def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
+        """The paper's motion of the right foot at a height, and what its curves add."""
+        time, (begin, end) = read_duration(at, "ssp"), stance.swing_x
+        paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
+        return add_motions(paper, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
+
+    def state(at: InstantPoint, s: SX) -> State:
+        time = read_duration(at, "ssp")
+        more = splines.motions(at, time, s)
+        hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, time, s, splines.is_measured)
+        return hip, body.angles("ssp", at, more, time, s), {"L": left, "R": swing(at, more, right_height, s)}
+
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
+        return body.plan(*state(at, s), at[REACH_MARGIN], ops)
+
+    def sole(at: InstantPoint, s: SX) -> SX:
+        return swing(at, splines.motions(at, read_duration(at, "ssp"), s), 0.0, s).position
+
+    others = (body.lift_variable, body.make_time_variable("ssp"), *splines.variables)
+    return Phase(
+        body=body,
+        variables=(*hip, *body.angle_variables, *others),
+        duration=TIMES["ssp"],
+        plan=plan,
+        loads=make_single_support_loads(body),
+        grid=grid,
+        derivatives=derivatives,
+        limits=(
+            *make_phase_limits(body, limit_to_sole(body, stance.support_xy)),
+            *((FootClearance(sole, step_m, LIFT),) if splines.count else ()),
+            *body.make_curve_limits("ssp", splines.count, state),
+            *body.motors.limits,
+        ),
+        goal=goal,
+        state=measured,
+        kinks=splines.kinks,
+    )
+
+
+def make_double_support_phase(
+    body: Body,
+    step_m: float,
+    splines: Splines,
+    sharing: LoadSharing,
+    grid: Grid,
+    goal: Goal,
+    derivatives: Derivatives = "analytic",
+) -> Phase:
+    """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
+    soles = place_soles(body, step_m)
+    ends = hip_ends(body, soles)
+    hip, measured = body.split_hip(splines, *ends)
+    ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
+
+    def state(at: InstantPoint, s: SX) -> State:
+        time = read_duration(at, "dsp")
+        more = splines.motions(at, time, s)
+        hip = hip_on_spline(at, more, *ends, time, s, splines.is_measured)
+        return hip, body.angles("dsp", at, more, time, s), ankles
+
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
+        return body.plan(*state(at, s), at[REACH_MARGIN], ops)
+
+    others = (body.make_time_variable("dsp"), *splines.variables, *sharing.variables)
+    return Phase(
+        body=body,
+        variables=(*hip, *body.angle_variables, *others),
+        duration=TIMES["dsp"],
+        plan=sharing.add_to(plan),
+        loads=sharing.loads,
+        grid=grid,
+        derivatives=derivatives,
+        limits=(
+            *make_phase_limits(body, limit_to_box(make_support_box(body.robot, soles))),
+            *body.make_curve_limits("dsp", splines.count, state),
+            *body.motors.limits,
+            *sharing.limits,
+        ),
+        goal=goal,
+        state=measured,
+        kinks=splines.kinks,
+    )
+
+
+def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
+    """Return the motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
+    forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
+    rise = parabola_lift(forward, start_x, end_x, lift)
+    return stack(forward, constant_motion(y), rise._replace(position=rise.position + ankle_height))
+
+
+def make_single_support_loads(body: Body) -> Loader:
+    """Return a function of the torques from the left foot, which supports the robot, and of the ZMP under it."""
+    foot = body.robot.feet["left"]
+
+    def loads(now: Instant) -> Instant:
+        torques, wrench = body.compute_torques(foot.link, tuple(body.robot.joints), now.joints)
+        offset = zmp_of_wrench(wrench, foot.ankle_height_m, body.weight)
+        wrenches = {"L": shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
+        return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)
+
+    return loads
