@@ -11,7 +11,7 @@ From a robot to the first constraint, in reading order:
     Goal      what is minimised: power, torques or smoothness (``goals.py``)
     Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
 
-``single_support.py`` and ``double_support.py`` compose a phase, ``cycle.py`` joins both; ``phase_problem.py`` makes the problem.
+``support_phases.py`` composes a phase, ``cycle.py`` joins both; ``phase_problem.py`` makes the problem.
 ``load_sharing.py`` divides the load between two standing feet. ``recorded_*.py`` judge motions that are given as angles over
 time by the same limits, ``cart_table.py`` plans such a motion by the textbook.
 """
