@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
-from nlp_gait.backends.onboard.reduced_qp import LEAST_DAMPING, StepSolver
+from nlp_gait.backends.onboard.reduced_qp import LEAST_COST, LEAST_DAMPING, StepSolver
 from nlp_gait.backends.optima.optimum import find_optimum
 from nlp_gait.backends.optima.sensitivities import parameter_sensitivities
 from nlp_gait.backends.solve import solve
@@ -26,7 +26,6 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 # than this share of the variables' ranges.
 COST_ERROR, VIOLATION, SHORT = 1e-7, 1e-8, 1e-3
 SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays
-LEAST_COST = 0.1  # of which relative tolerances are taken
 # Longest step, as a share of the variables' ranges: shorter after a step that had to be shortened, or whose program failed.
 LONGEST, SHORTEN, SHORTEST = 0.25, 2.5, 1e-3
 # Factors of the damping after a program failed, and after a shortened or a full step.
