@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -17,13 +18,15 @@ from nlp_gait.export.solver import export_solver
 
 @pytest.mark.slow
 @pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
-def test_the_example_in_c_finds_casadis_numbers(tmp_path: Path) -> None:
+@pytest.mark.parametrize("flags", ["", "-DLANES=1"])
+def test_the_example_in_c_finds_casadis_numbers(tmp_path: Path, flags: str) -> None:
     problem = nlp_gait.load("walk12", quadrature="simpson")
     written = export_solver(problem, tmp_path)
     assert {file.name for file in written} == {"walk12_nlp.cpp", "walk12_nlp.h", "main.c", "build.sh"}
     header = (tmp_path / "walk12_nlp.h").read_text()
     assert "@" not in header and all(f"{v.name} [{v.unit}]" in header for v in problem.variables)
-    subprocess.run(["sh", str(tmp_path / "build.sh")], check=True, capture_output=True, timeout=300)
+    environment = {**os.environ, "CXXFLAGS": flags}
+    subprocess.run(["sh", str(tmp_path / "build.sh")], check=True, capture_output=True, timeout=300, env=environment)
     done = subprocess.run([str(tmp_path / "main")], check=True, capture_output=True, text=True, timeout=60)
     f, violation, slope, curvature, apart = (float(line[29:].split(",")[0]) for line in done.stdout.splitlines())
 
