@@ -2,12 +2,13 @@
 
 Four steps of the cheapest ``nao-cycle``. The pushes (50 ms on the torso) begin at N equidistant times of the second and third
 step, each walk with noise of its own seed. For each controller and direction (``--directions forward,...``) bisection finds the
-impulse at which at least half of the walks fall.
+impulse at which at least half of the walks fall. The last line has a bound on it for pushes from the side.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import replace
 from functools import partial
 
@@ -84,6 +85,24 @@ def measure(plan: Plan, name: str, walks: int, directions: list[str]) -> None:
     print(f"| {name} | {' | '.join([*cells, cost, *rest])} |", flush=True)
 
 
+def bound_sideways(plan: Plan, direction: str, walks: int) -> float:
+    """Return the impulse [N s] at which half of the walks fall at best, for a pendulum with the whole mass at its mean height.
+
+    A push towards a foot that stands moves the divergent component towards its outer edge, and no step can follow unless the legs
+    cross. All other pushes are taken as survived.
+    """
+    t, com = plan.signals.arrays["t"], plan.signals.arrays["com"]
+    rate = math.sqrt(plan.gravity / com[:, 2].mean())
+    dcm = com[:, 1] + np.gradient(com[:, 1], t) / rate
+    foot, sign = plan.robot.feet[direction], DIRECTIONS[direction][1]
+    half_width = foot.left_m if sign > 0 else foot.right_m
+    begins = plan.duration_s / STEPS * (1.0 + 2.0 * np.arange(walks) / walks)
+    stands = plan.stands(direction, begins) > 0.0
+    left = sign * (plan.at(f"{direction}_foot", begins)[:, 1] - np.interp(begins, t, dcm)) + half_width
+    largest = np.where(stands, plan.robot.mass_kg * rate * left, np.inf)
+    return float(np.sort(largest)[math.ceil(walks / 2) - 1])
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -99,6 +118,10 @@ def main() -> None:
     print(f"| controller | {' | '.join(directions)} | J/m | time per plan | 99th percentile | converge |")
     print("|---|" + "--:|" * (len(directions) + 4))
     list(map(partial(measure, plan, walks=arguments.walks, directions=directions), arguments.controllers))
+    bounds = [
+        f"{each} {bound_sideways(plan, each, arguments.walks):.1f} N s" for each in directions if DIRECTIONS[each][1]
+    ]
+    print(f"\nbound for a pendulum whose legs do not cross: {', '.join(bounds)}")
 
 
 if __name__ == "__main__":
