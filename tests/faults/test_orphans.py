@@ -62,7 +62,8 @@ def command_line(number: int) -> str:
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
 @pytest.mark.parametrize("name", ["SIGHUP", "SIGKILL"])
 def test_workers_end_with_the_study(name: str, tmp_path: Path) -> None:
-    study = start("compare", "walk12", "--algorithms", "pso", "--runs", "4", "--evaluations", "90000000", "--jobs", "2")
+    effort = ("--runs", "4", "--evaluations", "90000000", "--jobs", "2")
+    study = start("compare", "walk12", "--algorithms", "pso", *effort, "--out", str(tmp_path / "results"))
     try:
         wait_for(lambda: sum("loky" in command_line(child) for child in offspring(study.pid)) >= 2)
         time.sleep(1.0)  # the runs are in progress

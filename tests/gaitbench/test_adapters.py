@@ -126,8 +126,9 @@ def test_scipy_ends_at_the_best_known(instance: gaitbench.Instance) -> None:
 
 
 @pytest.mark.slow
-def test_pycma(instance: gaitbench.Instance) -> None:
+def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The worst row of each group; with it ``fmin_con2`` gets to a feasible point."""
+    monkeypatch.chdir(tmp_path)  # pycma makes a folder there
     cma = package("cma")
     arguments = instance.to("cma")
     constraints = arguments["constraints"](instance.best_x)
