@@ -32,6 +32,8 @@ PARENT_CHECKED_EVERY_S = 0.5
 STOP_CHECKED_EVERY_S = 0.05
 END_WITHIN_S = 5.0  # a child that is to end is killed after this time
 COUNTER_BYTES = 8
+# Of the process that removes what killed workers leave behind: that it is gone already.
+HIDDEN_WARNINGS = "ignore:resource_tracker"
 SPARE_DESCRIPTORS = 12  # that joblib needs beside one for each worker
 PR_SET_PDEATHSIG = 1
 
@@ -209,6 +211,8 @@ def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterat
     from joblib import Parallel, delayed  # costs 0.1 s to import
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+    if HIDDEN_WARNINGS not in sys.warnoptions:  # which joblib's processes inherit
+        sys.warnoptions.append(HIDDEN_WARNINGS)
     begin = {"initializer": exit_with_parent, "initargs": (os.getpid(),)}
     parallel = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, **begin)
     results: Generator[tuple[K, T], None, None] | None = None
