@@ -36,6 +36,7 @@ KINK = 1e-3  # least share of the price of |v|'s other row where v is zero
 # A |v| stays on the row of the last program if that costs less than this share of the cost.
 NEAR, LEAST_COST = 1e-4, 0.1
 TOLERATED = 0.1  # share of the predicted decrease that lifted variables on wrong rows may cost
+WORST = 0.1  # share of the highest of these costs, from which a lifted variable is kept in the program
 RANK = 1e-6  # singular values of active rows below this share of the largest are zero
 # Smallest curvature, relative to the largest: along active rows, and at first across them.
 LEAST_CURVATURE, LEAST_DAMPING = 1e-6, 1e-3
@@ -60,16 +61,18 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """The program in the problem's variables z, without kept lifted variables."""
+    """The program in the problem's variables z, without kept lifted variables, and without what is left to the bounds."""
 
+    ties: IntArray  #: (lifted,) chosen rows
     own: Array  #: (lifted,) derivatives of the chosen rows by their lifted variables
     divide: Callable[
         ..., Array
     ]  #: by the derivatives of the chosen rows by the lifted variables, or ("T") by their transpose
-    lifts: Array  #: (lifted, n + 1) lifted variables from (z, 1)
-    rows: Array  #: (m, n + 1) change of the rows from (z, 1)
+    lifts: Array  #: (lifted, n) lifted variables from z
+    rows: Array  #: (m, n) change of the rows from z
     hessian: Array  #: (n, n)
     linear: Array  #: (n,)
+    crossed: Array  #: (lifted, n) linear term from lifted variables
 
 
 class StepSolver:
@@ -107,18 +110,22 @@ class StepSolver:
         place = np.where(values == least.repeat(self._sizes), self._places, -1)
         return np.asarray(self._order[np.maximum.reduceat(place, self._groups)])
 
-    def solve(self, ties: IntArray, lower: Array, upper: Array, z_lower: Array, z_upper: Array) -> Step | None:
-        """Solve the program at the functions' point, where ``ties`` are the least rows; None if that fails.
+    def prepare(self, ties: IntArray) -> None:
+        """Set up the program at the functions' point, where ``ties`` are the least rows."""
+        self._program = self._reduce(self._keep_ties(ties))
+        is_active, self._is_kept = self._find_active()
+        self._bent = _make_convex(self._program.hessian, self._list_normals(is_active), self.damping)
+
+    def solve(self, lower: Array, upper: Array, z_lower: Array, z_upper: Array) -> Step | None:
+        """Solve the prepared program, also again with other values of the rows; None if that fails.
 
         Takes what is left to the bounds of the rows (m,) and of z (n,), negative and positive.
         """
-        at, n, first = self._functions, self.n, self._first
-        ties = self._keep_ties(ties)
-        program = self._reduce(ties, lower)
-        is_active, is_kept = self._find_active()
-        bent = _make_convex(program.hessian, self._list_normals(program, ties, is_active), self.damping)
+        at, n, first, program = self._functions, self.n, self._first, self._program
+        ties, is_kept, lift = program.ties, self._is_kept, program.divide(lower[program.ties])
+        shift, slope = at.rows_by_s @ lift, program.linear + lift @ program.crossed
         is_inside = lower == upper
-        is_inside[:first] |= is_active[:first]
+        is_inside[:first] |= np.abs(self._prices[:first]) > PRICED
         for _ in range(ROUNDS):
             is_inside[first:] = is_kept[self._owner]
             is_inside[ties] = False
@@ -127,39 +134,42 @@ class StepSolver:
             away[kept, range(len(kept))] = (self._sense * program.own)[kept]
             away = program.divide(away)
             rows_by_r = at.rows_by_s @ away
-            constant = program.rows[inside, n]
-            rows = np.concatenate([program.rows[inside, :n], rows_by_r[inside]], axis=1)
-            linear = np.concatenate([program.linear, at.gradient[n:] @ away])
-            found = self._solve_dense(
-                bent, linear, rows, inside, (lower[inside] - constant, upper[inside] - constant, z_lower, z_upper)
-            )
+            rows = np.concatenate([program.rows[inside], rows_by_r[inside]], axis=1)
+            linear = np.concatenate([slope, at.gradient[n:] @ away])
+            left = lower[inside] - shift[inside], upper[inside] - shift[inside], z_lower, z_upper
+            found = self._solve_dense(self._bent, linear, rows, inside, left)
             if found is None:
                 return None
             y, prices, relaxed = found
-            z, r = np.append(y[:n], 1.0), y[n:]
-            w = np.concatenate([y[:n], program.lifts @ z + away @ r])
+            z, r = y[:n], y[n:]
+            w = np.concatenate([z, program.lifts @ z + lift + away @ r])
             curved = at.hessian @ w
             multipliers = np.zeros(len(at.g))
             multipliers[inside] = prices[len(y) :]
             multipliers[ties] = program.divide(-(at.gradient + curved)[n:] - at.s_by_rows @ multipliers, "T")
             decrease = -float(at.gradient @ w + 0.5 * w @ curved)
-            change = program.rows @ z + rows_by_r @ r
+            change = program.rows @ z + shift + rows_by_r @ r
             violation = np.maximum(lower - change, change - upper)
             violation[ties] = violation[inside] = 0.0
             wrong = np.flatnonzero(violation > VIOLATED)
-            owners = self._owner[wrong[wrong >= first] - first]
-            missed = float(np.abs(multipliers[ties[owners]]) @ violation[wrong[wrong >= first]])
-            if len(owners) == len(wrong) and missed <= TOLERATED * abs(decrease) + VIOLATED:
+            own_rows, wrong = wrong[wrong < first], wrong[wrong >= first]
+            owners = self._owner[wrong - first]
+            missed = np.abs(multipliers[ties[owners]]) * violation[wrong]
+            if not own_rows.size and missed.sum() <= TOLERATED * abs(decrease) + VIOLATED:
                 break
-            is_inside[wrong] = is_kept[owners] = True
+            is_inside[own_rows] = True
+            is_kept[owners[missed >= WORST * missed.max(initial=0.0)]] = True
         self._prices, self._z_prices = multipliers, prices[:n]
-        return Step(w, multipliers, decrease, relaxed, lambda: self._estimate_rest(program, ties, bent, y[:n]))
+        priced = inside[(inside >= first) & (np.abs(prices[len(y) :]) > PRICED)]
+        self._is_kept = np.isin(np.arange(self.lifted), self._owner[priced - first])
+        return Step(w, multipliers, decrease, relaxed, lambda: self._estimate_rest(z))
 
-    def _estimate_rest(self, program: _Program, ties: IntArray, bent: Array, z: Array) -> float:
-        along = _split(self._list_normals(program, ties, self._find_active()[0]))[1]
-        gradient = along.T @ ((bent - program.hessian) @ z)
-        values, directions = np.linalg.eigh(along.T @ program.hessian @ along)
-        return 0.5 * float(np.sum((directions.T @ gradient) ** 2 / np.maximum(values, _least(program.hessian))))
+    def _estimate_rest(self, z: Array) -> float:
+        hessian = self._program.hessian
+        along = _split(self._list_normals(self._find_active()[0]))[1]
+        gradient = along.T @ ((self._bent - hessian) @ z)
+        values, directions = np.linalg.eigh(along.T @ hessian @ along)
+        return 0.5 * float(np.sum((directions.T @ gradient) ** 2 / np.maximum(values, _least(hessian))))
 
     def _keep_ties(self, ties: IntArray) -> IntArray:
         """Return the rows to choose: that with the highest price in the last program if it is near the least one."""
@@ -186,12 +196,12 @@ class StepSolver:
         is_active[self._first :] &= is_kept[self._owner]
         return is_active, is_kept
 
-    def _list_normals(self, program: _Program, ties: IntArray, is_active: BoolArray) -> Array:
+    def _list_normals(self, is_active: BoolArray) -> Array:
         """Return the derivatives of active rows and bounds by z; those of the chosen ties are 0."""
-        is_active[ties] = False
-        return np.concatenate([program.rows[is_active, : self.n], self._unit[np.abs(self._z_prices) > PRICED]])
+        is_active[self._program.ties] = False
+        return np.concatenate([self._program.rows[is_active], self._unit[np.abs(self._z_prices) > PRICED]])
 
-    def _reduce(self, ties: IntArray, lower: Array) -> _Program:
+    def _reduce(self, ties: IntArray) -> _Program:
         """Eliminate all lifted variables."""
         at, n, by_s = self._functions, self.n, self._functions.rows_by_s
         divide: Callable[..., Array]
@@ -201,14 +211,12 @@ class StepSolver:
         else:
             chosen = sparse.csc_matrix(by_s[ties])
             own, divide = chosen.diagonal(), splu(chosen).solve
-        lifts = divide(np.column_stack([-at.rows_by_z[ties], lower[ties]]))
-        rows = by_s @ lifts
-        rows[:, :n] += at.rows_by_z
-        full = np.concatenate([self._unit, lifts[:, :n]])
+        lifts = divide(-at.rows_by_z[ties])
+        full = np.concatenate([self._unit, lifts])
         bent = at.hessian @ full
         hessian = full.T @ bent
-        linear = at.gradient @ full + lifts[:, n] @ bent[n:]
-        return _Program(own, divide, lifts, rows, (hessian + hessian.T) / 2, linear)
+        hessian = (hessian + hessian.T) / 2
+        return _Program(ties, own, divide, lifts, by_s @ lifts + at.rows_by_z, hessian, at.gradient @ full, bent[n:])
 
     def _solve_dense(
         self, bent: Array, linear: Array, rows: Array, inside: IntArray, bounds: tuple[Array, Array, Array, Array]

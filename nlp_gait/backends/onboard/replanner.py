@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
-from nlp_gait.backends.onboard.reduced_qp import LEAST_COST, LEAST_DAMPING, StepSolver
+from nlp_gait.backends.onboard.reduced_qp import LEAST_COST, LEAST_DAMPING, Step, StepSolver
 from nlp_gait.backends.optima.optimum import find_optimum
 from nlp_gait.backends.optima.sensitivities import parameter_sensitivities
 from nlp_gait.backends.solve import solve
@@ -228,7 +228,9 @@ class _Run:
             size = max(abs(cost), LEAST_COST)
             at.differentiate(self._multipliers)
             z_lower, z_upper = np.maximum(self._z_lower - w[:n], -longest), np.minimum(self._z_upper - w[:n], longest)
-            step = self._steps.solve(self._ties, at.lower - at.g, at.upper - at.g, z_lower, z_upper)
+            g = at.g.copy()
+            self._steps.prepare(self._ties)
+            step = self._steps.solve(at.lower - g, at.upper - g, z_lower, z_upper)
             self.iterations += 1
             if step is None and (self._steps.damping < 1.0 or longest > SHORTEST):
                 longest /= SHORTEN if self._steps.damping == 1.0 else 1.0
@@ -243,20 +245,41 @@ class _Run:
                 self._go_to(w + share * step.w)
                 if at.cost[0] + weight * self._violation <= max(merits) + ROUNDING * size:
                     break
+            error, length = self._miss(step, cost), float(np.abs(step.w[:n]).max(initial=0.0))
+            is_short = share == 1.0 and length <= SHORT and length < longest
+            if is_short and (error > COST_ERROR * size or self._violation > VIOLATION):
+                step = self._correct(step, w, g, z_lower, z_upper, weight)
+                error = self._miss(step, cost)
             self._multipliers = self._multipliers + share * (step.multipliers - self._multipliers)
             self._keep_best()
             factor = DAMP_LESS if share == 1.0 else DAMP_SHORTENED
             self._steps.damping = min(max(factor * self._steps.damping, LEAST_DAMPING), 1.0)
-            error = abs(at.cost[0] - cost + step.decrease)
-            length = float(np.abs(step.w[:n]).max(initial=0.0))
-            accurate = share == 1.0 and error <= COST_ERROR * size and length <= SHORT and length < longest
             self.converged = (
-                bool(accurate)
+                is_short
+                and error <= COST_ERROR * size
                 and self._violation <= VIOLATION
                 and not step.relaxed
                 and step.estimate_rest() <= COST_ERROR * size
             )
             longest = min(2.0 * longest, LONGEST) if share == 1.0 else max(share * length, ROUNDING)
+
+    def _miss(self, step: Step, cost: float) -> float:
+        """Return by how much a full step missed the predicted cost."""
+        return abs(float(self._at.cost[0]) - cost + step.decrease)
+
+    def _correct(self, step: Step, w: Array, g: Array, z_lower: Array, z_upper: Array, weight: float) -> Step:
+        """Return a full step from w, where the rows were g, or one for the rows' values at its end if that reduces the merit."""
+        at, end, n = self._at, self._w, self._n
+        error = at.g - g - at.rows_by_z @ (end - w)[:n] - at.rows_by_s @ (end - w)[n:]
+        merit = at.cost[0] + weight * self._violation
+        other = self._steps.solve(at.lower - g - error, at.upper - g - error, z_lower, z_upper)
+        if other is None:
+            return step
+        self._go_to(w + other.w)
+        if not at.cost[0] + weight * self._violation < merit:
+            self._go_to(end)
+            return step
+        return replace(other, decrease=other.decrease + float(self._multipliers @ error))
 
     def result(self) -> Replan:
         """Return the optimum, else the best feasible point, else the last one with its violated rows."""

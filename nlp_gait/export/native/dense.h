@@ -18,6 +18,15 @@ static double dot(int n, const double *restrict a, const double *restrict b) {
   return all;
 }
 
+/* Turn rows a and b (n). */
+static void rotate(int n, double *restrict a, double *restrict b, double c, double s) {
+  for (int k = 0; k < n; ++k) {
+    const double old = a[k];
+    a[k] = c * old - s * b[k];
+    b[k] = s * old + c * b[k];
+  }
+}
+
 /* Eigenvalues and eigenvectors of a symmetric matrix a (n, n) by Jacobi's rotations: a becomes diagonal, and row i of
  * vectors (n, n) belongs to the eigenvalue a[i][i]. At most 30 sweeps, of 6 n^3 operations each. */
 static void find_eigenvectors(int n, double *a, double *vectors) {
@@ -31,25 +40,17 @@ static void find_eigenvectors(int n, double *a, double *vectors) {
     if (outside <= 1e-34 * all) return;
     for (int i = 0; i < n; ++i)
       for (int j = i + 1; j < n; ++j) {
-        const double between = a[i * n + j];
-        if (between == 0.0) continue;
-        const double ratio = (a[j * n + j] - a[i * n + i]) / (2.0 * between);
+        double *first = a + i * n, *second = a + j * n;
+        const double between = first[j];
+        if (between * between <= 1e-34 * all / (n * n)) continue;
+        const double ratio = (second[j] - first[i]) / (2.0 * between);
         const double t = (ratio < 0.0 ? -1.0 : 1.0) / (fabs(ratio) + sqrt(ratio * ratio + 1.0));
         const double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
-        for (int k = 0; k < n; ++k) {
-          const double left = a[k * n + i], right = a[k * n + j];
-          a[k * n + i] = c * left - s * right;
-          a[k * n + j] = s * left + c * right;
-        }
-        for (int k = 0; k < n; ++k) {
-          const double upper = a[i * n + k], lower = a[j * n + k];
-          a[i * n + k] = c * upper - s * lower;
-          a[j * n + k] = s * upper + c * lower;
-          const double first = vectors[i * n + k], second = vectors[j * n + k];
-          vectors[i * n + k] = c * first - s * second;
-          vectors[j * n + k] = s * first + c * second;
-        }
-        a[i * n + j] = a[j * n + i] = 0.0;
+        const double less = first[i] - t * between, more = second[j] + t * between;
+        rotate(n, first, second, c, s);
+        rotate(n, vectors + i * n, vectors + j * n, c, s);
+        first[i] = less, second[j] = more, first[j] = second[i] = 0.0;
+        for (int k = 0; k < n; ++k) a[k * n + i] = first[k], a[k * n + j] = second[k];
       }
   }
 }
@@ -90,12 +91,7 @@ static double product(const Program *q, int i, const double *y) {
 static double turn(Program *q, int i, int j, double a, double b, double *cosine, double *sine) {
   const double length = sqrt(a * a + b * b);
   const double c = length > 0.0 ? a / length : 1.0, s = length > 0.0 ? b / length : 0.0;
-  double *restrict first = q->basis + i * q->n, *restrict second = q->basis + j * q->n;
-  for (int k = 0; k < q->n; ++k) {
-    const double old = first[k];
-    first[k] = c * old + s * second[k];
-    second[k] = c * second[k] - s * old;
-  }
+  rotate(q->n, q->basis + i * q->n, q->basis + j * q->n, c, -s);
   *cosine = c, *sine = s;
   return length;
 }
