@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from casadi import MX
 
 import nlp_gait
 from nlp_gait.backends.onboard.replanner import Replanner, replanner
 from nlp_gait.backends.optima.optimum import SHARP
 from nlp_gait.errors import InputError, UnknownNameError
-from tests.backends.toys import corner, toy
+from nlp_gait.formulation import Constraint
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from tests.backends.toys import corner, row, toy
 
 pytest.importorskip("daqp")
 
@@ -29,6 +33,23 @@ def test_a_corner_follows_its_limit_across_a_change_of_sign() -> None:
         assert found.converged and found.feasible and found.solver == "sqp", found.note
         assert found.objective == pytest.approx(expected, abs=1e-8)
         np.testing.assert_allclose(found.x, max(1.0, limit), atol=1e-8)
+
+
+def test_many_values_that_are_zero_at_once_stay_so() -> None:
+    """20 terms |a d + b e + d e / 10| with d = x - limit, e = y - 1 are zero together, in two directions, against a pull by x."""
+    angles = np.linspace(0.0, 3.0, 20)
+
+    def fan(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+        d, e = x - limit, y - 1
+        terms = [ops.abs(math.cos(a) * d + math.sin(a) * e + d * e / 10) for a in angles]
+        return sum(terms, 3 * x), (row(x + y, lower=MX(-9)),)
+
+    plan = replanner(toy(fan, limit=0.5), starts=1)
+    for limit in (0.6, 1.4, -0.3, -0.31):
+        found = plan.solve({"limit": limit}, judge=True)
+        assert found.converged and found.feasible and found.solver == "sqp" and found.iterations <= 5, found.note
+        np.testing.assert_allclose(found.x, [limit, 1.0], atol=1e-7)
+        assert found.objective == pytest.approx(3 * limit, rel=1e-6)
 
 
 def test_a_predicted_start_is_the_optimum_where_the_same_bounds_stay_active() -> None:
