@@ -25,6 +25,7 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 # A step is the last one if it misses the predicted cost by less than this share, violates less than this total, and is shorter
 # than this share of the variables' ranges.
 COST_ERROR, VIOLATION, SHORT = 1e-7, 1e-8, 1e-3
+CORRECTED = 3e-4  # longest step that is corrected: a longer one needs new derivatives
 SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays
 # Longest step, as a share of the variables' ranges: shorter after a step that had to be shortened, or whose program failed.
 LONGEST, SHORTEN, SHORTEST = 0.25, 2.5, 1e-3
@@ -247,7 +248,7 @@ class _Run:
                     break
             error, length = self._miss(step, cost), float(np.abs(step.w[:n]).max(initial=0.0))
             is_short = share == 1.0 and length <= SHORT and length < longest
-            if is_short and (error > COST_ERROR * size or self._violation > VIOLATION):
+            if is_short and length <= CORRECTED and (error > COST_ERROR * size or self._violation > VIOLATION):
                 step = self._correct(step, w, g, z_lower, z_upper, weight)
                 error = self._miss(step, cost)
             self._multipliers = self._multipliers + share * (step.multipliers - self._multipliers)
