@@ -194,14 +194,15 @@ def _compute_turning(spin: SX, spin_rate: SX) -> SX:
 
 def _compute_moment(turning: SX, second: np.ndarray[Any, Any]) -> SX:
     """Return the moment that turning a body about its reference point needs: sum of p x (turning p) over its matter at p."""
-    U, J = turning, second
+    U = [[turning[i, j] for j in range(3)] for i in range(3)]
+    J = second.tolist()  # CasADi converts plain floats faster than NumPy's
     return ca.vertcat(
         *(
-            (U[k, k] - U[j, j]) * J[j, k]
-            + U[k, i] * J[i, j]
-            - U[j, i] * J[i, k]
-            + U[k, j] * J[j, j]
-            - U[j, k] * J[k, k]
+            (U[k][k] - U[j][j]) * J[j][k]
+            + U[k][i] * J[i][j]
+            - U[j][i] * J[i][k]
+            + U[k][j] * J[j][j]
+            - U[j][k] * J[k][k]
             for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
         )
     )

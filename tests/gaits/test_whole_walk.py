@@ -113,18 +113,18 @@ def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
 def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     path = tmp_path / "walk.json"
-    data = as_json("plan", "--steps", "3", "--distance", "0.12", "--intervals", "2", "--starts", "1", "--out", path)
+    data = as_json("plan", "--steps", "3", "--distance", "0.1", "--intervals", "2", "--starts", "1", "--out", path)
     assert data["feasible"] and data["claimed"] and data["steps"] == 3 and not data["obstacles"]
-    assert data["distance_m"] == pytest.approx(0.12, abs=1e-7)
+    assert data["distance_m"] == pytest.approx(0.1, abs=1e-7)
     again = load_result(path)
     assert again.problem.options["steps"] == 3 and again.problem.by_name(again.x) == data["x"]
     indexes = build_exact_model(again.problem).at(again.x, again.problem.p).indexes
     assert [data[name] for name in ("energy_J", "duration_s")] == [indexes["energy_J"], indexes["duration_s"]]
     simulated = as_json("simulate", path)
-    assert not simulated["fallen"] and simulated["planned_m"] == pytest.approx(0.12)
+    assert not simulated["fallen"] and simulated["planned_m"] == pytest.approx(0.1)
     assert simulated["walked_m"] > 0.98 * simulated["planned_m"]
     # Three samples a phase are too few for the energy of the plan; the model's is computed on a dense grid.
-    assert simulated["energy_J"] == pytest.approx(simulated["walk"]["model_J_per_m"] * 0.12, rel=0.1)
+    assert simulated["energy_J"] == pytest.approx(simulated["walk"]["model_J_per_m"] * 0.1, rel=0.1)
 
 
 def test_a_start_from_a_cycle_has_its_states_and_times_in_all_phases(problem: GaitProblem, x: np.ndarray) -> None:

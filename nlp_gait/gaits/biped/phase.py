@@ -92,12 +92,10 @@ class Phase:
 
     def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
         """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
-        traces = {name: trace for limit in self.limits for name, trace in limit.traces.items()}
-        reads_wrenches = any(limit.reads_wrenches for limit in self.limits)
+        traces, reads_wrenches = self._traces, self._reads_wrenches
         if self.derivatives == "analytic":
-            reads_motion = self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
-            inputs, outputs = self._instant_outputs(ops, reads_motion, reads_wrenches, traces)
-            found = self._map_instant(inputs, outputs, ats, ops, phases)
+            reads_motion = self._reads_motion
+            found = self._map_instant(ats, ops, phases)
         else:
             q, _, _, hip, planned, reach, world, _, *seen = self._map(self._kinematics(ops, traces), ats)
             n = self.grid.parts + 1
@@ -167,8 +165,7 @@ class Phase:
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
-        torque, _, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
-        wrenches = self._ground.map(n)(q, qd, qdd, hip, world)
+        torque, zmp, *wrenches = self._signal_loads.map(n)(q, qd, qdd, hip, world)
         rows = [self.body.joints.index(name) for name in self.moving]
 
         def full(moved: Any, others: Array) -> Array:
@@ -247,10 +244,28 @@ class Phase:
         at = InstantPoint.of(x, known, self.names, self.known)
         return [x, known, phase], self.plan(at, phase, ops), at
 
-    def _map_instant(
-        self, inputs: list[SX], outputs: list[SX], ats: Sequence[Point], ops: Nonsmooth, phases: MX | None
-    ) -> list[Any]:
+    @property
+    def _traces(self) -> dict[str, Trace]:
+        return {name: trace for limit in self.limits for name, trace in limit.traces.items()}
+
+    @property
+    def _reads_wrenches(self) -> bool:
+        return any(limit.reads_wrenches for limit in self.limits)
+
+    @property
+    def _reads_motion(self) -> bool:
+        return self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
+
+    @cached_property
+    def _exact_instant(self) -> ca.Function:
+        inputs, outputs = self._instant_outputs(Exact())
+        return ca.Function("sample", inputs, simplify(outputs))
+
+    def _map_instant(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[Any]:
         """Evaluate one instant at all samples, or at other phases; its open equations become rows of gradient solvers."""
+        if ops.exact:  # the judge, the proofs and the start points share it
+            return self._map(self._exact_instant, ats, phases=phases)
+        inputs, outputs = self._instant_outputs(ops)
         roots = ops.open_roots()
         if roots is None:
             return self._map(ca.Function("sample", inputs, simplify(outputs)), ats, phases=phases)
@@ -266,19 +281,17 @@ class Phase:
         ops.tie_roots(start, residual)
         return found
 
-    def _instant_outputs(
-        self, ops: Nonsmooth, motion: bool, wrenches: bool, traces: Mapping[str, Trace]
-    ) -> tuple[list[SX], list[SX]]:
+    def _instant_outputs(self, ops: Nonsmooth) -> tuple[list[SX], list[SX]]:
         """Return x, margin and phase of one instant, and its outputs for ``sample``, with analytic derivatives."""
-        inputs, plan, at = self._symbolic_plan(ops)
+        inputs, plan, at = self._exact_plan if ops.exact else self._symbolic_plan(ops)
         loads = self.loads(plan)
         power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
         torque = ca.vertcat(*(loads.torques[name] for name in self.body.joints))
         outputs = [planned, plan.reach, torque, power, loads.zmp, plan.miss]
-        outputs += [loads.wrenches[side] for side in BOTH_FEET] if wrenches else []
-        outputs += self._motion(plan) if motion else []
-        outputs += [trace(at, inputs[2]) for trace in traces.values()]
+        outputs += [loads.wrenches[side] for side in BOTH_FEET] if self._reads_wrenches else []
+        outputs += self._motion(plan) if self._reads_motion else []
+        outputs += [trace(at, inputs[2]) for trace in self._traces.values()]
         return inputs, outputs
 
     def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
@@ -321,6 +334,13 @@ class Phase:
         """One sample: wrenches (6,) on both soles."""
         inputs, loads = self._loads
         return ca.Function("ground", inputs, simplify([loads.wrenches[side] for side in BOTH_FEET]))
+
+    @cached_property
+    def _signal_loads(self) -> ca.Function:
+        """One sample: torques, ZMP and wrenches; not simplified, which takes longer than evaluating it as often as signals do."""
+        inputs, loads = self._loads
+        torque = ca.vertcat(*(loads.torques[name] for name in self.body.joints))
+        return ca.Function("loads", inputs, [torque, loads.zmp, *(loads.wrenches[side] for side in BOTH_FEET)])
 
     @cached_property
     def _loads(self) -> tuple[list[SX], Instant]:
