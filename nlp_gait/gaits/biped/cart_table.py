@@ -19,6 +19,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 from casadi import SX
+from scipy.interpolate import PPoly
 from scipy.linalg import solve_discrete_are
 
 from nlp_gait.errors import InputError
@@ -35,77 +36,39 @@ PREVIEW_S = 1.6
 ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Course:
-    """Motion of a cart with constant jerk between samples."""
-
-    sample_s: float  # time between samples [s]
-    states: Array  # (T, 3) position, velocity and acceleration at each sample [m, s]
-    jerks: Array  # (T,) from each sample on [m/s^3]
-
-    def at(self, t: Array) -> Array:
-        """Return positions (k,) [m] at times (k,) [s], exact between samples."""
-        k = np.clip(np.floor(t / self.sample_s + 1e-9).astype(int), 0, len(self.jerks) - 1)
-        since = t - k * self.sample_s
-        position, velocity, acceleration = self.states[k].T
-        return position + since * (velocity + since * (acceleration / 2 + since * self.jerks[k] / 6))
+def count_preview(sample_s: float) -> int:
+    """Return the number of previewed samples."""
+    return math.ceil(PREVIEW_S / sample_s)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PreviewController:
-    """Controller of a cart whose ZMP follows a reference that is known in advance (eqs. 13 to 22)."""
+def follow_zmp(reference: Array, sample_s: float, height_m: float, gravity: float) -> PPoly:
+    """Return the motion of a cart from rest, with constant jerk between samples, whose ZMP follows a reference (eqs. 13 to 22).
 
-    sample_s: float  # T [s]
-    height_m: float  # of the cart [m]
-    gravity: float  # [m/s^2]
-
-    def follow(self, reference: Array) -> Course:
-        """Return the motion of the cart from rest above the first reference.
-
-        The ZMP's reference (T + preview,) [m] is longer than the motion by ``self.preview`` samples.
-        """
-        integral_gain, state_gain, preview_gains = self._gains()
-        a, b, c = self._cart()
-        steps = len(reference) - self.preview
-        states, jerks = np.zeros((steps, 3)), np.zeros(steps)
-        state, error = np.array([reference[0], 0.0, 0.0]), 0.0
-        for k in range(steps):
-            error += c @ state - reference[k]
-            ahead = preview_gains @ reference[k + 1 : k + 1 + self.preview]
-            jerk = -integral_gain * error - state_gain @ state - ahead
-            states[k], jerks[k] = state, jerk
-            state = a @ state + b * jerk
-        return Course(sample_s=self.sample_s, states=states, jerks=jerks)
-
-    @property
-    def preview(self) -> int:
-        """Number of previewed samples."""
-        return math.ceil(PREVIEW_S / self.sample_s)
-
-    def _cart(self) -> tuple[Array, Array, Array]:
-        """Matrices of its motion under constant jerk, and row of its ZMP (eq. 6)."""
-        t = self.sample_s
-        a = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
-        return a, np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -self.height_m / self.gravity])
-
-    def _gains(self) -> tuple[float, Array, Array]:
-        """Gains on the summed error, on the state (3,), and on the next references (preview,)."""
-        a, b, c = self._cart()
-        whole_b = np.concatenate([[c @ b], b])[:, None]
-        unit = np.array([[1.0], [0.0], [0.0], [0.0]])
-        rest = np.vstack([c @ a, a])
-        whole_a = np.hstack([unit, rest])
-        weight = np.diag([ERROR_WEIGHT, 0.0, 0.0, 0.0])
-        p = solve_discrete_are(whole_a, whole_b, weight, np.array([[JERK_WEIGHT]]))
-        scaled = whole_b.T / (JERK_WEIGHT + whole_b.T @ p @ whole_b)
-        gain = scaled @ p @ whole_a
-        closed = (whole_a - whole_b @ gain).T
-        previews = np.zeros(self.preview)
-        effect = -p @ unit
-        for k in range(self.preview):
-            previews[k] = (scaled @ effect).item()
-            effect = closed @ effect
-        return (scaled @ p @ unit).item(), (scaled @ p @ rest).ravel(), previews
+    The ZMP's reference (T + preview,) [m] is known in advance: it is longer than the motion by ``count_preview`` samples.
+    """
+    t, preview = sample_s, count_preview(sample_s)
+    a = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
+    b, c = np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -height_m / gravity])  # (eq. 6)
+    # Optimal gains on the summed error, on the state (3,), and on the next references (preview,).
+    whole_b, unit, rest = np.concatenate([[c @ b], b])[:, None], np.eye(4)[:, :1], np.vstack([c @ a, a])
+    whole_a = np.hstack([unit, rest])
+    p = solve_discrete_are(whole_a, whole_b, np.diag([ERROR_WEIGHT, 0.0, 0.0, 0.0]), np.array([[JERK_WEIGHT]]))
+    scaled = whole_b.T / (JERK_WEIGHT + whole_b.T @ p @ whole_b)
+    closed = (whole_a - whole_b @ (scaled @ p @ whole_a)).T
+    integral_gain, state_gain = (scaled @ p @ unit).item(), (scaled @ p @ rest).ravel()
+    previews, effect = np.zeros(preview), -p @ unit
+    for k in range(preview):
+        previews[k], effect = (scaled @ effect).item(), closed @ effect
+    steps = len(reference) - preview
+    states, jerks = np.zeros((steps, 3)), np.zeros(steps)
+    state, error = np.array([reference[0], 0.0, 0.0]), 0.0
+    for k in range(steps):
+        error += c @ state - reference[k]
+        ahead = previews @ reference[k + 1 : k + 1 + preview]
+        states[k], jerks[k] = state, -integral_gain * error - state_gain @ state - ahead
+        state = a @ state + b * jerks[k]
+    position, velocity, acceleration = states.T
+    return PPoly(np.stack([jerks / 6, acceleration / 2, velocity, position]), t * np.arange(steps + 1))
 
 
 SAMPLE_S = 0.005  # as in the source
@@ -182,25 +145,25 @@ class Walker:
 
         That ZMP (2, k) of a cycle is a function of times (k,). The walk advances by a step each time; a correction does not.
         """
-        controller = PreviewController(sample_s=self.sample_s, height_m=height_m, gravity=self.body.gravity)
         period, begins = self.footsteps.period_s, self.cycle_step * self.footsteps.period_s
         t = np.arange(math.ceil((begins + period + PREVIEW_S) / self.sample_s) + 2) * self.sample_s
         step = np.floor(t / period + 1e-9)
         x, y = zmp(t - step * period)
         distance = self.footsteps.step_m * advances
-        courses = [controller.follow(x + step * distance), controller.follow(np.where(step % 2 == 0, y, -y))]
+        along, across = (
+            follow_zmp(reference, self.sample_s, height_m, self.body.gravity)
+            for reference in (x + step * distance, np.where(step % 2 == 0, y, -y))
+        )
 
         def path(t: Array) -> Array:
-            along, across = (course.at(begins + t) for course in courses)
-            return np.stack([along - self.cycle_step * distance, across])
+            return np.stack([along(begins + t) - self.cycle_step * distance, across(begins + t)])
 
         return path
 
     def make_gait(self, hip_path: Callable[[Array], Array]) -> Result:
         """Return the cycle in which the hip moves along a path (2, k) over the floor, judged as a planned one.
 
-        Raises:
-            InputError: a foot is out of reach.
+        Raises InputError if a foot is out of reach.
         """
         t, steps = self.times, self.footsteps
         hip = np.vstack([hip_path(t), np.full(len(t), steps.hip_height_m)])
@@ -242,9 +205,7 @@ def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes
 
     One pass models the robot as a cart; each further pass moves the hip so that a cart would remove the distance of the whole
     body's ZMP from the planned one. The source has two.
-
-    Raises:
-        InputError: a foot is out of reach of the hip.
+    Raises InputError if a foot is out of reach of the hip.
     """
     if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
         raise InputError(f"passes must be a whole number >= 1, got {passes!r}")

@@ -8,7 +8,14 @@ from scipy.linalg import toeplitz
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
-from nlp_gait.gaits.biped.cart_table import JERK_WEIGHT, Footsteps, PreviewController, Walker, plan_cart_table_walk
+from nlp_gait.gaits.biped.cart_table import (
+    JERK_WEIGHT,
+    Footsteps,
+    Walker,
+    count_preview,
+    follow_zmp,
+    plan_cart_table_walk,
+)
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
 from nlp_gait.gaits.nao.problems import make_nao_cycles
 
@@ -26,11 +33,10 @@ def walker() -> Walker:
 @pytest.mark.slow
 def test_preview_control_is_the_least_squares_optimum() -> None:
     """The gains come from a Riccati equation; the same cost over a long horizon is a linear least squares problem."""
-    controller = PreviewController(sample_s=0.02, height_m=0.26, gravity=GRAVITY)
     count, t = 300, 0.02
-    reference = np.zeros(count + controller.preview)
+    reference = np.zeros(count + count_preview(t))
     reference[100:], reference[160:] = 0.05, 0.12
-    course = controller.follow(reference)
+    course = follow_zmp(reference, t, 0.26, GRAVITY)
     step = np.array([[1.0, t, t**2 / 2], [0.0, 1.0, t], [0.0, 0.0, 1.0]])
     push, output = np.array([t**3 / 6, t**2 / 2, t]), np.array([1.0, 0.0, -0.26 / GRAVITY])
     response, state = np.zeros(count), push
@@ -44,15 +50,14 @@ def test_preview_control_is_the_least_squares_optimum() -> None:
         rcond=None,
     )[0]
     # The controller looks 1.6 s ahead, the least squares to the end.
-    assert np.abs(course.jerks[:200] - jerks[:200]).max() < 1e-3 * np.abs(jerks).max()
+    assert np.abs(6 * course.c[0, :200] - jerks[:200]).max() < 1e-3 * np.abs(jerks).max()
 
 
 def test_a_course_is_exact_between_its_samples() -> None:
-    controller = PreviewController(sample_s=0.02, height_m=0.26, gravity=GRAVITY)
-    course = controller.follow(np.linspace(0.0, 0.1, 50 + controller.preview))
-    assert course.states[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
-    assert course.at(np.arange(50) * 0.02) == pytest.approx(course.states[:, 0], abs=1e-15)
-    assert course.at(np.array([0.02 - 1e-9])) == pytest.approx(course.states[1, :1], abs=1e-9)
+    course = follow_zmp(np.linspace(0.0, 0.1, 50 + count_preview(0.02)), 0.02, 0.26, GRAVITY)
+    assert [course(0.0, order) for order in range(3)] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+    before, after = course(0.02 * np.arange(1, 50) - 1e-9), course(0.02 * np.arange(1, 50))
+    assert before == pytest.approx(after, abs=1e-9)
 
 
 def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_image() -> None:
