@@ -32,7 +32,7 @@ PARENT_CHECKED_EVERY_S = 0.5
 STOP_CHECKED_EVERY_S = 0.05
 END_WITHIN_S = 5.0  # a child that is to end is killed after this time
 COUNTER_BYTES = 8
-# Of the process that removes what killed workers leave behind: that it is gone already.
+# Warnings of joblib's resource tracker, which removes what killed workers leave behind, about what is gone already.
 HIDDEN_WARNINGS = "ignore:resource_tracker"
 SPARE_DESCRIPTORS = 12  # that joblib needs beside one for each worker
 PR_SET_PDEATHSIG = 1

@@ -1,9 +1,9 @@
-"""Feedback by planning again: the rest of each phase, with the place and the time of the next foothold, as the state demands.
+"""Feedback by planning again: the rest of each phase, with the place and the time of the next foothold.
 
 At each measurement the replanner solves the rest of the present phase (``gaits.biped.rest_of_phase``). The motion continues from
-where the drives were told to be, so that they keep their stiffness; the distance from there to the measured divergent component
-of motion, of a pendulum under the torso, decides where and when the foot lands, and when it lifts off. Where the robot leans, the
-swinging foot is turned and raised to the floor as it is under the leaning robot. At touch-down and lift-off the next phase
+the commanded state, so that the drives keep their stiffness; the distance from there to the measured divergent component of
+motion (DCM), of a pendulum under the torso, decides where and when the foot lands, and when it lifts off. Where the robot leans,
+the swinging foot is turned and raised to the floor as it is under the leaning robot. At touch-down and lift-off the next phase
 begins at the last plan's end.
 """
 
@@ -50,7 +50,7 @@ LAST_S = 0.04  # a phase with less left is not planned again: its state at the e
 # Whole phases, where times are free: double support may last longer but not end before the load has passed.
 FASTEST_S: dict[PhaseName, float] = {"ssp": 0.2, "dsp": math.inf}
 SLOWEST = 1.5  # longest phase, relative to the planned one
-NOTICED = 3.0  # a distance of the DCM that is larger by this factor than its noise is noticed
+NOTICED = 3.0  # standard deviations of the sensors' noise; a smaller distance of the DCM is ignored
 UPRIGHT_AGAIN_S = 0.15  # after touch-down, until the foot is placed as under an upright robot
 STEPS, TIME_LIMIT_S = 10, 3600.0  # of each plan; the limit of time only keeps the replanner from using IPOPT
 MOST_OUTSIDE_M, MOST_BEYOND = 0.05, 0.1  # of the ZMP and the joints: a worse plan is not followed
@@ -218,16 +218,20 @@ class StepPlanner:
             self._lean = to_rotation_vector(seen.attitude) + seen.tilt_error
         if now.began_s + now.duration_s - t < LAST_S:
             return
-        name, stance, told = now.phase.name, now.phase.stance, now.at(t)
+        name, stance, commanded = now.phase.name, now.phase.stance, now.at(t)
         (x, y, _), (vx, vy, _) = seen.places[stance], seen.velocity
         side = 1.0 - 2.0 * stance
         place, rate = np.array([x, side * y + self._body.feet_y[0]]), np.array([vx, side * vy])
         growth = math.sqrt(self._body.gravity / self._mass_height)
         # The robot turns about its ankles, so its mass is displaced by less than its torso.
-        miss = self._mass_height / self._torso_height * (place - told.hip[:2] + (rate - told.hip_rate[:2]) / growth)
+        miss = (
+            self._mass_height
+            / self._torso_height
+            * (place - commanded.hip[:2] + (rate - commanded.hip_rate[:2]) / growth)
+        )
         noise = math.hypot(self._settings.position_noise_m, self._settings.velocity_noise_m_s / growth)
         miss -= np.clip(miss, -NOTICED * noise, NOTICED * noise)
-        trial, planner = self._make(t, now.share_at(t), told), self._planners[name]
+        trial, planner = self._make(t, now.share_at(t), commanded), self._planners[name]
         trial = trial._replace(
             values=trial.values | {**_pair(MISS, miss), RATE: growth, REACH: self._reach_m, **self._find_rise(t)}
         )

@@ -1,12 +1,12 @@
 """The rest of a support phase of a disturbed robot: where the hip goes, and where and when the swinging foot lands.
 
 The left foot stands at x = 0, as in a cycle. In single support the right foot swings on from where it is to a place that is
-free; in double support it stands ahead. The hip moves on a cubic from where the drives were told to hold it to a free state.
+free; in double support it stands ahead. The hip moves on a cubic from its commanded state to a free one.
 
-The robot is elsewhere: its divergent component of motion (DCM) misses the told one by e, which grows with rate w and is reduced
-by a constant shift d of the ZMP: at the end of the phase, after T, e exp(w T) + d (1 - exp(w T)). The shifted ZMP stays within a
-polygon of up to ``EDGES`` edges. What is minimised is the distance from the planned end of the phase; a foothold that is moved
-by as much as the DCM misses then costs nothing, and in double support what is left of the miss costs.
+The robot is elsewhere: its divergent component of motion (DCM) misses the commanded one by e, which grows with rate w and is
+reduced by a constant shift d of the ZMP: at the end of the phase, after T, e exp(w T) + d (1 - exp(w T)). The shifted ZMP
+stays within a polygon of up to ``EDGES`` edges. What is minimised is the distance from the planned end of the phase; a
+foothold that is moved by as much as the DCM misses then costs nothing, and in double support what is left of the miss costs.
 
 Source:
     Khadiv, Herzog, Moosavian, Righetti (2020), "Walking control based on step timing adaptation": place and time of the next
@@ -253,7 +253,7 @@ def _list_variables(body: Body, name: PhaseName) -> tuple[Variable, ...]:
             else []
         ),
         (TIMES[name], "s", 0.005, 4.0, "left of the phase"),
-        *((left, "m", -0.3, 0.3, "by which the DCM misses the told one at the end") for left in MISS_END),
+        *((left, "m", -0.3, 0.3, "by which the DCM misses the commanded one at the end") for left in MISS_END),
         (OUTSIDE, "m", 0.0, 0.3, "of the ZMP beyond its polygon"),
         (BEYOND, "1", 0.0, 1.0, "of joints beyond their limits [rad] and cosines of knees beyond theirs"),
     ]
