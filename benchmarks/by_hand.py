@@ -13,7 +13,7 @@ from benchmarks.rows import Array
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import Body, tree_from
+from nlp_gait.robots.tree import TreeBody, tree_from
 
 # Gupta, Pratihar, Deb (2023), section 4.1 and Table 3 [m, rad].
 SUPPORT_XY, SWING_X, SWING_Y = (0.06, 0.05), (0.0, 0.12), -0.05
@@ -40,7 +40,7 @@ def pinocchio_model(robot: Robot) -> tuple[pin.Model, list[int]]:
     return model, [model.joints[model.getJointId(name)].idx_q for name in JOINTS]
 
 
-def _inertia(body: Body) -> pin.Inertia:
+def _inertia(body: TreeBody) -> pin.Inertia:
     return pin.Inertia(body.link.mass_kg, np.array(body.com_offset_m), body.link.inertia_matrix)
 
 

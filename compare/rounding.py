@@ -39,7 +39,7 @@ How = Literal["enclosed", "found by optimisation", "evaluated"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Margin:
+class TightestConstraint:
     """The constraint that is violated most at a point, relative to its scale, or else satisfied most narrowly."""
 
     constraint: str
@@ -66,8 +66,8 @@ class Rounded:
     enclosure: tuple[float, float] | None  #: contains the objective of every point; None if it cannot be enclosed
     feasible: Where  #: whether the points are feasible at the problem's samples
     how: How  #: the verdict is enclosed, found by optimisation, or evaluated at a feasible and an infeasible point
-    at_best: Margin  #: at the point with the least of the largest violations
-    at_worst: Margin  #: at the point with the largest violation
+    at_best: TightestConstraint  #: at the point with the least of the largest violations
+    at_worst: TightestConstraint  #: at the point with the largest violation
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -223,11 +223,11 @@ class _Judge:
                 return "nowhere", "enclosed"
         return ("everywhere" if any(good) else "nowhere"), "found by optimisation"
 
-    def describe(self, point: _Point) -> Margin:
+    def describe(self, point: _Point) -> TightestConstraint:
         """Return the largest violation at a point."""
         k = int(np.argmax(point.excess))
         row = int(self.rows[k])
-        return Margin(
+        return TightestConstraint(
             constraint=self.model.row_names[row],
             violation=float(point.excess[k] * self.scales[k]),
             unit=self.model.row_units[row],

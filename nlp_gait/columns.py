@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.files import is_number, read_text
+from nlp_gait.files import is_numeric_text, read_text
 
 DELIMITERS = ",;\t"
 MOST = 2**63 - 1  # a whole number in 64 bits, as other programs read it
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class CsvTable:
     """Table of numbers."""
 
     owner: str  # the file, for messages
@@ -69,7 +69,7 @@ class Table:
         return value
 
 
-def read_table(path: Path, what: str) -> Table:
+def read_table(path: Path, what: str) -> CsvTable:
     """Read a CSV file of numbers separated by commas, semicolons or tabs; a first line that is not all numbers is the header.
 
     Raises:
@@ -82,7 +82,7 @@ def read_table(path: Path, what: str) -> Table:
     lines = enumerate(csv.reader(text.splitlines(), delimiter=delimiter), start=1)
     found = [(number, [cell.strip() for cell in row]) for number, row in lines if any(cell.strip() for cell in row)]
     header: tuple[str, ...] = ()
-    if found and not all(is_number(cell) for cell in found[0][1] if cell):
+    if found and not all(is_numeric_text(cell) for cell in found[0][1] if cell):
         header = tuple(found.pop(0)[1])
         if len(set(header)) < len(header):
             raise InputError(f"{owner}: two columns have the same name")
@@ -94,7 +94,7 @@ def read_table(path: Path, what: str) -> Table:
         if len(row) != width:
             raise InputError(f"{owner}, line {number}: {len(row)} cells, but {width} columns")
         for cell in row:
-            if cell and not is_number(cell):
+            if cell and not is_numeric_text(cell):
                 raise InputError(f"{owner}, line {number}: expected a number, got {cell[:40]!r}")
         rows.append(tuple(float(cell) if cell else math.nan for cell in row))
-    return Table(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))
+    return CsvTable(owner=owner, header=header, rows=tuple(rows), lines=tuple(number for number, _ in found))

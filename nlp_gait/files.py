@@ -131,12 +131,12 @@ def format_csv(rows: Iterable[Sequence[object]]) -> str:
 
 
 def _escape_formula(cell: object) -> object:
-    if not isinstance(cell, str) or cell in FORMULA or not cell.lstrip().startswith(FORMULA) or is_number(cell):
+    if not isinstance(cell, str) or cell in FORMULA or not cell.lstrip().startswith(FORMULA) or is_numeric_text(cell):
         return cell
     return f"'{cell}"
 
 
-def is_number(text: str) -> bool:
+def is_numeric_text(text: str) -> bool:
     """Return whether Python reads a text as a number."""
     try:
         float(text)
@@ -277,7 +277,7 @@ def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> 
         yield Path(name)
 
 
-def check_name(path: Path) -> None:
+def check_output_name(path: Path) -> None:
     """Check that records and messages can contain an output path; raises OutputError if it is not valid UTF-8."""
     check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
 
@@ -294,7 +294,7 @@ def make_writable_folder(path: Path) -> Path:
     Raises:
         OutputError: it cannot be made or written to, or its name is not valid UTF-8.
     """
-    check_name(path)
+    check_output_name(path)
     with convert_errors(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
         make_folder(path)
         tempfile.TemporaryFile(dir=path).close()

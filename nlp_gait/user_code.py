@@ -52,7 +52,7 @@ class PackedCode(NamedTuple):
     contents: Mapping[str, bytes]  # of it and of the files that it imports, by path in its folder
 
 
-class Reference(NamedTuple):
+class CodeReference(NamedTuple):
     """Place of an object in user code."""
 
     home: str  # absolute path of a file, or dotted name of a module
@@ -99,13 +99,13 @@ def shorten_name(text: str) -> str:
     return text.rpartition(":")[2] if is_reference(text) else text
 
 
-def parse_reference(text: str, kind: Kind) -> Reference:
+def parse_reference(text: str, kind: Kind) -> CodeReference:
     """Return the place of an object from a reference or the name of an entry point."""
     if is_program(text):
-        return Reference(_find_program_file(text), text)
+        return CodeReference(_find_program_file(text), text)
     home, _, name = find_entry_points(kind).get(text, text).rpartition(":")
     home = _copies.get(home, home)
-    return Reference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
+    return CodeReference(os.path.abspath(home) if home.endswith(ENDING) else home, name)
 
 
 def allow_code(text: str, kind: Kind) -> None:
@@ -359,7 +359,7 @@ def _run_file(path: str, content: bytes) -> ModuleType:
     return module
 
 
-def _read_source(place: Reference, text: str) -> tuple[str, bytes]:
+def _read_source(place: CodeReference, text: str) -> tuple[str, bytes]:
     """Return the path and the content of a file or module."""
     if place.is_file:
         path = place.home

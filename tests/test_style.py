@@ -1,9 +1,10 @@
-"""Plain English in code and docs: no words of the old dialect, and functions named by verbs."""
+"""Plain English in code and docs: no words of the old dialect, functions named by verbs, and one thing to a class name."""
 
 from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -32,6 +33,7 @@ WORDS = re.compile(rf"\b({'|'.join(REPLACEMENTS)})\b", re.IGNORECASE)
 PARTICIPLE = re.compile(
     r"_?([a-z]+ed|understood|borne|told|sought|drawn|shown|known|left|kept|held|made|given|taken|seen|found|written|begun|said)"
 )
+CLASS = re.compile(r"^class (\w+)", re.MULTILINE)
 NOT_PARTICIPLES = frozenset({"_embed", "_speed", "speed", "seed", "_seed", "_feed", "_need", "embed", "proceed"})
 
 
@@ -79,6 +81,13 @@ def test_functions_are_named_by_verbs(package: str) -> None:
         path: find_participles(path.read_text(encoding="utf-8")) for path in sorted((ROOT / package).rglob("*.py"))
     }
     assert not {str(path.relative_to(ROOT)): names for path, names in files.items() if names}
+
+
+def test_no_two_classes_have_one_name() -> None:
+    # metaheuristics stands alone and has its own words, such as History.
+    paths = [path for package in ("nlp_gait", "compare") for path in (ROOT / package).rglob("*.py")]
+    names = Counter(name for path in paths for name in CLASS.findall(path.read_text(encoding="utf-8")))
+    assert "GaitProblem" in names and not [name for name, count in names.items() if count > 1]
 
 
 def test_the_check_finds_what_it_looks_for() -> None:

@@ -179,7 +179,7 @@ def print_written(*paths: Path) -> None:
 def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
     """Show progress on stderr, of unknown length if total is None; the yielded function adds one step with a note."""
     if not stderr.is_terminal:
-        yield _Log(description, total)
+        yield _ProgressLog(description, total)
         return
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -194,7 +194,7 @@ def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str]
         yield lambda note: progress.update(task, advance=1, note=escape_controls(note))
 
 
-class _Log:
+class _ProgressLog:
     """Progress without a terminal: an occasional line for the log of long work."""
 
     def __init__(self, description: str, total: int | None) -> None:

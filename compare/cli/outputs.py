@@ -12,7 +12,7 @@ from pathlib import Path
 
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import CompilerError, InputError, OutputError
-from nlp_gait.files import check_name, check_output, is_forced, make_writable_folder, write_text
+from nlp_gait.files import check_output, check_output_name, is_forced, make_writable_folder, write_text
 
 REGISTER = "written"  # folder in the cache folder
 
@@ -21,7 +21,7 @@ _named: dict[Path, str] = {}  # outputs of the running command, and their hashes
 
 def output_file(path: Path) -> Path:
     """Check before the work that a file can be written and may be replaced, and return its path; raises OutputError."""
-    check_name(path)
+    check_output_name(path)
     check_output(path)
     make_writable_folder(path.parent)
     try:

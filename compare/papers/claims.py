@@ -26,7 +26,7 @@ SIGNIFICANT = 0.05  # p-value below which a difference is not put down to chance
 T = TypeVar("T")
 
 
-class Verdict(StrEnum):
+class ClaimVerdict(StrEnum):
     """What the numbers say about a claim."""
 
     HOLDS = "holds"
@@ -58,7 +58,7 @@ class Claim:
         ""  # smallest change that counts where the paper prints no size, for example "1 %" in the unit of the change
     )
     found: str = ""  # our numbers
-    verdict: str = ""  # a ``Verdict``; in a file only of a claim without a check
+    verdict: str = ""  # a ``ClaimVerdict``; in a file only of a claim without a check
     detail: str = ""  # of the verdict, for example by how much a claim holds
     reading_of: str = ""  # id of the row of the same claim in its first reading
 
@@ -84,7 +84,7 @@ class ClaimsFile:
     differences: tuple[Difference, ...] = ()
 
 
-Rule = Callable[[Claim], tuple[Verdict, str]]
+Rule = Callable[[Claim], tuple[ClaimVerdict, str]]
 """Verdict and its detail from what a claim states."""
 
 
@@ -92,38 +92,38 @@ Rule = Callable[[Claim], tuple[Verdict, str]]
 class Check:
     """Verdict on a claim or the rule that gives it, and the values of the fields in its texts."""
 
-    verdict: Verdict | Rule
+    verdict: ClaimVerdict | Rule
     values: Mapping[str, Any]
 
     def apply(self, claim: Claim) -> Claim:
         """Return the claim with this verdict; the text of the detail of a claim that does not hold is dropped."""
-        verdict, note = (self.verdict, "") if isinstance(self.verdict, Verdict) else self.verdict(claim)
+        verdict, note = (self.verdict, "") if isinstance(self.verdict, ClaimVerdict) else self.verdict(claim)
         texts = {name: text.format_map(self.values) for name, text in asdict(claim).items()}
-        detail = "" if verdict is Verdict.FAILS else texts["detail"]
+        detail = "" if verdict is ClaimVerdict.FAILS else texts["detail"]
         return replace(claim, **{**texts, "verdict": verdict, "detail": f"{detail} {note}".strip()})
 
 
-def decide(verdict: bool | Verdict | Sequence[bool], /, **values: Any) -> Check:
+def decide(verdict: bool | ClaimVerdict | Sequence[bool], /, **values: Any) -> Check:
     """Return a check whose verdict is given, or whether the claim holds; the claim states its criterion.
 
     Of several readings of the paper, under each of which it holds or not, all have to agree: else it cannot be tested.
     """
-    if isinstance(verdict, Verdict):
+    if isinstance(verdict, ClaimVerdict):
         return Check(verdict, values)
     counts = Counter(np.atleast_1d(verdict).tolist())
     if len(counts) == 2:
         return Check(
-            lambda _: (Verdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"), values
+            lambda _: (ClaimVerdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"), values
         )
-    return Check(Verdict.HOLDS if counts[True] else Verdict.FAILS, values)
+    return Check(ClaimVerdict.HOLDS if counts[True] else ClaimVerdict.FAILS, values)
 
 
 def compare_levels(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
     """Return a check of values without a direction: the claim holds if all of ours are within its tolerance."""
 
-    def rule(claim: Claim) -> tuple[Verdict, str]:
+    def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
         within = _find_within(claim, printed, ours)
-        return (Verdict.HOLDS if within.all() else Verdict.FAILS), _describe_sizes(within, printed, ours)
+        return (ClaimVerdict.HOLDS if within.all() else ClaimVerdict.FAILS), _describe_sizes(within, printed, ours)
 
     return Check(rule, values)
 
@@ -134,12 +134,12 @@ def compare_changes(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Ch
     The claim holds if all of ours are within its tolerance. Otherwise its direction holds if all have the printed sign.
     """
 
-    def rule(claim: Claim) -> tuple[Verdict, str]:
+    def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
         within = _find_within(claim, printed, ours) & (np.sign(ours) == np.sign(printed))
         if within.all():
-            return Verdict.HOLDS, _describe_sizes(within, printed, ours)
+            return ClaimVerdict.HOLDS, _describe_sizes(within, printed, ours)
         same = (np.sign(ours) == np.sign(printed)).all()
-        return (Verdict.SIZE_DIFFERS if same else Verdict.FAILS), _describe_sizes(within, printed, ours)
+        return (ClaimVerdict.SIZE_DIFFERS if same else ClaimVerdict.FAILS), _describe_sizes(within, printed, ours)
 
     return Check(rule, values)
 
@@ -151,15 +151,15 @@ def compare_readings(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> C
     under every one. Otherwise the choice of a reading would decide, and it cannot be tested.
     """
 
-    def rule(claim: Claim) -> tuple[Verdict, str]:
+    def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
         rows = np.atleast_2d(ours)
         off = [np.where(_find_within(claim, printed, row), 0.0, np.sign(row - printed)) for row in rows]
         if not np.any(off):
-            return Verdict.HOLDS, ""
+            return ClaimVerdict.HOLDS, ""
         wrong = np.abs(np.mean(off, axis=0)) == 1.0
         if wrong.any():
-            return Verdict.FAILS, f"({wrong.sum()} of {wrong.size} under every reading)" if wrong.size > 1 else ""
-        return Verdict.UNTESTABLE, "(readings differ)"
+            return ClaimVerdict.FAILS, f"({wrong.sum()} of {wrong.size} under every reading)" if wrong.size > 1 else ""
+        return ClaimVerdict.UNTESTABLE, "(readings differ)"
 
     return Check(rule, values)
 
@@ -171,10 +171,10 @@ def require_change(ours: ArrayLike, /, **values: Any) -> Check:
     (readings, n), under every reading.
     """
 
-    def rule(claim: Claim) -> tuple[Verdict, str]:
+    def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
         least, _ = _parse_size(claim.least)
         verdict = decide([bool((row >= least).all()) for row in np.atleast_2d(ours)]).verdict
-        return (verdict, "") if isinstance(verdict, Verdict) else verdict(claim)
+        return (verdict, "") if isinstance(verdict, ClaimVerdict) else verdict(claim)
 
     return Check(rule, values)
 
@@ -182,14 +182,14 @@ def require_change(ours: ArrayLike, /, **values: Any) -> Check:
 def require_feasible(check: Check, infeasible: Iterable[str]) -> Check:
     """Return a check whose verdict is "not shown" if a result that it needs is infeasible, for texts that say by how much."""
     texts = "; ".join(infeasible)
-    return Check(lambda _: (Verdict.NOT_SHOWN, f"({texts})"), check.values) if texts else check
+    return Check(lambda _: (ClaimVerdict.NOT_SHOWN, f"({texts})"), check.values) if texts else check
 
 
 def require_significance(check: Check, test: str, p: float) -> Check:
     """Return a check whose verdict is "not shown" unless the p-value of a test, two-sided, excludes chance."""
     if p < SIGNIFICANT:
         return check
-    return Check(lambda _: (Verdict.NOT_SHOWN, f"({test}, p = {p:.2g})"), check.values)
+    return Check(lambda _: (ClaimVerdict.NOT_SHOWN, f"({test}, p = {p:.2g})"), check.values)
 
 
 def _parse_size(text: str) -> tuple[float, str]:

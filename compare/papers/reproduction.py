@@ -23,8 +23,8 @@ from compare.papers.claims import (
     Check,
     Claim,
     ClaimsFile,
+    ClaimVerdict,
     Difference,
-    Verdict,
     decide,
     fill_differences,
     make_claims_table,
@@ -117,7 +117,7 @@ class Reproduction(Generic[E, F]):
         """Return all claims by id, in the order of the report; their texts may have values of the report."""
         checked = {}
         for name, claim in self.printed.claims.items():
-            check = self.checks[name](findings) if name in self.checks else decide(Verdict(claim.verdict))
+            check = self.checks[name](findings) if name in self.checks else decide(ClaimVerdict(claim.verdict))
             checked[name] = replace(check, values={**(values or {}), **check.values}).apply(claim)
         return checked
 
@@ -180,7 +180,7 @@ def count_verdicts(claims: Mapping[str, Claim]) -> list[str]:
     words = ", ".join(f'{count} "{verdict}"' for verdict, count in counts.items())
     every, tested = (
         {claim.reading_of or name for name, claim in claims.items() if claim.verdict != left_out}
-        for left_out in ("", Verdict.UNTESTABLE)
+        for left_out in ("", ClaimVerdict.UNTESTABLE)
     )
     return (
         [f"{len(claims)} rows on {len(every)} claims, of which {len(tested)} are tested here: {words}."]

@@ -20,7 +20,7 @@ from nlp_gait.gaits.humanoid.turning import find_sharpest_turn
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 
-class Goal(NamedTuple):
+class RaisedQuantity(NamedTuple):
     """A quantity to be maximised: an index or a variable of a walking cycle."""
 
     words: str
@@ -29,9 +29,9 @@ class Goal(NamedTuple):
 
 
 GOALS = (
-    Goal("highest speed", "speed_m_s", "m/s"),
-    Goal("longest step", "step_length_m", "m"),
-    Goal("highest lift of a foot", "swing_height_m", "m"),
+    RaisedQuantity("highest speed", "speed_m_s", "m/s"),
+    RaisedQuantity("longest step", "step_length_m", "m"),
+    RaisedQuantity("highest lift of a foot", "swing_height_m", "m"),
 )
 FACTOR, MOST_ROUNDS = 2.0, 6  # by which our bounds are moved in each round, and the number of rounds
 SHOWN = 4  # limits in a sentence
@@ -39,7 +39,7 @@ FREE = 1e-4  # share of the value: a limit whose natural step changes it by less
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stop:
+class StoppingLimit:
     """A limit that stops the robot."""
 
     name: str  #: of the row or bound
@@ -55,7 +55,7 @@ class Round:
     """The greatest value with some of our bounds moved outwards."""
 
     value: float
-    stops: tuple[Stop, ...]  #: most effective one first
+    stops: tuple[StoppingLimit, ...]  #: most effective one first
     moved: Mapping[str, float]  #: parameters of our bounds, by name
     x: Mapping[str, float]  #: the gait, by variable name
 
@@ -149,7 +149,9 @@ class Capabilities(Question[tuple[Capability, ...]]):
         return [f"{c.words}: {c.end}" for c in findings if c.within is None]
 
 
-def raise_quantity(problem: GaitProblem, goal: Goal, x: Mapping[str, float], solver: Solver, work: Work) -> Capability:
+def raise_quantity(
+    problem: GaitProblem, goal: RaisedQuantity, x: Mapping[str, float], solver: Solver, work: Work
+) -> Capability:
     """Maximise a quantity from a feasible gait x; while our bounds stop it, move them outwards and continue."""
     raised = maximise(problem, goal)
     rounds: list[Round] = []
@@ -173,7 +175,7 @@ def raise_quantity(problem: GaitProblem, goal: Goal, x: Mapping[str, float], sol
     return Capability(words=goal.words, quantity=goal.quantity, unit=goal.unit, rounds=tuple(rounds), end=end)
 
 
-def maximise(problem: GaitProblem, goal: Goal) -> GaitProblem:
+def maximise(problem: GaitProblem, goal: RaisedQuantity) -> GaitProblem:
     """Return the problem that maximises a quantity under the same constraints."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
@@ -184,18 +186,18 @@ def maximise(problem: GaitProblem, goal: Goal) -> GaitProblem:
     return problem.derive(name=f"{problem.name}-{goal.quantity}", objective=objective, change=change)
 
 
-def list_stops(solution: Solution) -> tuple[Stop, ...]:
+def list_stops(solution: Solution) -> tuple[StoppingLimit, ...]:
     """Return the limits that stop a maximum, the one whose natural step gains most first."""
     stops = [make_stop(active) for active in solution.active_constraints]
     effective = (stop for stop in stops if abs(stop.gain) > FREE * abs(solution.objective))
     return tuple(sorted(effective, key=lambda stop: -abs(stop.gain)))
 
 
-def make_stop(active: ActiveConstraint) -> Stop:
+def make_stop(active: ActiveConstraint) -> StoppingLimit:
     """Return an active constraint as a stop."""
     variable = active.name.removeprefix("bounds[").removesuffix("]") if active.name.startswith("bounds[") else ""
     is_goal = any(variable == goal.quantity for goal in GOALS)
-    return Stop(
+    return StoppingLimit(
         name=active.name,
         side=active.side,
         bound=active.bound,
@@ -207,7 +209,7 @@ def make_stop(active: ActiveConstraint) -> Stop:
     )
 
 
-def move_bound(problem: GaitProblem, stop: Stop) -> tuple[str, float]:
+def move_bound(problem: GaitProblem, stop: StoppingLimit) -> tuple[str, float]:
     """Return the parameter of one of our bounds and its value further out; times stay positive."""
     variable = stop.name.removeprefix("bounds[").removesuffix("]")
     outwards = (stop.side == "upper") == (stop.bound > 0.0)

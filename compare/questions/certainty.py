@@ -15,7 +15,7 @@ from matplotlib.figure import Figure as Drawing
 from compare.analysis.best_known import relative_gap
 from compare.analysis.units import axis_label, with_unit
 from compare.drawing.figures import COLOURS, new_figure, style
-from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_starts
+from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import Figure, text_table
 from compare.study.references import find_reference
@@ -49,7 +49,7 @@ class LongSearch:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
+class FoundCertainty:
     """Evidence that the best known optimum is the global one."""
 
     problem: GaitProblem  #: with its parameter values
@@ -108,7 +108,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Certainty(Question[Evidence]):
+class Certainty(Question[FoundCertainty]):
     """How certain is it that the best known optimum is the global one: many starts, a long search and, if possible, a proof."""
 
     name: ClassVar[str] = "certainty"
@@ -134,7 +134,7 @@ class Certainty(Question[Evidence]):
         if self.evaluations:
             algorithm("cma")
 
-    def find(self, work: Work) -> Iterator[Evidence]:
+    def find(self, work: Work) -> Iterator[FoundCertainty]:
         """Yield the evidence.
 
         Raises:
@@ -142,7 +142,7 @@ class Certainty(Question[Evidence]):
             CompilerError: a search or a proof is requested and there is no compiler.
         """
         problem, store, progress = self.problem, work.store, work.progress
-        ends = run_starts(problem, store, starts=self.starts, seed=self.seed, progress=progress)
+        ends = run_stored_starts(problem, store, starts=self.starts, seed=self.seed, progress=progress)
         optima = cluster_ends(problem, ends)
         if not optima:
             raise InputError(
@@ -169,7 +169,7 @@ class Certainty(Question[Evidence]):
         if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
             inputs = {**identity, **limits, "proof_code_sha256": hash_code(make_bounds(problem))}
             certificate = work.compute(Certificate, "certificate-{key}", inputs, prove)
-        yield Evidence(
+        yield FoundCertainty(
             problem=problem,
             starts=self.starts,
             statuses=dict(Counter(ends.status)),
@@ -179,10 +179,10 @@ class Certainty(Question[Evidence]):
             certificate=certificate,
         )
 
-    def get_optimum(self, findings: Evidence) -> float:
+    def get_optimum(self, findings: FoundCertainty) -> float:
         return findings.optima[0].objective
 
-    def report(self, findings: Evidence) -> Answer:
+    def report(self, findings: FoundCertainty) -> Answer:
         problem, unit = findings.problem, findings.problem.objective.unit
         stem = f"{problem.name}-certainty"
         proof, estimate = findings.certificate, findings.unseen
@@ -231,7 +231,7 @@ def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> L
     return LongSearch(objective=value, evaluations=result.evaluations, gap=relative_gap(value, best, problem.objective))
 
 
-def plot_evidence(evidence: Evidence) -> Drawing:
+def plot_evidence(evidence: FoundCertainty) -> Drawing:
     """Plot objective and share of the best distinct optima, with the proven bound and the end of the long search as lines."""
     objective, search, proof = evidence.problem.objective, evidence.search, evidence.certificate
     shown = evidence.optima[:DRAWN]

@@ -65,7 +65,7 @@ class UnseenOptima:
     largest_missed: float  #: upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
 
 
-def run_starts(
+def run_stored_starts(
     problem: GaitProblem,
     store: Store,
     *,

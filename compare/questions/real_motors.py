@@ -68,7 +68,7 @@ class Variant:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motors(Question[tuple[Variant, ...]]):
+class RealMotors(Question[tuple[Variant, ...]]):
     """What do the real motors change in a NAO phase (without the option ``motors``)?"""
 
     name: ClassVar[str] = "motors"

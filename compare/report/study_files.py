@@ -20,7 +20,7 @@ from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
 from nlp_gait.errors import MissingExtraError
 from nlp_gait.files import format_csv, make_file_name, replace_file, replace_nan, write_text
 
-Table = Sequence[Sequence[object]]
+TableRows = Sequence[Sequence[object]]
 """Header and rows; None for an unknown value."""
 
 MEASURED = ("n", "budget", "gap", "equivalent_evaluations")
@@ -72,7 +72,7 @@ class FurtherFiles:
         return written
 
 
-def make_runs_table(comparisons: Sequence[Comparison]) -> Table:
+def make_runs_table(comparisons: Sequence[Comparison]) -> TableRows:
     """Return all runs: ``HEADER``, dimension, budget, gap, equivalent evaluations, and costs to each target, empty if missed."""
     to_targets = [f"{axis}_to_{target:g}" for axis in COSTS for target in TARGETS]
     rows: list[Sequence[object]] = [(*HEADER, *MEASURED, *to_targets)]
@@ -86,9 +86,9 @@ def make_runs_table(comparisons: Sequence[Comparison]) -> Table:
     return replace_nan(rows)
 
 
-def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, Table]:
+def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows]:
     """Return the final points of each problem with the judge's values, by the name of their file."""
-    tables: dict[str, Table] = {}
+    tables: dict[str, TableRows] = {}
     for comparison in comparisons:
         records = comparison.records
         names = list(dict.fromkeys(name for record in records for name in record.x))
@@ -105,11 +105,11 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, Table]:
     return tables
 
 
-def _write_csv(folder: Path, tables: Mapping[str, Table]) -> list[Path]:
+def _write_csv(folder: Path, tables: Mapping[str, TableRows]) -> list[Path]:
     return [write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))) for name, rows in tables.items()]
 
 
-def _write_parquet(path: Path, table: Table) -> Path:
+def _write_parquet(path: Path, table: TableRows) -> Path:
     try:
         import pyarrow
         from pyarrow.parquet import write_table
@@ -129,7 +129,7 @@ def _write_figures(stem: Path, comparison: Comparison, style: Path | None) -> li
         for name, (plot, words) in FIGURES.items():
             figure = f"{stem.name}-{name}"
             written.append(save_pdf(plot(comparison, column=True), stem.with_name(f"{figure}.pdf")))
-            caption = escape_latex(f"{words}; {comparison.problem}, {describe_runs(comparison)}.")
+            caption = escape_latex(f"{words}; {comparison.problem}, {describe_run_counts(comparison)}.")
             text += (
                 f"\\begin{{figure}}\n\\centering\n\\includegraphics{{{figure}.pdf}}\n"
                 f"\\caption{{{caption}}}\n\\label{{fig:{figure}}}\n\\end{{figure}}\n"
@@ -185,7 +185,7 @@ def escape_latex(text: str) -> str:
     return text.translate(SPECIAL)
 
 
-def describe_runs(comparison: Comparison) -> str:
+def describe_run_counts(comparison: Comparison) -> str:
     """Return for example "n = 20 runs of each solver, at most 10,000 evaluations of a search"."""
     runs = sorted({len(solver.records) for solver in comparison.solvers})
     stops = [record.definition.get("stop") or {} for record in comparison.records]
@@ -203,7 +203,7 @@ def _write_caption(comparison: Comparison) -> str:
         gap = f"Gap: distance of the median from the best known value, {best_known} ({comparison.known.source})"
     sentences = [
         f"{heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
-        f"{describe_runs(comparison)}",
+        f"{describe_run_counts(comparison)}",
         "Best to gap are over the feasible runs",
         gap,
         "p: two-sided rank-sum test over all runs against the first solver, Holm-corrected over all pairs",

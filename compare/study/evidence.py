@@ -49,7 +49,7 @@ class Exclusion(NamedTuple):
 Scope = Literal["none", "best", "all"]
 
 
-class Evidence(NamedTuple):
+class CheckedRecords(NamedTuple):
     """Records that passed all checks, and the others."""
 
     records: list[RunRecord]
@@ -61,7 +61,7 @@ def check_records(
     *,
     find_problem: Callable[[RunRecord], GaitProblem] | None = None,
     between_samples: Scope = "best",
-) -> Evidence:
+) -> CheckedRecords:
     """Check records against their points, proofs, each other and the code that made them.
 
     Args:
@@ -87,7 +87,7 @@ def check_records(
         why += check_claims(record)
     find_copies(records, reasons)
     check_code(records, reasons)
-    evidence = Evidence([], [])
+    evidence = CheckedRecords([], [])
     for record, why in zip(records, reasons, strict=True):
         if why:
             evidence.excluded.append(Exclusion(name_record(record), tuple(why), record))
@@ -98,7 +98,7 @@ def check_records(
 
 def read_evidence(
     folder: Path, between_samples: Scope = "best", find_problem: Callable[[RunRecord], GaitProblem] | None = None
-) -> Evidence:
+) -> CheckedRecords:
     """Read and check all records of a folder, those of other definitions last.
 
     Raises:

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from compare.judge import evaluate
-from compare.study.evidence import Evidence, check_records
+from compare.study.evidence import CheckedRecords, check_records
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.record_files import RECORDS, read_records
 from compare.study.store import as_json
 from compare.study.task import LABEL, ProblemSpec
 from nlp_gait.backends.identity import hash_json, identify_problem
-from nlp_gait.columns import Table, read_table
+from nlp_gait.columns import CsvTable, read_table
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 
@@ -27,7 +27,7 @@ HISTORY = ("run", "evaluations", "objective")
 LEAST = {"objective": -math.inf, "violation": 0.0, "time_s": 0.0}
 
 
-def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) -> tuple[Table, Array]:
+def read_points(path: Path, problem: GaitProblem, others: Sequence[str] = ()) -> tuple[CsvTable, Array]:
     """Read points (m, n) from CSV: columns by the variables' names and some others, or without a header as in x.
 
     Raises:
@@ -151,10 +151,10 @@ def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tupl
     }
 
 
-def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> Evidence:
+def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> CheckedRecords:
     """Return the checked imported records in a folder whose problems are those of some records."""
     if not (folder / RECORDS).is_dir():
-        return Evidence([], [])
+        return CheckedRecords([], [])
     known = {record.problem: record.definition["problem"].get("sha256") for record in records}
     imported = [
         record

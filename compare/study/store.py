@@ -49,7 +49,7 @@ class Computation:
     function: Callable[[], Any]
 
 
-class Result(NamedTuple):
+class StoredResult(NamedTuple):
     """A stored result: its value, which may be None, and the inputs from which it was computed."""
 
     value: Any
@@ -140,7 +140,7 @@ class Store:
                 values[name] = self.save(name, inputs[name], function())
         return values
 
-    def load(self, name: str, inputs: Mapping[str, Any] | None = None) -> Result | None:
+    def load(self, name: str, inputs: Mapping[str, Any] | None = None) -> StoredResult | None:
         """Return the stored result; None if it is missing, damaged or of other inputs (inputs None accepts any)."""
         path = self._path(name, inputs, ".json")
         if path is None or not path.exists():
@@ -153,7 +153,7 @@ class Store:
             return None
         intact = content["result_sha256"] == hash_json([content["result"], content["inputs"]])
         fits = inputs is None or content["sha256"] == hash_json(inputs)
-        return Result(content["result"], content["inputs"]) if intact and fits else None
+        return StoredResult(content["result"], content["inputs"]) if intact and fits else None
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
         """Store a result, and return it as ``load`` does; raises as ``compute_all``."""
@@ -199,7 +199,7 @@ class Store:
         stored = counts[STORED[0]]
         return f"{stored} of {counts.total()} results were stored by an earlier run" if stored else ""
 
-    def _find(self, name: str, inputs: Mapping[str, Any]) -> tuple[Result | None, str]:
+    def _find(self, name: str, inputs: Mapping[str, Any]) -> tuple[StoredResult | None, str]:
         """Result, and what to say when it is computed."""
         result = self.load(name, inputs)
         outdated = self.load(name) if result is None and KEY not in name else None

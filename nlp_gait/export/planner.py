@@ -9,7 +9,17 @@ from casadi import SX
 
 from nlp_gait.backends.derivatives.assembly import NlpPlan
 from nlp_gait.backends.derivatives.compiled import write_array
-from nlp_gait.backends.derivatives.plan import CALL, FIRST, PRODUCTS, RUNS, SECOND, TAPE, VALUES, Plan, format_number
+from nlp_gait.backends.derivatives.plan import (
+    CALL,
+    FIRST,
+    PRODUCTS,
+    RUNS,
+    SECOND,
+    TAPE,
+    VALUES,
+    DerivativePlan,
+    format_number,
+)
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import NlpModel, build_nlp
 from nlp_gait.errors import InputError
@@ -142,7 +152,7 @@ def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
     ]
 
 
-def _count(plan: Plan, phase: int) -> int:
+def _count(plan: DerivativePlan, phase: int) -> int:
     """Count a phase's additions, multiplications and functions."""
     total = 0
     for kind, first, last in plan.steps[phase]:

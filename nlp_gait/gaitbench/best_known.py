@@ -69,7 +69,7 @@ def compute_facts(instance: Judged, starts: int) -> Facts:
             best = make_strictly_feasible(instance, np.array(end.x))
             if best is None:
                 continue
-            best_known = evaluate(instance, best)[0]
+            best_known = evaluate_interpreted(instance, best)[0]
             costs = [outcome.cost for outcome in ends]
             return Facts(
                 best_known=best_known,
@@ -92,7 +92,7 @@ def count_distinct(costs: Sequence[float]) -> int:
     return 1 + sum(b - a > 1e-4 * abs(a) for a, b in zip(order, order[1:], strict=False))
 
 
-def evaluate(instance: Judged, x: Array) -> tuple[float, Array]:
+def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     kernel = build_kernel(instance.gait_problem)
     cost, g = kernel.function(x, instance.gait_problem.p)
@@ -113,7 +113,7 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
         x = first
         for _ in range(4):
-            cost, G = evaluate(instance, x)
+            cost, G = evaluate_interpreted(instance, x)
             if G.max() <= -SLACK / 2:
                 found.append((cost, x))
                 break
@@ -139,7 +139,7 @@ def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
     X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])
-    values = [evaluate(instance, x) for x in X]
+    values = [evaluate_interpreted(instance, x) for x in X]
     weights = 1.0 + np.arange(len(values[0][1])) % 7
     return tuple(
         Probe(x=tuple(x.tolist()), objective=f, violation=float(np.maximum(G, 0.0).sum()), rows=float(G @ weights))

@@ -39,7 +39,7 @@ NEAREST, FARTHEST = -6.0, -1.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class CertificateCheck:
     """Result of a search for better points, and of following paths."""
 
     best: float  # best feasible objective found; it does not contradict the bound
@@ -51,7 +51,7 @@ class Check:
     same_code: bool  # whether this code made the file; otherwise the paths prove what this code would prove
 
 
-def load_problem(file: CertificateFile) -> GaitProblem:
+def load_certified_problem(file: CertificateFile) -> GaitProblem:
     """Return the problem of a certificate; raises InputError if it cannot be made or has changed."""
     with convert_errors("the certificate's problem cannot be made", InputError):
         stored = decode(StoredProblem, file.problem, "problem")
@@ -71,7 +71,7 @@ def check_certificate(
     starts: int = STARTS,
     paths: int = PATHS,
     seed: int = 0,
-) -> Check:
+) -> CertificateCheck:
     """Look for a point that is better than the bound, then follow paths of the proof.
 
     Args:
@@ -88,7 +88,7 @@ def check_certificate(
             bound, or a path does not end.
     """
     _check_numbers(file.certificate)
-    problem = load_problem(file)
+    problem = load_certified_problem(file)
     target = _check_incumbent(problem, file.certificate)
     found = {"the incumbent": np.array(file.certificate.x), **_check_shipped(problem, file), **(points or {})}
     if starts:
@@ -106,7 +106,7 @@ def check_certificate(
         if not len(path):
             same = file.code_sha256 == hash_code(bounds)
             size = float(sizes[: (paths + 1) // 2].mean())
-            return Check(
+            return CertificateCheck(
                 best=best, source=source, paths=paths, pieces=dropped, deepest=depth, boxes=size, same_code=same
             )
         sizes[path] += 2.0 * weight
@@ -138,7 +138,7 @@ def repeat_proof(
         InputError: the certificate is not valid, see ``check_certificate``, or its bound is tighter than the proven one.
     """
     _check_numbers(file.certificate)
-    problem = load_problem(file)
+    problem = load_certified_problem(file)
     _check_incumbent(problem, file.certificate)
     proof, x = file.certificate, np.array(file.certificate.x)
     return certify(

@@ -45,7 +45,7 @@ class JointPlace(NamedTuple):
 Chain = list[JointPlace]  # joints from a link towards the root
 
 
-class Sole(NamedTuple):
+class InferredSole(NamedTuple):
     """Part of a foot that touches the ground, from its joint, along the root's axes [m]."""
 
     height: float  # of the joint above it
@@ -207,7 +207,7 @@ def _are_arms(legs: Legs, links: Records, chains: Mapping[str, Chain]) -> bool:
     return bool(mass > 0.0 and legs.chains[0][-1].place[2] > moment / mass)
 
 
-def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> Sole:
+def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> InferredSole:
     points, kind, missing = read_shapes(link)
     write = (
         'write its sole into the JSON file next to the model: "ankle_height_m", "front_m", "back_m", "left_m", "right_m" '
@@ -228,10 +228,10 @@ def _find_sole(robot: str, link: str, read_shapes: ReadShapes) -> Sole:
             f"{1e3 * (high[1] - low[1]):.1f} mm: no flat sole. Soles that are tilted at zero angles are not supported; "
             f"else {write}"
         )
-    return Sole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground), kind)
+    return InferredSole(-float(points[:, 2].min()), low[:2], high[:2], len(on_ground), kind)
 
 
-def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[Sole]) -> float:
+def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[InferredSole]) -> float:
     """Return the angle about z that turns the forward direction to x: a multiple of a quarter turn [rad].
 
     Forward is perpendicular to the line between the feet, and knees bend so that the feet go back; the longer part of the soles

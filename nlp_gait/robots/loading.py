@@ -21,7 +21,7 @@ from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_fee
 from nlp_gait.robots.mjcf import list_dependencies, mjcf_record, read_foot_geoms
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
-from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_name
+from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_robot_name
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
 from nlp_gait.robots.urdf import find_moving_link, list_meshes, read_foot_shapes, urdf_record
 
@@ -62,10 +62,10 @@ class RobotFile:
 
     def __post_init__(self) -> None:
         if self.name is not None:
-            check_name(self.name, "robot")
+            check_robot_name(self.name, "robot")
         for group in ("links", "joints", "joint_names"):
             for name in getattr(self, group):
-                check_name(name, group)
+                check_robot_name(name, group)
         for side in self.feet:
             decode_value(Side, side, "a key of feet")
 

@@ -20,7 +20,7 @@ LARGEST_NUMBER = 1e9  # in the unit of its field: above those of any robot, and 
 TRIANGLE_TOLERANCE = 1e-6
 
 
-def check_name(name: str, where: str) -> None:
+def check_robot_name(name: str, where: str) -> None:
     """Raise ValueError for a name that is empty, too long, or not printable."""
     if not name or len(name) > LONGEST_NAME or not name.isprintable():
         raise ValueError(f"{where}: a name has 1 to {LONGEST_NAME} printable characters, got {name[:LONGEST_NAME]!r}")

@@ -125,7 +125,7 @@ MIRROR_M, MIRROR_COSINE = 2e-3, 0.999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Body:
+class TreeBody:
     """Link in a tree from the fixed link; its reference point is the joint to its parent in the tree."""
 
     link: Link  # mass and inertia, in link axes
@@ -137,7 +137,7 @@ class Body:
     armature_kgm2: float = 0.0  # inertia of the rotor at the joint, if the robot's dynamics include it [kg m^2]
 
 
-def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[Body, ...]:
+def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[TreeBody, ...]:
     """Return the bodies from the fixed link outwards, parents before children, connected by some joints (None: by all).
 
     The fixed link's reference point is its frame's origin.
@@ -152,7 +152,7 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
     for between in robot.joints.values() if joints is None else map(robot.joint, joints):
         neighbours[between.parent].append((between.child, between))
         neighbours[between.child].append((between.parent, between))
-    bodies: list[Body] = []
+    bodies: list[TreeBody] = []
     waiting: list[tuple[str, int, Joint | None, Vector]] = [(fixed_link, -1, None, (0.0, 0.0, 0.0))]
     while waiting:
         name, parent, joint, parent_reference = waiting.pop()
@@ -162,7 +162,7 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
         reference = (0.0, 0.0, 0.0) if joint is None or forward else joint.origin_m
         link = robot.links[name]
         bodies.append(
-            Body(
+            TreeBody(
                 link=link,
                 parent=parent,
                 joint=joint,

@@ -12,7 +12,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
-from nlp_gait.simulation.feedback import Balance, Feedback
+from nlp_gait.simulation.feedback import BalanceController, Feedback
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.replanning import Replanning, StepPlanner
 from nlp_gait.simulation.sensors import check_period
@@ -85,7 +85,7 @@ class Drive:
             return shifted
         return shifted + at("tau", times) / np.array([self.stiffness(joint) for joint in joints])
 
-    def balance(self, plan: Plan, model: Any) -> Balance | StepPlanner | None:
+    def balance(self, plan: Plan, model: Any) -> BalanceController | StepPlanner | None:
         """Return the controller of one simulation, if the drive has a feedback."""
         if self.feedback is None:
             return None
@@ -98,7 +98,7 @@ class Drive:
         if isinstance(self.feedback, Replanning):
             return StepPlanner(self.feedback, plan, shift, model)
         stiffness = np.array([self.stiffness(plan.robot.joint(name)) for name in plan.joints])
-        return Balance(self.feedback, plan, stiffness, model)
+        return BalanceController(self.feedback, plan, stiffness, model)
 
     def torque_limit(self, joint: Joint) -> float:
         """Return the torque limit of a joint [Nm]."""

@@ -44,7 +44,7 @@ class Feedback(Sensing):
         return replace(self, **{name: factor * getattr(self, name) for name in STRENGTHS})
 
 
-class Balance:
+class BalanceController:
     """Controller of one simulation; ``stiffness`` (J,) is that of the drives as their driver assumes it [Nm/rad]."""
 
     def __init__(self, feedback: Feedback, plan: Plan, stiffness: Array, model: Any) -> None:

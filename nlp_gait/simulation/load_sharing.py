@@ -56,7 +56,7 @@ class Support(NamedTuple):
     lifting: str | None
 
 
-class Instants(NamedTuple):
+class SharedLoads(NamedTuple):
     """Loads of n samples that are linear in the wrench w (6,) on the right sole: torque - gain w, left - carried w."""
 
     torque: Array  # (n, J) without it [Nm]
@@ -100,7 +100,7 @@ def find_double_supports(signals: Signals) -> Iterator[Support]:
 
 
 @lock_casadi
-def compute_instants(plan: Plan, samples: slice) -> Instants:
+def compute_instants(plan: Plan, samples: slice) -> SharedLoads:
     """Compute the loads of some of a plan's samples."""
     arrays, joints, feet = plan.signals.arrays, plan.joints, plan.robot.feet
     symbols = [SX.sym(name, len(joints)) for name in MOVED]
@@ -115,7 +115,7 @@ def compute_instants(plan: Plan, samples: slice) -> Instants:
     values = [arrays[name][samples] for name in MOVED]
     n = len(values[0])
     torque, gain, left, carried = (np.array(part) for part in function.map(n)(*(value.T for value in values)))
-    return Instants(
+    return SharedLoads(
         torque.T,
         gain.reshape(len(joints), n, WRENCH).transpose(1, 0, 2),
         left.T,
@@ -134,7 +134,7 @@ def make_sole_rows(robot: Robot, friction: float) -> Mapping[str, Array]:
     return found
 
 
-def _solve_cheapest(plan: Plan, support: Support, instants: Instants, sharing: Sharing) -> Array:
+def _solve_cheapest(plan: Plan, support: Support, instants: SharedLoads, sharing: Sharing) -> Array:
     samples = slice(support.first, support.last + 1)
     t, rate = plan.signals.arrays["t"][samples], plan.signals.arrays["qd"][samples]
     n, knots = len(t), max(2, math.ceil((t[-1] - t[0]) / sharing.period_s) + 1)
@@ -175,7 +175,7 @@ def _solve_cheapest(plan: Plan, support: Support, instants: Instants, sharing: S
 Limit = tuple[Any, Array]  # rows of a sparse matrix, to be multiplied with all knots, and their upper bounds
 
 
-def _limit_soles(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any) -> Iterator[Limit]:
+def _limit_soles(plan: Plan, instants: SharedLoads, sharing: Sharing, wrenches: Any) -> Iterator[Limit]:
     """Yield the limits of both soles at every sample."""
     rows = make_sole_rows(plan.robot, sharing.friction)
     n = len(instants.left)
@@ -186,7 +186,7 @@ def _limit_soles(plan: Plan, instants: Instants, sharing: Sharing, wrenches: Any
 
 
 def _limit_rates(
-    plan: Plan, support: Support, instants: Instants, sharing: Sharing, t: Array, knots: int, place: Array
+    plan: Plan, support: Support, instants: SharedLoads, sharing: Sharing, t: Array, knots: int, place: Array
 ) -> Iterator[Limit]:
     """Yield the limits of the change of each foot's load between knots, and from zero at landing and to zero at lifting."""
     if not math.isfinite(sharing.load_rate_1_s):

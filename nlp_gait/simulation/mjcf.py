@@ -12,7 +12,7 @@ import numpy as np
 from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
-from nlp_gait.robots.tree import Body, tree_from
+from nlp_gait.robots.tree import TreeBody, tree_from
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.shapes import Prism, Shape
@@ -108,7 +108,7 @@ def _add_hulls(assets: Xml.Element, shapes: Shapes) -> None:
 
 
 def add_bodies(
-    world: Xml.Element, tree: Sequence[Body], shapes: Shapes, *, root: Literal["free", "planar", "fixed"]
+    world: Xml.Element, tree: Sequence[TreeBody], shapes: Shapes, *, root: Literal["free", "planar", "fixed"]
 ) -> dict[str, Xml.Element]:
     """Add the bodies of a tree, each with its frame at its reference point; return the elements by link."""
     elements: list[Xml.Element] = []

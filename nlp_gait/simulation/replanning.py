@@ -70,7 +70,7 @@ class Replanning(Sensing):
             raise InputError(f"free must be some of {','.join(FREE)}, separated by commas, got {self.free!r}")
 
 
-class State(NamedTuple):
+class PlanState(NamedTuple):
     """State of a plan in the axes of the standing foot: places [m] with velocities [m/s], angles [rad] with rates [rad/s]."""
 
     hip: Array  # (3,)
@@ -87,8 +87,8 @@ class PlannedPhase(NamedTuple):
     name: PhaseName
     stance: int  # number of this foot in ``SIDES``
     duration_s: float
-    start: State
-    end: State
+    start: PlanState
+    end: PlanState
     height: float  # of the swing [m]
 
 
@@ -99,8 +99,8 @@ class Pursuit(NamedTuple):
     began_s: float
     share: float  # of the phase that is done where it begins
     duration_s: float
-    start: State
-    end: State
+    start: PlanState
+    end: PlanState
     values: dict[str, float]  # parameters of the problem
     x: Array  # (n,) its variables
 
@@ -108,13 +108,13 @@ class Pursuit(NamedTuple):
         """Return the share of the phase that is done at a time of the walk [s]."""
         return self.share + (1.0 - self.share) * min(max((t - self.began_s) / self.duration_s, 0.0), 1.0)
 
-    def at(self, t: float) -> State:
+    def at(self, t: float) -> PlanState:
         """Return the state at a time of the walk [s]: cubics, as in the problem."""
         s, found = min(max((t - self.began_s) / self.duration_s, 0.0), 1.0), list[Any]()
         for k in range(0, len(self.start), 2):
             ends: list[Any] = [self.start[k], self.end[k], self.start[k + 1], self.end[k + 1], self.duration_s, s]
             found += cubic(*ends)[:2]  # of numbers
-        return State(*found)
+        return PlanState(*found)
 
 
 class RestPlanner:
@@ -206,7 +206,7 @@ class StepPlanner:
         if phase.stance != now.phase.stance:  # seen from the other foot
             mirror, (x, y) = np.array([1.0, -1.0, 1.0]), state.foot
             hip = mirror * state.hip + [-x, y + left_y, 0.0]
-            state = State(hip, mirror * state.hip_rate, np.array([-x, y]), -state.foot_rate, *phase.start[4:])
+            state = PlanState(hip, mirror * state.hip_rate, np.array([-x, y]), -state.foot_rate, *phase.start[4:])
         self._now = self._make(end_s, 0.0, state)
         self._guess, self._guess_s = self._now.x, end_s
 
@@ -255,7 +255,7 @@ class StepPlanner:
             end = trial.end._replace(hip=hip, hip_rate=rate, foot=foot)
             self._now = trial._replace(x=found.x, end=end, duration_s=at[TIMES[name]])
 
-    def _make(self, t: float, share: float, state: State) -> Pursuit:
+    def _make(self, t: float, share: float, state: PlanState) -> Pursuit:
         """Return the rest of the present phase to its planned end, from a state at a time [s]."""
         phase, left_y = self._phases[self._k], self._body.feet_y[0]
         name, end, duration = phase.name, phase.end, TIMES[phase.name]
@@ -284,7 +284,7 @@ class StepPlanner:
         else:
             values |= _pair(FOOT, foot)
         values |= self._list_edges([np.array([0.0, left_y])] + [foot] * (name == "dsp"))
-        ends = State(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
+        ends = PlanState(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
         named = {duration: left, **_pair(HIP_PLACES, ends.hip), **_pair(HIP_RATES, rate), **_pair(FOOT, foot)}
         x = np.array([named.get(each, 0.0) for each in self._planners[name].names])
         return Pursuit(phase, t, share, left, state, ends, values, x)
@@ -350,7 +350,7 @@ def list_phases(plan: Plan, body: Body) -> list[PlannedPhase]:
             other, hip = (mirror * (place - feet[stance][i]) for place in (feet[1 - stance][i], plan.at("hip", at)[0]))
             q, qd = ((signs * plan.at(kind, at)[0][columns])[arms] for kind in ("q", "qd"))
             other, hip = (other + origin)[:2], hip + origin
-            states.append(State(hip, mirror * plan.rate("hip", at)[0], other, np.zeros(2), q, qd))
+            states.append(PlanState(hip, mirror * plan.rate("hip", at)[0], other, np.zeros(2), q, qd))
         start, end = states
         end = end._replace(hip=end.hip - [*end.foot, 0.0])
         found.append(PlannedPhase(name, stance, float(t[last] - t[first]), start, end, height))

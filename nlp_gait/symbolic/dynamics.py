@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, SX
 
-from nlp_gait.robots.tree import Body
+from nlp_gait.robots.tree import TreeBody
 from nlp_gait.symbolic.kinematics import relative_rotation
 
 
@@ -64,7 +64,7 @@ def tilt_gravity(magnitude: float, slope_rad: float) -> tuple[float, float, floa
 
 
 def newton_euler(
-    tree: Sequence[Body],
+    tree: Sequence[TreeBody],
     q: Mapping[str, SX],
     qd: Mapping[str, SX],
     qdd: Mapping[str, SX],
@@ -119,7 +119,7 @@ def newton_euler(
     return torques, Wrench(forces[0], moments[0])
 
 
-def regroup_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[Inertia]:
+def regroup_inertias(tree: Sequence[TreeBody], kept: Collection[str] = ()) -> list[Inertia]:
     """Return inertias with the same torques and the same wrench on the ground that need fewer operations.
 
     Matter on the axis of a joint moves in the same way whether it belongs to the body before or after the joint, and exerts no
@@ -145,14 +145,14 @@ def regroup_inertias(tree: Sequence[Body], kept: Collection[str] = ()) -> list[I
     return inertias
 
 
-def _inertia(body: Body) -> Inertia:
+def _inertia(body: TreeBody) -> Inertia:
     mass, com, about_com = body.link.mass_kg, np.array(body.com_offset_m), body.link.inertia_matrix
     spread = np.trace(about_com) / 2 * np.eye(3) - about_com  # second moments about the centre of mass
     return Inertia(mass, mass * com, spread + mass * np.outer(com, com))
 
 
 def _accelerate(
-    tree: Sequence[Body],
+    tree: Sequence[TreeBody],
     inertias: Sequence[Inertia],
     rotations: Sequence[SX],
     qd: Mapping[str, SX],

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.robots.tree import Body
+from nlp_gait.robots.tree import TreeBody
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, stack
 
@@ -41,14 +41,14 @@ def rotation_matrix(k: DM, cos: SX, sin: SX) -> SX:
     return SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)
 
 
-def relative_rotation(body: Body, q: Mapping[str, SX]) -> SX:
+def relative_rotation(body: TreeBody, q: Mapping[str, SX]) -> SX:
     """Return the rotation (3, 3) from a body's axes to those of its parent in the tree; q by joint name [rad]."""
     if body.joint is None:
         return SX.eye(3)
     return axis_rotation(body.joint.axis, body.direction * q[body.joint.name])
 
 
-def forward_kinematics(tree: Sequence[Body], q: Mapping[str, SX], base: SX) -> list[Pose]:
+def forward_kinematics(tree: Sequence[TreeBody], q: Mapping[str, SX], base: SX) -> list[Pose]:
     """Return the poses of all bodies; the first is at ``base`` (3,) [m] with world axes, and q has joint angles [rad]."""
     poses: list[Pose] = []
     for body in tree:
@@ -62,7 +62,7 @@ def forward_kinematics(tree: Sequence[Body], q: Mapping[str, SX], base: SX) -> l
     return poses
 
 
-def centre_of_mass(tree: Sequence[Body], poses: Sequence[Pose]) -> SX:
+def centre_of_mass(tree: Sequence[TreeBody], poses: Sequence[Pose]) -> SX:
     """Return the centre of mass (3,) of all bodies [m].
 
     Source:

@@ -14,7 +14,7 @@ from nlp_gait.gaits.biped.load_sharing import torso_shares
 from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import Body, tree_from
+from nlp_gait.robots.tree import TreeBody, tree_from
 from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.mjcf import add_bodies
 
@@ -47,7 +47,7 @@ def engine_torques(result: Result, signals: Signals) -> Array:
 
 
 def _fill(
-    torques: Array, tree: Sequence[Body], signals: Signals, shared: str | None = None, share: Array | None = None
+    torques: Array, tree: Sequence[TreeBody], signals: Signals, shared: str | None = None, share: Array | None = None
 ) -> None:
     """Write the torques of a tree's joints into their columns; ``share`` (T,) scales mass and inertia of one link."""
     engine = load_mujoco()
@@ -98,7 +98,7 @@ def standing_on(
     return torques, wrench
 
 
-def fixed_model(tree: Sequence[Body], gravity: float = GRAVITY) -> str:
+def fixed_model(tree: Sequence[TreeBody], gravity: float = GRAVITY) -> str:
     """Masses and joints alone, the tree's first body welded to the world: the robot that planned torques belong to."""
     root = Xml.fromstring(
         '<mujoco><compiler angle="radian"/><option><flag constraint="disable"/></option><worldbody/></mujoco>'

@@ -24,7 +24,7 @@ pytest.importorskip("mujoco")
 
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import load_mujoco  # noqa: E402
-from nlp_gait.simulation.feedback import Balance, Feedback, compute_load_shares  # noqa: E402
+from nlp_gait.simulation.feedback import BalanceController, Feedback, compute_load_shares  # noqa: E402
 from nlp_gait.simulation.measurements import measure_walk  # noqa: E402
 from nlp_gait.simulation.plan import SIDES, Plan, make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import (  # noqa: E402
@@ -118,7 +118,7 @@ def test_torques_do_the_virtual_work_of_the_springs(plan: Plan) -> None:
     expected = np.zeros(len(names))
     for share, side in zip(shares, SIDES, strict=True):
         expected += share * virtual_work(plan, plan.robot.feet[side].link, force, plan.at("q", start)[0])
-    found = stiffness * Balance(spring, plan, stiffness, model).shift(data)
+    found = stiffness * BalanceController(spring, plan, stiffness, model).shift(data)
     np.testing.assert_allclose(found, expected, atol=1e-9)
     assert np.abs(expected).max() > 0.1
 

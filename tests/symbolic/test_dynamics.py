@@ -11,7 +11,7 @@ from casadi import SX
 
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import Body, tree_from, weld
+from nlp_gait.robots.tree import TreeBody, tree_from, weld
 from nlp_gait.symbolic.balance import LEAST_LOAD, combine_zmps, ground_load, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler, regroup_inertias
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
@@ -33,7 +33,7 @@ def by_name(q: SX) -> dict[str, SX]:
     return {name: q[i] for i, name in enumerate(JOINTS)}
 
 
-def dynamics(tree: tuple[Body, ...] = TREE, shares: dict[str, SX] | None = None) -> ca.Function:
+def dynamics(tree: tuple[TreeBody, ...] = TREE, shares: dict[str, SX] | None = None) -> ca.Function:
     """(q, qd, qdd) to torques in the order of JOINTS (those of the tree), ground force and moment."""
     q, qd, qdd = (SX.sym(name, len(JOINTS)) for name in ("q", "qd", "qdd"))
     torques, wrench = newton_euler(tree, by_name(q), by_name(qd), by_name(qdd), GRAVITY, shares)

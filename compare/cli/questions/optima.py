@@ -53,10 +53,10 @@ def certainty(
 def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: bool) -> None:
     from compare.questions.certainty import search_point
     from nlp_gait.proofs.certificate import read_certificate
-    from nlp_gait.proofs.check import check_certificate, load_problem, repeat_proof
+    from nlp_gait.proofs.check import check_certificate, load_certified_problem, repeat_proof
 
     file = read_certificate(path)
-    proof, points = file.certificate, {"a search": search_point(load_problem(file), seed)}
+    proof, points = file.certificate, {"a search": search_point(load_certified_problem(file), seed)}
     found, repeated = check_certificate(file, points=points, paths=paths, seed=seed), None
     if repeat_in is not None:
         make_writable_folder(repeat_in)
@@ -113,9 +113,9 @@ def motors(*, starts: int = 10, seed: int = 0, problem: NaoPhase, output: Output
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
     """
-    from compare.questions.real_motors import Motors
+    from compare.questions.real_motors import RealMotors
 
-    output.answer(Motors(problem=problem.load(), starts=starts, seed=seed))
+    output.answer(RealMotors(problem=problem.load(), starts=starts, seed=seed))
 
 
 @command

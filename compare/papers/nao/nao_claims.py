@@ -17,7 +17,7 @@ from compare.analysis.record_statistics import a12, rank_sum_normal
 from compare.papers.claims import (
     SIGNIFICANT,
     Check,
-    Verdict,
+    ClaimVerdict,
     compare_changes,
     compare_levels,
     decide,
@@ -57,8 +57,8 @@ def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
 def _check_left_tail(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
     """Check by the left-tailed test whether a swarm's median is less than GA's; it does not hold if the other tail is shown."""
     p = phase.test(f"{swarm}{kind}", f"ga{kind}").p_less
-    shown = {p < SIGNIFICANT: Verdict.HOLDS, p > 1 - SIGNIFICANT: Verdict.FAILS}
-    return decide(shown.get(True, Verdict.NOT_SHOWN), swarm=NAMES[swarm], p_less=p)
+    shown = {p < SIGNIFICANT: ClaimVerdict.HOLDS, p > 1 - SIGNIFICANT: ClaimVerdict.FAILS}
+    return decide(shown.get(True, ClaimVerdict.NOT_SHOWN), swarm=NAMES[swarm], p_less=p)
 
 
 def _check_each_run(phase: PhaseFindings, swarm: str) -> Check:
@@ -174,7 +174,7 @@ def _compare_histories(
 ) -> Check:
     """Compare a change [%] with that in the median run's history, or runs' histories; NaN where it holds no solution."""
     values |= {"printed": printed, "middle": _describe_change(middle), "every": _describe_change(every)}
-    return decide(Verdict.UNTESTABLE, **values) if math.isnan(middle) else compare(printed, middle, **values)
+    return decide(ClaimVerdict.UNTESTABLE, **values) if math.isnan(middle) else compare(printed, middle, **values)
 
 
 def _describe_change(change: float) -> str:
@@ -385,7 +385,7 @@ def _check_speeds(findings: NaoFindings, by: Literal["fastest", "ratio", "differ
     shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
     is_at_bound = shortest <= 1.001 * ssp.problem.lower[ssp.paper.duration]
     check = require_change(change, speeds=speeds, ranges=fast / slow, change=change)
-    return replace(check, verdict=Verdict.UNTESTABLE) if change > 0 and is_at_bound else check
+    return replace(check, verdict=ClaimVerdict.UNTESTABLE) if change > 0 and is_at_bound else check
 
 
 def _list_speeds(findings: NaoFindings) -> tuple[Array, Array]:

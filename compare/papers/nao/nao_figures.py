@@ -11,7 +11,7 @@ from compare.analysis.units import axis_label
 from compare.drawing.animation import plot_poses
 from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.gait_figure import make_skeleton
-from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points
+from compare.papers.nao.nao_findings import NAMES, FeasiblePoints, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import PAPER
 from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
 from compare.papers.paper_runs import get_point
@@ -86,7 +86,7 @@ def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
     return figure
 
 
-def _plot_solutions(axes: Axes, points: Points, position: int, name: str) -> None:
+def _plot_solutions(axes: Axes, points: FeasiblePoints, position: int, name: str) -> None:
     """Plot feasible solutions, thinned to those that can be distinguished."""
     x, power = points.x[:, position], points.power_W
     cells = np.stack([_assign_cells(x), _assign_cells(np.log(power))])

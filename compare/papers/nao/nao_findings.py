@@ -12,7 +12,7 @@ import numpy as np
 
 from compare.analysis.record_statistics import RankSum, rank_sum_normal
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, PrintedPhase
-from compare.papers.nao.nao_runs import SweepPoint, evaluate_indexes
+from compare.papers.nao.nao_runs import FixedOptimum, evaluate_indexes
 from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
@@ -29,7 +29,7 @@ CHEAP = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Points:
+class FeasiblePoints:
     """Feasible solutions that all runs of one search evaluated: x (m, n), power (m,) [W] and run (m,)."""
 
     x: Array
@@ -53,8 +53,8 @@ class PhaseFindings:
     # Runs by search, in the order of their seeds; equal runs start from the same population
     searches: Mapping[str, Sequence[RunRecord]]
     starts: Sequence[RunRecord]  # of IPOPT
-    sweeps: Mapping[int, Sequence[SweepPoint]]  # IPOPT's optima over each variable, by its position in x
-    points: Mapping[str, Points]  # by search
+    sweeps: Mapping[int, Sequence[FixedOptimum]]  # IPOPT's optima over each variable, by its position in x
+    points: Mapping[str, FeasiblePoints]  # by search
     variants: Mapping[str, Sequence[RunRecord]]  # runs of the searches with other choices
     choices: Mapping[str, ProblemSpec]  # the phase with each other choice of ``nao_paper.toml``
     choice_starts: Mapping[str, Sequence[RunRecord]]  # of IPOPT, for the choices with an optimum
@@ -180,8 +180,8 @@ class NaoFindings:
 
     ssp: PhaseFindings  # single support
     dsp: PhaseFindings  # double support
-    swing: Sequence[SweepPoint]  # IPOPT's optima of single support over the paper's swing heights
-    durations: Sequence[SweepPoint]  # likewise over durations
+    swing: Sequence[FixedOptimum]  # IPOPT's optima of single support over the paper's swing heights
+    durations: Sequence[FixedOptimum]  # likewise over durations
     others: Mapping[str, NaoFindings] = field(default_factory=dict)  # with other choices, by choice
 
     @property
@@ -205,7 +205,7 @@ class NaoFindings:
 
 
 def choose_sweep_values(
-    points: Mapping[str, Points], position: int, optimum: float, counts: tuple[int, int]
+    points: Mapping[str, FeasiblePoints], position: int, optimum: float, counts: tuple[int, int]
 ) -> list[float]:
     """Return values of a variable for a sweep, ascending.
 

@@ -15,10 +15,10 @@ from compare.papers.claims import SIGNIFICANT, bind_checks
 from compare.papers.nao import nao_claims, nao_gait_claims
 from compare.papers.nao import nao_runs as nao
 from compare.papers.nao.nao_figures import draw_figures
-from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings, Points, choose_sweep_values
+from compare.papers.nao.nao_findings import NAMES, FeasiblePoints, NaoFindings, PhaseFindings, choose_sweep_values
 from compare.papers.nao.nao_gait_claims import MARGINS, compute_joint_shares, describe_effect
 from compare.papers.nao.nao_paper import PAPER, SWING_POWER_W, PrintedPhase
-from compare.papers.nao.nao_runs import ALGORITHMS, NaoEffort, SweepPoint
+from compare.papers.nao.nao_runs import ALGORITHMS, FixedOptimum, NaoEffort
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
 from compare.report.document import Rows, Value
@@ -68,7 +68,7 @@ def _run_phases(runner: Runner, effort: NaoEffort) -> dict[str, Any]:
     return {**phases, **{fields[name]: points for name, points in special.items()}}
 
 
-def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, Points]:
+def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, FeasiblePoints]:
     """Feasible solutions of all runs, by search."""
     points = {}
     for name in nao.SEARCHES:
@@ -76,7 +76,7 @@ def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]
         runs = [found for task in tasks if (found := nao.load_points(store, task)) is not None]
         x, power = (np.concatenate(arrays) for arrays in zip(*runs, strict=True))
         run = np.repeat(np.arange(len(runs), dtype=float), [len(power) for _, power in runs])
-        points[name] = Points(x=x, power_W=power, run=run)
+        points[name] = FeasiblePoints(x=x, power_W=power, run=run)
     return points
 
 
@@ -85,7 +85,7 @@ def _sweep_phase(
     effort: NaoEffort,
     paper: PrintedPhase,
     runs: Runs,
-    points: Mapping[str, Points],
+    points: Mapping[str, FeasiblePoints],
     simulated: Mapping[str, Any],
 ) -> PhaseFindings:
     """Sweep by IPOPT over each variable's feasible range."""
@@ -110,9 +110,9 @@ def _sweep_phase(
     )
 
 
-def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> dict[str, list[SweepPoint]]:
+def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> dict[str, list[FixedOptimum]]:
     results = runner.compute(sweeps, code=(nao, ipopt))
-    return {name: [SweepPoint(**row) for row in rows] for name, rows in results.items()}
+    return {name: [FixedOptimum(**row) for row in rows] for name, rows in results.items()}
 
 
 def compute_values(findings: NaoFindings) -> dict[str, Any]:

@@ -83,7 +83,7 @@ class NaoEffort(Effort):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SweepPoint:
+class FixedOptimum:
     """IPOPT's optimum with a variable fixed at a value."""
 
     at: float
@@ -174,7 +174,7 @@ def make_sweep(name: str, spec: ProblemSpec, position: int, values: Sequence[flo
 def solve_sweep(
     spec: ProblemSpec, variable: str, values: Sequence[float], starts: int
 ) -> list[dict[str, float | bool]]:
-    """Return the fields of ``SweepPoint`` at ascending values, infeasible points included."""
+    """Return the fields of ``FixedOptimum`` at ascending values, infeasible points included."""
     problem = spec.load()
     solutions = solve_both_ways([problem.fix(**{variable: value}) for value in values], starts=starts)
     return [

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from compare.analysis.record_statistics import rank_sum
-from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide
+from compare.papers.claims import SIGNIFICANT, Check, ClaimVerdict, decide
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Case, ParetoEffort, Run
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
@@ -65,7 +65,7 @@ class Measures:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PhaseFindings:
+class PhaseFronts:
     """Results of one support phase."""
 
     problem: GaitProblem  # the phase, without its constraint on the criterion
@@ -125,7 +125,7 @@ class PhaseFindings:
 class ParetoFindings:
     """All results."""
 
-    phases: tuple[PhaseFindings, ...]  # single and double support
+    phases: tuple[PhaseFronts, ...]  # single and double support
     effort: ParetoEffort  # what was computed
 
 
@@ -180,7 +180,7 @@ def _check_knees(findings: ParetoFindings) -> Check:
 def _decide(named_cases: Iterable[tuple[str, Tested]]) -> Check:
     cases = dict(named_cases)
     held = all(holds for holds, _ in cases.values())
-    verdicts = {True: Verdict.HOLDS, False: Verdict.FAILS}
+    verdicts = {True: ClaimVerdict.HOLDS, False: ClaimVerdict.FAILS}
     found = "; ".join(f"{case}: {numbers}: {verdicts[holds]}" for case, (holds, numbers) in cases.items())
     return decide(held, found=found, early=100 * EARLY, competitive=100 * COMPETITIVE)
 
@@ -219,7 +219,7 @@ def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], 
     return _first(medians, best) == name and p < SIGNIFICANT, f"{shown}; against {NAMES[following]} p = {p:.2g}"
 
 
-def _has_two_knees(phase: PhaseFindings) -> Tested:
+def _has_two_knees(phase: PhaseFronts) -> Tested:
     knees, unit = phase.bends.knees, phase.criterion.unit
     shown = ", ".join(f"{k.value:.4f} {unit} at {k.power_W:.3f} W, {k.turn_deg:.0f} degrees" for k in knees) or "none"
     return len(knees) == KNEES, f"{len(knees)} ({shown})"

@@ -10,10 +10,10 @@ import numpy as np
 
 from compare.analysis.units import axis_label, join_words
 from compare.drawing.figures import COLOURS, add_legend_below, new_figure, use_log_axes
-from compare.papers.claims import Verdict, bind_checks
+from compare.papers.claims import ClaimVerdict, bind_checks
 from compare.papers.nao_pareto import nao_pareto_claims
 from compare.papers.nao_pareto import nao_pareto_runs as runs
-from compare.papers.nao_pareto.nao_pareto_claims import NAMES, NEAR, ParetoFindings, PhaseFindings
+from compare.papers.nao_pareto.nao_pareto_claims import NAMES, NEAR, ParetoFindings, PhaseFronts
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, CRITERION, ParetoEffort
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
@@ -35,7 +35,7 @@ def run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
     return ParetoFindings(phases=tuple(_run_phase(runner, phase, effort) for phase in runs.PHASES), effort=effort)
 
 
-def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFindings:
+def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFronts:
     work = Work(store=Store(runner.folder / phase, runner.progress), progress=runner.progress)
     problem = runs.make_spec(phase, effort).load()
     question = ParetoFront(problem=problem, objective=CRITERION, points=effort.points, starts=effort.starts)
@@ -52,7 +52,7 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFinding
     step = Computation(name=f"{phase}-challenge", inputs=inputs, function=lambda: asdict(solve()))
     (answer,) = runner.compute([step], code=()).values()
     answer = decode(Challenge, answer)
-    return PhaseFindings(problem=problem, criterion=criterion, first_front=front, answer=answer, runs=done)
+    return PhaseFronts(problem=problem, criterion=criterion, first_front=front, answer=answer, runs=done)
 
 
 def compute_values(findings: ParetoFindings) -> dict[str, Any]:
@@ -69,7 +69,7 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
         "near": 100 * NEAR,
         "criterion": ssp.criterion.name,
         "claims": len(verdicts),
-        "held": verdicts.count(Verdict.HOLDS),
+        "held": verdicts.count(ClaimVerdict.HOLDS),
         "robot": ssp.problem.options["robot"],
         "variables": [len(phase.problem.names) for phase in findings.phases],
     }
@@ -85,14 +85,14 @@ def make_tables(findings: ParetoFindings) -> dict[str, Rows]:
     return tables
 
 
-def _make_front_row(phase: PhaseFindings) -> list[Value]:
+def _make_front_row(phase: PhaseFronts) -> list[Value]:
     low, high, answer = phase.front[0], phase.front[-1], phase.answer
     ends = [low.value, low.power_W, high.value, high.power_W]
     solved = [answer.points, answer.solved, 100 * answer.least_gap, answer.moved]
     return [phase.problem.name, len(phase.front), *ends, len(phase.bends.knees), *solved]
 
 
-def _make_ends(phase: PhaseFindings) -> Rows:
+def _make_ends(phase: PhaseFronts) -> Rows:
     rows: list[list[Value]] = []
     for (name, budget), m in phase.measures.items():
         ends = (100 * m.hypervolume[:, -1], m.igd[:, -1])
@@ -101,7 +101,7 @@ def _make_ends(phase: PhaseFindings) -> Rows:
     return rows
 
 
-def _make_constraints(phase: PhaseFindings) -> Rows:
+def _make_constraints(phase: PhaseFronts) -> Rows:
     rows: list[list[Value]] = []
     for (name, budget), m in phase.measures.items():
         columns = (100 * m.feasible, m.first_feasible, m.until(NEAR), m.time_s, m.objective_time_s)
@@ -110,7 +110,7 @@ def _make_constraints(phase: PhaseFindings) -> Rows:
     return rows
 
 
-def _make_running(phase: PhaseFindings) -> Rows:
+def _make_running(phase: PhaseFronts) -> Rows:
     """Medians at each look of the runs with the largest budget."""
     chosen = [m for (_, budget), m in phase.measures.items() if budget == phase.budgets[-1]]
     columns = [chosen[0].evaluations]
@@ -127,7 +127,7 @@ def draw_figures(findings: ParetoFindings) -> dict[str, Figure]:
     return running | {f"fronts-{phase.problem.name}": _draw_fronts(phase) for phase in findings.phases}
 
 
-def _draw_running(phase: PhaseFindings) -> Figure:
+def _draw_running(phase: PhaseFronts) -> Figure:
     """Hypervolume missing and distance over evaluations, with the largest budget: medians, and the range of all runs."""
     budget = phase.budgets[-1]
     figure = new_figure(6.6, 3.0)
@@ -150,7 +150,7 @@ def _draw_running(phase: PhaseFindings) -> Figure:
     return figure
 
 
-def _draw_fronts(phase: PhaseFindings) -> Figure:
+def _draw_fronts(phase: PhaseFronts) -> Figure:
     """The true front with its knees, and the ends of all runs with the largest budget, a panel for each algorithm."""
     budget, criterion = phase.budgets[-1], phase.criterion
     line = np.array([(p.value, p.power_W) for p in phase.front])

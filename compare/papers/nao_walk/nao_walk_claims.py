@@ -9,7 +9,7 @@ from typing import Any
 
 from scipy.stats import fisher_exact
 
-from compare.papers.claims import SIGNIFICANT, Check, Verdict, decide, require_change
+from compare.papers.claims import SIGNIFICANT, Check, ClaimVerdict, decide, require_change
 from compare.papers.nao_walk import nao_walk_runs
 from compare.papers.nao_walk.nao_walk_runs import KINDS, SPECS, SPEED_M_S, NaoWalkEffort, sum_energy
 
@@ -91,9 +91,9 @@ def _check_straight(findings: NaoWalkFindings) -> Check:
             f"at {tallest_mm:.0f} mm {at_tallest:+z.1f} %"
         )
     optimum = findings.straighter["sheet"]["free"]
-    verdict = Verdict.HOLDS if all(point is tallest for point in best.values()) else Verdict.SIZE_DIFFERS
+    verdict = ClaimVerdict.HOLDS if all(point is tallest for point in best.values()) else ClaimVerdict.SIZE_DIFFERS
     if not all(best[heat][f"{heat}_J_per_m"] <= (1 - LEAST_SAVING) * own[f"{heat}_J_per_m"] for heat in HEATS):
-        verdict = Verdict.FAILS
+        verdict = ClaimVerdict.FAILS
     return decide(
         verdict,
         torso_mm=1000 * nao_walk_runs.TORSO_M,
@@ -142,12 +142,12 @@ def _check_efficient(findings: NaoWalkFindings) -> Check:
 def _check_robust(findings: NaoWalkFindings) -> Check:
     plain, fed = findings.over_stiffness("falls")
     count, full, fewest = findings.drives["none"][0]["disturbances"], plain[0], min(plain[1:])
-    verdict, chance = Verdict.FAILS, ""
+    verdict, chance = ClaimVerdict.FAILS, ""
     if fewest < full:
         p = fisher_exact([[fewest, count - fewest], [full, count - full]], alternative="less").pvalue
-        verdict = Verdict.HOLDS
+        verdict = ClaimVerdict.HOLDS
         if p >= SIGNIFICANT:
-            verdict, chance = Verdict.NOT_SHOWN, f" may be chance, Fisher: p = {p:.2g}"
+            verdict, chance = ClaimVerdict.NOT_SHOWN, f" may be chance, Fisher: p = {p:.2g}"
     return decide(
         verdict,
         count=count,
@@ -182,7 +182,7 @@ def _check_speed(findings: NaoWalkFindings) -> Check:
             f"with K of the {HEATS[heat]} {default['cost_of_transport']:.3f} there against "
             f"{cheapest['cost_of_transport']:.3f} at {100 * cheapest['speed_m_s']:.1f} cm/s{edge}"
         )
-    return decide(Verdict.UNTESTABLE, speed=100 * SPEED_M_S, found="; ".join(found), above=above)
+    return decide(ClaimVerdict.UNTESTABLE, speed=100 * SPEED_M_S, found="; ".join(found), above=above)
 
 
 def _check_battery(findings: NaoWalkFindings) -> Check:
@@ -190,7 +190,7 @@ def _check_battery(findings: NaoWalkFindings) -> Check:
     powers = [findings.engine_W(name, "sheet") for name in ("own-plain", "own")]
     share = max((power for power in powers if power is not None), default=0.0) / drained
     return decide(
-        Verdict.UNTESTABLE if 0.0 < share < 1.0 else Verdict.FAILS,
+        ClaimVerdict.UNTESTABLE if 0.0 < share < 1.0 else ClaimVerdict.FAILS,
         battery_Wh=nao_walk_runs.BATTERY_WH,
         active_min=nao_walk_runs.ACTIVE_MIN,
         drained=drained,

@@ -24,7 +24,7 @@ PERCENTILES = (5, 95)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Instants:
+class Quanta:
     """All quanta of a step; what is decided in each is x: K_p, K_d and torso pitch, or nine torques [Nm]."""
 
     problem: GaitProblem  # ``stairs-track`` with the parameters of the step
@@ -84,10 +84,10 @@ class Instants:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Instant:
+class Quantum:
     """Objective of one quantum: (53) at its end, with the distance of the ZMP from the support polygon as violation."""
 
-    instants: Instants
+    instants: Quanta
     k: int
     state: Array
     names: tuple[str, ...]
@@ -100,7 +100,7 @@ class Instant:
         return found["cost"], found["outside_m"]
 
 
-def track_by_instants(instants: Instants, algorithm: Algorithm, evaluations: int) -> dict[str, Any]:
+def track_by_instants(instants: Quanta, algorithm: Algorithm, evaluations: int) -> dict[str, Any]:
     """Return what Algorithm 4 finds over a whole step: means and extremes, and percentiles of its decisions.
 
     Args:
@@ -112,7 +112,7 @@ def track_by_instants(instants: Instants, algorithm: Algorithm, evaluations: int
     names = tuple(f"x{i}" for i in range(len(lower)))
     state, moments, started = instants.inputs[0][0], list[Mapping[str, Array]](), time.perf_counter()
     for k in range(instants.loop.quanta):
-        objective = Instant(instants=instants, k=k, state=state, names=names, lower=lower, upper=upper)
+        objective = Quantum(instants=instants, k=k, state=state, names=names, lower=lower, upper=upper)
         x = minimize(objective, algorithm, evaluations=evaluations, seed=k).x
         moments.append({"x": x[None], **instants.move(k, state, x[None])})
         state = moments[-1]["state"][0]

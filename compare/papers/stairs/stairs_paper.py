@@ -36,7 +36,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class Reading:
     """A reading of the planner or of the tracked step: options and values of the problem; the plan that is followed."""
 
     text: str
@@ -66,6 +66,6 @@ class StairsPaper:
 PAPER = read_printed(StairsPaper, "stairs/stairs_paper.toml")
 TABLE_3, TABLE_4 = PAPER.table_3, dict(enumerate(PAPER.table_4, 1))
 ANTS, ITERATIONS, EVAPORATION = PAPER.ants, PAPER.iterations, PAPER.evaporation
-CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_choices.toml").items()}
+CHOICES = {name: decode(Reading, row) for name, row in read_tables("stairs/stairs_choices.toml").items()}
 INSTANTS = (OURS, FREE, PRINTED)  # with which Algorithm 4 runs
-PLAN_CHOICES = {name: decode(Choice, row) for name, row in read_tables("stairs/stairs_plan_choices.toml").items()}
+PLAN_CHOICES = {name: decode(Reading, row) for name, row in read_tables("stairs/stairs_plan_choices.toml").items()}

@@ -10,7 +10,7 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.papers import claims
-from compare.papers.claims import Check, Series, Verdict, compare_levels, decide, require_change
+from compare.papers.claims import Check, ClaimVerdict, Series, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible
 from compare.papers.stairs import stairs_planning, stairs_runs
 from compare.papers.stairs.stairs_effects import measure_depth
@@ -141,7 +141,7 @@ def _check_peaks(findings: StairsFindings, quantity: str) -> Check:
 def _check_least_peak(findings: StairsFindings, quantity: str) -> Check:
     peaks = np.array([row for what in PLANS for row in _measure_peaks(findings, quantity, what).values()])
     if peaks.shape[1] < len(TABLE_4):
-        return decide(Verdict.NOT_SHOWN)
+        return decide(ClaimVerdict.NOT_SHOWN)
     changes = 100 * (peaks[:, [0, 2]] / peaks[:, [DRAWN_CASE - 1]] - 1)
     return _require_plans(findings, require_change(changes), *PLANS)
 
@@ -149,7 +149,7 @@ def _check_least_peak(findings: StairsFindings, quantity: str) -> Check:
 def _check_jerk_changes(findings: StairsFindings) -> Check:
     peaks = np.array([*_measure_peaks(findings, "jerk", "jerk").values()])
     changes = ", ".join(f"{Series(100 * (row[1:] / row[:-1] - 1)):+.0f}" for row in peaks)
-    return decide(Verdict.UNTESTABLE, changes=changes)
+    return decide(ClaimVerdict.UNTESTABLE, changes=changes)
 
 
 def _describe_hips(findings: StairsFindings) -> dict[str, str | Series]:
@@ -224,7 +224,7 @@ def _check_climb(findings: StairsFindings) -> Check:
     first, after = (np.array([measure_hip_speeds(findings, what, case) for case in findings.cases]) for what in STEPS)
     jumps = np.abs([first[:, 1] - after[:, 0], after[:, 1] - after[:, 0]])
     texts = {"first": Series(first[:, 1]), "start": Series(after[:, 0]), "end": Series(after[:, 1])}
-    return decide(jumps.max() <= CONTINUOUS or Verdict.UNTESTABLE, **texts)
+    return decide(jumps.max() <= CONTINUOUS or ClaimVerdict.UNTESTABLE, **texts)
 
 
 def _check_network(findings: StairsFindings) -> Check:
@@ -255,7 +255,7 @@ def _check_poses(findings: StairsFindings, share_of_first: float = math.inf, lim
             f"{rule} {first:.3g}, then {later:.3g} ms ({steps[0]}, {steps[1]:g} iterations; {found['poses']} poses)"
         )
     enough = network["adam"]["poses"] >= LEAST_POSES
-    return decide(verdicts if enough else Verdict.NOT_SHOWN, found="; ".join(texts), least=LEAST_POSES)
+    return decide(verdicts if enough else ClaimVerdict.NOT_SHOWN, found="; ".join(texts), least=LEAST_POSES)
 
 
 def _check_continuity(findings: StairsFindings) -> Check:
@@ -292,7 +292,7 @@ def _check_jerk_terms(_: StairsFindings) -> Check:
     """Shares of the jerk terms in (31) and (32), of the acceleration terms, with the maxima of Table IV."""
     ratios = [100 * row.jerk * QUANTUM / row.acceleration for row in TABLE_4.values()]
     speeds, places = (Series(ratio / part for ratio in ratios) for part in (2, 3))
-    return decide(Verdict.UNTESTABLE, speeds=speeds, places=places)
+    return decide(ClaimVerdict.UNTESTABLE, speeds=speeds, places=places)
 
 
 def _check_torso_mass(_: StairsFindings) -> Check:

@@ -10,10 +10,10 @@ from typing import Any, get_args
 import numpy as np
 
 from compare.judge import evaluate
-from compare.papers.claims import Check, Series, Verdict, decide, require_change, require_feasible
+from compare.papers.claims import Check, ClaimVerdict, Series, decide, require_change, require_feasible
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible, make_computation, make_search_tasks
 from compare.papers.stairs import stairs_runs
-from compare.papers.stairs.stairs_instants import Decides, Instants, track_by_instants
+from compare.papers.stairs.stairs_instants import Decides, Quanta, track_by_instants
 from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, OURS, PAPER, PRINTED, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import ACO, ALGORITHMS, StairsFindings, make_track_spec
 from compare.report.document import Rows, Value
@@ -82,7 +82,7 @@ def run_algorithm_4(spec: ProblemSpec, torso_rad: float, decides: Decides, evalu
     problem = spec.load()
     quanta = round(problem.value("t3_s") / QUANTUM)
     loop = ClosedLoop(quanta=quanta, scheme="implicit", gains=1, **options)  # type: ignore[arg-type]
-    instants = Instants(problem=problem, loop=loop, torso_rad=torso_rad, decides=decides)
+    instants = Quanta(problem=problem, loop=loop, torso_rad=torso_rad, decides=decides)
     return track_by_instants(instants, ALGORITHMS[ACO], evaluations)
 
 
@@ -192,13 +192,13 @@ def _check_ratios(findings: StairsFindings, quantity: str, least: bool = False) 
     """
     ours = _collect(findings, LEAST_ROWS[quantity], NEXT)
     if len(findings.cases) < len(TABLE_4):
-        return decide(Verdict.NOT_SHOWN, ratios="one case only")
+        return decide(ClaimVerdict.NOT_SHOWN, ratios="one case only")
     ratios = [np.array(row)[[0, 2]] / row[1] for row in ours.values()]
     shown = dict(zip(ours, map(Series, ratios), strict=True))
     texts = _describe({name: row for name, row in shown.items() if name in READINGS})
     spreads = np.array([[measure_spread(findings, name)] for name in ours])
     leads = 100 * (np.array(ratios) - 1) - spreads
-    check = require_change(leads, ratios=texts) if least else decide(Verdict.UNTESTABLE, ratios=texts)
+    check = require_change(leads, ratios=texts) if least else decide(ClaimVerdict.UNTESTABLE, ratios=texts)
     return _require_steps(findings, check, ours)
 
 
@@ -237,7 +237,7 @@ def _check_instants(findings: StairsFindings, decides: Decides) -> Check:
     found = _get_instants(findings, decides).values()
     held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found]
     enough = findings.effort.instant_evaluations >= ANTS * ITERATIONS or all(held)
-    return decide(held if enough else Verdict.NOT_SHOWN)
+    return decide(held if enough else ClaimVerdict.NOT_SHOWN)
 
 
 def _describe_instant_times(findings: StairsFindings) -> str:

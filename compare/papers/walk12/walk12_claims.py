@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from compare.papers import claims
-from compare.papers.claims import Check, Verdict, compare_levels, decide, require_change
+from compare.papers.claims import Check, ClaimVerdict, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, compute_range, get_point, list_objectives
 from compare.papers.walk12 import walk12_findings
 from compare.papers.walk12.walk12_findings import Walk12Findings, choose_median, compute_stable_share
@@ -211,7 +211,7 @@ def _check_static_stability(findings: Walk12Findings) -> Check:
     shares = [stable.share for stable in findings.stable]
     texts = [", ".join(f"{1 - share:.3f}" for share in values) for values in (shares, optima)]
     return decide(
-        Verdict.UNTESTABLE,
+        ClaimVerdict.UNTESTABLE,
         stable=findings.stable,
         printed=texts[0],
         optima=texts[1],
@@ -286,7 +286,7 @@ def _check_walks(findings: Walk12Findings, step_time_s: float) -> Check:
         counts = (f"{_describe_walks([w for w in driven if w.by == by])} by {by}" for by in ("paper", "IPOPT"))
         texts.append(f"drives {drives!r}: {', '.join(counts)}; of the equal optima {sum(equal)} of {len(equal)}")
     apart = float(np.ptp(list_x(findings, IPOPT)[: len(same)], axis=0).max() / 1e3)
-    return decide(Verdict.UNTESTABLE, found="; ".join(texts) if walks else NO_ENGINE, apart=apart)
+    return decide(ClaimVerdict.UNTESTABLE, found="; ".join(texts) if walks else NO_ENGINE, apart=apart)
 
 
 def _describe_walks(walks: Sequence[WalkedGait]) -> str:
@@ -299,13 +299,13 @@ def _check_same_fate(findings: Walk12Findings) -> Check:
     """Report how many walks do not fall at both step times, with all drives of ten set-points for each step; no verdict."""
     drives = [name for name, (_, set_points, *_) in DRIVES.items() if set_points]
     texts = [f"{name}: {count_upright(findings.walks, name, 'paper')}" for name in drives]
-    return decide(Verdict.UNTESTABLE, found="; ".join(texts) if findings.walks else NO_ENGINE)
+    return decide(ClaimVerdict.UNTESTABLE, found="; ".join(texts) if findings.walks else NO_ENGINE)
 
 
 def _check_below(findings: Walk12Findings) -> Check:
     below = get_point(choose_best(findings.runs["below", IPOPT]))
     apart = 1e3 * max(abs(a - b) for a, b in zip(below, get_point(findings.optimum(PAPER, 0.1)), strict=True))
-    return decide(Verdict.UNTESTABLE, apart=apart)
+    return decide(ClaimVerdict.UNTESTABLE, apart=apart)
 
 
 def _check_accuracy(findings: Walk12Findings, zmp: Zmp) -> Check:

@@ -65,7 +65,7 @@ class MotionTask:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class SolvedMotion:
     """Optimum of one task."""
 
     task: MotionTask  #: what was solved
@@ -135,7 +135,7 @@ def make_tasks(
     return [*planned, *coarse, *smooth, *free]
 
 
-def solve_motion(task: MotionTask, earlier: Sequence[Motion], seed: int, work: Work) -> Motion:
+def solve_motion(task: MotionTask, earlier: Sequence[SolvedMotion], seed: int, work: Work) -> SolvedMotion:
     """Return the optimum of a task, which may start from an earlier motion."""
     problem = task.spec.load()
     x0 = find_start(task, problem, earlier)
@@ -143,15 +143,15 @@ def solve_motion(task: MotionTask, earlier: Sequence[Motion], seed: int, work: W
     inputs = {**fingerprint(problem), "task": asdict(task), "seed": seed, "start": start}
     function = partial(_solve_motion, task, problem, x0, seed, work.solver(SOLVER))
     name = f"{task.problem}-{task.label}-{{key}}"
-    return work.compute(Motion, name, inputs, function, code=[sys.modules[__name__]])
+    return work.compute(SolvedMotion, name, inputs, function, code=[sys.modules[__name__]])
 
 
-def _solve_motion(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int, solver: Solver) -> Motion:
+def _solve_motion(task: MotionTask, problem: GaitProblem, x0: Array | None, seed: int, solver: Solver) -> SolvedMotion:
     first = None if x0 is None else np.clip(x0, problem.lower, problem.upper)
     solution = solve(problem, starts=task.starts + 1, seed=seed, x0=first, solver=solver)
     x = problem.check_x(solution.x)
     verdict = evaluate(problem, x, prove=False)
-    return Motion(
+    return SolvedMotion(
         task=task,
         seed=seed,
         variables=len(problem.names),
@@ -170,7 +170,7 @@ def _solve_motion(task: MotionTask, problem: GaitProblem, x0: Array | None, seed
     )
 
 
-def find_start(task: MotionTask, problem: GaitProblem, earlier: Sequence[Motion]) -> Array | None:
+def find_start(task: MotionTask, problem: GaitProblem, earlier: Sequence[SolvedMotion]) -> Array | None:
     """Return the richest earlier motion that this one contains; if there is none, free joints are fitted to a planned one."""
     spans = SPANS[task.trajectory]
     solved = [motion for motion in reversed(earlier) if motion.feasible and motion.task.kind in (PLANNED, FREED)]

@@ -19,8 +19,8 @@ from compare.questions.motions.motion import (
     ORDERS,
     PLANNED,
     SMOOTHED,
-    Motion,
     MotionTask,
+    SolvedMotion,
     extrapolate,
     make_tasks,
     solve_motion,
@@ -35,7 +35,7 @@ DRAWN = 20  # samples of a drawn path for each of the problem's own
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motions(Question[tuple[Motion, ...]]):
+class Motions(Question[tuple[SolvedMotion, ...]]):
     """How much power do richer motions of a NAO phase save?"""
 
     name: ClassVar[str] = "motions"
@@ -63,14 +63,14 @@ class Motions(Question[tuple[Motion, ...]]):
     def total(self) -> int:
         return len(self.tasks)
 
-    def find(self, work: Work) -> Iterator[tuple[Motion, ...]]:
-        motions: tuple[Motion, ...] = ()
+    def find(self, work: Work) -> Iterator[tuple[SolvedMotion, ...]]:
+        motions: tuple[SolvedMotion, ...] = ()
         for task in self.tasks:
             motions = (*motions, solve_motion(task, motions, self.seed, work))
             work.progress(task.label)
             yield motions
 
-    def report(self, findings: tuple[Motion, ...]) -> Answer:
+    def report(self, findings: tuple[SolvedMotion, ...]) -> Answer:
         name, stem, base = self.problem.name, f"{self.problem.name}-motions", findings[0].power_W
         over = "Least power over the coefficients beyond the paper's cubics, with the limit of the richest motions."
         return Answer(
@@ -104,11 +104,11 @@ class Motions(Question[tuple[Motion, ...]]):
             data={"problem": name, "motions": [asdict(motion) for motion in findings]},
         )
 
-    def failures(self, findings: tuple[Motion, ...]) -> list[str]:
+    def failures(self, findings: tuple[SolvedMotion, ...]) -> list[str]:
         return [f"{motion.task.label}: {motion.status}" for motion in findings if not motion.feasible]
 
 
-def describe_motion(motion: Motion) -> str:
+def describe_motion(motion: SolvedMotion) -> str:
     """Return in words what was solved."""
     if motion.task.kind == SMOOTHED:
         return f"{KIND_WORDS[SMOOTHED]}{motion.task.options['objective']}, {motion.task.trajectory}"
@@ -117,7 +117,7 @@ def describe_motion(motion: Motion) -> str:
     return KIND_WORDS[motion.task.kind] + motion.task.trajectory
 
 
-def describe_motions(motions: Sequence[Motion]) -> list[str]:
+def describe_motions(motions: Sequence[SolvedMotion]) -> list[str]:
     """Return sentences on the trend of the orders, violations between few samples, and the price of smoothness."""
     sentences = []
     for kind, (_, _, words) in LOOKS.items():
@@ -146,7 +146,7 @@ def describe_motions(motions: Sequence[Motion]) -> list[str]:
     return sentences
 
 
-def _make_csv(stem: str, motions: Sequence[Motion]) -> Table:
+def _make_csv(stem: str, motions: Sequence[SolvedMotion]) -> Table:
     header = (
         "kind problem trajectory objective samples_per_interval variables power_W dense_power_W worst_dense_violation "
         "converged starts iterations time_s joint_jerk_rad2_s6 torque_rate_Nm2_s2 status"
@@ -160,7 +160,7 @@ def _make_csv(stem: str, motions: Sequence[Motion]) -> Table:
     return make_csv_table(stem, header, rows)
 
 
-def plot_powers(motions: Sequence[Motion]) -> Drawing:
+def plot_powers(motions: Sequence[SolvedMotion]) -> Drawing:
     """Plot the power over the number of free coefficients, with the limit of the richest motions."""
     with style():
         figure = new_figure(4.6, 3.0)
@@ -189,7 +189,7 @@ def plot_powers(motions: Sequence[Motion]) -> Drawing:
     return figure
 
 
-def plot_paths(motions: Sequence[Motion]) -> Drawing:
+def plot_paths(motions: Sequence[SolvedMotion]) -> Drawing:
     """Plot the hip from above and from the side, and the swing foot from the side if it moves.
 
     Shown are the paper's cubics, the richest planned motion and the richest one with free joints.
@@ -216,7 +216,7 @@ def plot_paths(motions: Sequence[Motion]) -> Drawing:
     return figure
 
 
-def _sample_finely(motion: Motion) -> dict[str, Array]:
+def _sample_finely(motion: SolvedMotion) -> dict[str, Array]:
     problem = motion.task.spec.load().dense(DRAWN)
     assert problem is not None  # a phase has one; for the type checker
     return dict(problem.signals(motion.x).arrays)

@@ -15,8 +15,8 @@ from compare.questions.perturbed_problem import is_mass
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_optima_table, make_table
 from compare.questions.robust.robust_gait import (
     Box,
+    RobotSimulation,
     RobustGait,
-    SimulatedGait,
     Worst,
     make_boxes,
     simulate_robots,
@@ -33,7 +33,7 @@ class FoundRobust(NamedTuple):
     """Robust gaits, one for each box, the widest last, and simulations on the robots of the widest box."""
 
     gaits: tuple[RobustGait, ...]
-    simulations: tuple[SimulatedGait, ...] = ()
+    simulations: tuple[RobotSimulation, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,7 +123,7 @@ PRICES = {
 }
 
 
-def _make_simulation_table(widest: RobustGait, simulations: Sequence[SimulatedGait]) -> Table:
+def _make_simulation_table(widest: RobustGait, simulations: Sequence[RobotSimulation]) -> Table:
     return make_table(
         f"Simulated open loop on the robots of the last box ({widest.name})",
         simulations,
@@ -154,7 +154,7 @@ def _make_csv(stem: str, gaits: Sequence[RobustGait]) -> Table:
     return make_csv_table(stem, header, rows)
 
 
-def plot_robust(gaits: Sequence[RobustGait], simulations: Sequence[SimulatedGait]) -> Drawing:
+def plot_robust(gaits: Sequence[RobustGait], simulations: Sequence[RobotSimulation]) -> Drawing:
     """Plot the power with the nominal robot and in the worst corner, and lateral margins in model and engine."""
     nominal = gaits[0].nominal_W
     names = ["none", *(gait.name for gait in gaits)]

@@ -194,7 +194,7 @@ class RobustGait:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulatedGait:
+class RobotSimulation:
     """One gait on one robot, open loop."""
 
     gait: str  #: ``"nominal"`` or ``"robust"``
@@ -283,21 +283,21 @@ def _require(solution: Solution, what: str) -> Solution:
     return solution
 
 
-def simulate_robots(problem: GaitProblem, gait: RobustGait, work: Work) -> Iterator[SimulatedGait]:
+def simulate_robots(problem: GaitProblem, gait: RobustGait, work: Work) -> Iterator[RobotSimulation]:
     """Simulate the nominal and the robust gait on all robots of the scenario problem; raises MissingExtraError without MuJoCo."""
     for robot in gait.robots:
         for kind, x in (("nominal", gait.nominal_x), ("robust", gait.x)):
             perturbed = rebuild(problem, robot=robot)
             inputs = {**fingerprint(perturbed), "gait": kind, "x": dict(x)}
-            yield work.compute(SimulatedGait, "play-{key}", inputs, partial(_simulate, perturbed, robot, kind, x))
+            yield work.compute(RobotSimulation, "play-{key}", inputs, partial(_simulate, perturbed, robot, kind, x))
             work.progress(f"{kind} gait on {robot[:40]}")
 
 
-def _simulate(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -> SimulatedGait:
+def _simulate(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -> RobotSimulation:
     plan, drive = make_plan(Result(problem=problem, x=problem.check_x(x))), Drive()
     trace = simulate_plan(plan, drive=drive)
     during = trace.t <= plan.duration_s
-    return SimulatedGait(
+    return RobotSimulation(
         gait=gait,
         robot=robot,
         fell_at_s=trace.fell_at_s,

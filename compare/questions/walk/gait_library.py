@@ -23,7 +23,7 @@ from nlp_gait.formulation import GaitProblem
 
 
 @dataclass(frozen=True, kw_only=True)
-class JudgedGait:
+class MiddleGait:
     """A gait in the middle between the points of a library, and the optimum there."""
 
     at: dict[str, float]  #: value of each axis
@@ -37,7 +37,7 @@ class FoundLibrary(NamedTuple):
     """Optima of the grid, and gaits between them."""
 
     points: list[LibraryPoint]
-    judged: list[JudgedGait]
+    judged: list[MiddleGait]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,7 +88,7 @@ class LibraryOfGaits(Question[FoundLibrary]):
             if library.covers(**at):
                 gait = library.interpolate(**at)
                 inputs = {**fingerprint(gait.result.problem), "x": gait.result.x.tolist()}
-                found.judged.append(work.compute(JudgedGait, "middle-{key}", inputs, partial(_judge, gait, at)))
+                found.judged.append(work.compute(MiddleGait, "middle-{key}", inputs, partial(_judge, gait, at)))
             work.progress("")
             yield found
 
@@ -100,7 +100,7 @@ class LibraryOfGaits(Question[FoundLibrary]):
             **at,
             self.problem.objective.name: lambda point: with_unit(point.objective if point.feasible else None, unit),
         }
-        between: dict[str, Callable[[JudgedGait], str]] = {
+        between: dict[str, Callable[[MiddleGait], str]] = {
             **at,
             "interpolated": lambda gait: with_unit(gait.objective, unit),
             "worse than the optimum": lambda gait: f"{100 * self._find_excess(gait):.3f} %" if gait.optimum else "-",
@@ -132,7 +132,7 @@ class LibraryOfGaits(Question[FoundLibrary]):
             },
         )
 
-    def _find_excess(self, gait: JudgedGait) -> float:
+    def _find_excess(self, gait: MiddleGait) -> float:
         """Share of the optimum by which an interpolated gait is worse."""
         assert gait.optimum is not None
         return self.problem.objective.sign * (gait.objective - gait.optimum) / abs(gait.optimum)
@@ -141,7 +141,7 @@ class LibraryOfGaits(Question[FoundLibrary]):
         return [] if any(point.feasible for point in findings.points) else ["no point of the grid has an optimum"]
 
 
-def _format_place(axis: str, row: LibraryPoint | JudgedGait) -> str:
+def _format_place(axis: str, row: LibraryPoint | MiddleGait) -> str:
     return f"{row.at[axis]:g}"
 
 
@@ -171,10 +171,10 @@ def _read_slope(table: SensitivityTable, name: str, axis: str) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _judge(gait: LibraryGait, at: dict[str, float]) -> JudgedGait:
+def _judge(gait: LibraryGait, at: dict[str, float]) -> MiddleGait:
     solution = solve(gait.result.problem, x0=gait.result.x, workers=1)
     worst = gait.violated[0] if gait.violated else None
-    return JudgedGait(
+    return MiddleGait(
         at=at,
         objective=gait.objective,
         violation=worst.violation if worst else 0.0,

@@ -15,9 +15,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.first_order import Samples
+from nlp_gait.backends.derivatives.first_order import StagePlaces
 from nlp_gait.backends.derivatives.glue import Assembler, Glue, union
-from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Block, Call, Integers, Plan, Row
+from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Call, DerivativePlan, Integers, PlaceBlock, Row
 from nlp_gait.backends.derivatives.structure import Structure, nonzeros
 
 # Columns d and c, the entries for c, and places of the entry for d and of a factor.
@@ -27,7 +27,7 @@ Products: TypeAlias = "list[tuple[Integers, Integers, Row, int, int]]"
 class Hessian:
     """Second derivatives of the Lagrangian: sparsity and place of the upper triangle."""
 
-    def __init__(self, assembler: Assembler, stages: Sequence[Samples], last: Glue, weights: int) -> None:
+    def __init__(self, assembler: Assembler, stages: Sequence[StagePlaces], last: Glue, weights: int) -> None:
         self.assembler, self.plan = assembler, assembler.plan
         plan = self.plan
         bars = []
@@ -76,24 +76,24 @@ class Hessian:
             for row, other in [rows] if i == j else [rows, rows[::-1]]:
                 _add_outer(row, other, place, contributions)
 
-    def _add_samples(self, samples: Samples, bar: int, contributions: Products) -> None:
+    def _add_samples(self, samples: StagePlaces, bar: int, contributions: Products) -> None:
         plan, found, count = self.plan, samples.derivatives, samples.count
         ma, nv = len(samples.active), len(samples.used)
         number = plan.add_function(found.second)
-        weights = Block(bar, nv, nv, 1, 0)
+        weights = PlaceBlock(bar, nv, nv, 1, 0)
         gradient = plan.allocate(count * ma)
-        write = Block(gradient, ma, ma, 1, 0)
+        write = PlaceBlock(gradient, ma, ma, 1, 0)
         pattern = np.zeros((ma, ma), bool)
         pattern[tuple(found.hessian.get_triplet())] = True
         if found.directional:
             place = plan.allocate(count * ma * samples.width)
-            change = Block(place, ma * samples.width, ma, samples.width, 1)
+            change = PlaceBlock(place, ma * samples.width, ma, samples.width, 1)
             given = (samples.read, weights, samples.place_directions(plan))
             plan.add_call(SECOND, Call(number, count, samples.count_directions(), given, (write, change)))
         else:
             upper = ca.triu(found.hessian)
             place = plan.allocate(count * upper.nnz())
-            change = Block(place, upper.nnz(), upper.nnz(), 1, 0)
+            change = PlaceBlock(place, upper.nnz(), upper.nnz(), 1, 0)
             plan.add_call(SECOND, Call(number, count, None, (samples.read, weights), (write, change)))
             at = np.full((ma, ma), -1)
             i, j = upper.get_triplet()
@@ -133,7 +133,7 @@ def _add_outer(row: Row, other: Row, factor: int, contributions: Products) -> No
 class NlpPlan:
     """A plan and the places of its inputs and results."""
 
-    plan: Plan  #: with steps of three phases
+    plan: DerivativePlan  #: with steps of three phases
     parameters: int  #: k, their number
     #: Place of the variables (n,); likewise ``p`` (k,), ``rows`` (1 + m,) of cost and g, ``weights`` (1 + m,) of these in the
     #: Lagrangian
@@ -155,7 +155,7 @@ def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
     stages = []
     before = n
     for stage in structure.stages:
-        stages.append(Samples(assembler, stage, before))
+        stages.append(StagePlaces(assembler, stage, before))
         before += stage.outputs.shape[0]
     rows = structure.rows
     place = plan.allocate(rows.shape[0])

@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.backends.derivatives.glue import Assembler, union
-from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Block, Call, Integers, Plan, Row
+from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Call, DerivativePlan, Integers, PlaceBlock, Row
 from nlp_gait.backends.derivatives.structure import Stage, nonzeros
 
 # Longest function whose derivatives are all written out, if that is cheaper than one direction after the other.
@@ -58,7 +58,7 @@ def derive_sample(function: ca.Function, active: Integers, used: Integers, direc
     return SampleDerivatives(value, jacobian, hessian, True, first, second)
 
 
-class Samples:
+class StagePlaces:
     """A stage with the places of its inputs and outputs, and rows of derivatives of both."""
 
     def __init__(self, assembler: Assembler, stage: Stage, before: int) -> None:
@@ -78,8 +78,8 @@ class Samples:
         self.by_column = self.derivatives.directional and most <= len(active)
         self.v = plan.allocate(count * len(used))
         value = plan.add_function(self.derivatives.value)
-        self.read = Block(self.u, m, m, 1, 0)
-        plan.add_call(VALUES, Call(value, count, None, (self.read,), (Block(self.v, len(used), len(used), 1, 0),)))
+        self.read = PlaceBlock(self.u, m, m, 1, 0)
+        plan.add_call(VALUES, Call(value, count, None, (self.read,), (PlaceBlock(self.v, len(used), len(used), 1, 0),)))
         self.outputs = all_outputs
         self.place_outputs(assembler.value_places, self.v)
         self.width = most if self.by_column else len(active)
@@ -99,14 +99,14 @@ class Samples:
             return np.array([len(each) for each in self.columns])
         return np.full(self.count, len(self.active))
 
-    def place_directions(self, plan: Plan) -> Block:
+    def place_directions(self, plan: DerivativePlan) -> PlaceBlock:
         """Return the directions of all samples: columns of the derivatives of their inputs, or the inputs themselves."""
         size = len(self.active)
         if self.by_column:
-            return Block(self.d, size * self.width, size, self.width, 1)
+            return PlaceBlock(self.d, size * self.width, size, self.width, 1)
         place = plan.allocate(size * size)
         plan.initial |= {place + i * (size + 1): 1.0 for i in range(size)}
-        return Block(place, 0, size, size, 1)
+        return PlaceBlock(place, 0, size, size, 1)
 
     def _add_input_rows(self, assembler: Assembler, patterns: list[list[Integers]]) -> list[list[Row]]:
         plan, ma = assembler.plan, len(self.active)
@@ -142,14 +142,16 @@ class Samples:
         number = plan.add_function(found.first)
         if found.directional:
             place = plan.allocate(count * nv * self.width)
-            write = Block(place, nv * self.width, nv, self.width, 1)
+            write = PlaceBlock(place, nv * self.width, nv, self.width, 1)
             plan.add_call(
                 FIRST, Call(number, count, self.count_directions(), (self.read, self.place_directions(plan)), (write,))
             )
         else:
             nonzeros = found.jacobian.nnz()
             place = plan.allocate(count * nonzeros)
-            plan.add_call(FIRST, Call(number, count, None, (self.read,), (Block(place, nonzeros, nonzeros, 1, 0),)))
+            plan.add_call(
+                FIRST, Call(number, count, None, (self.read,), (PlaceBlock(place, nonzeros, nonzeros, 1, 0),))
+            )
         at = np.full((nv, ma), -1)
         output, source = found.jacobian.get_triplet()
         at[output, source] = np.arange(len(output))

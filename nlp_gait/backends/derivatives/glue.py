@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Integers, Plan, Row
+from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, DerivativePlan, Integers, Row
 from nlp_gait.backends.derivatives.structure import Structure, scalars
 from nlp_gait.symbolic.tape import read_tape
 
@@ -28,7 +28,7 @@ class Assembler:
 
     def __init__(self, structure: Structure) -> None:
         self.structure = structure
-        self.plan = plan = Plan()
+        self.plan = plan = DerivativePlan()
         self.n = n = structure.w.shape[0]
         self.y = ca.vertcat(structure.w, *(stage.outputs for stage in structure.stages))
         self.w, self.p = plan.allocate(n), plan.allocate(structure.p.shape[0])

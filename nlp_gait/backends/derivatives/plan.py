@@ -117,7 +117,7 @@ class Row(NamedTuple):
     places: Integers
 
 
-class Block(NamedTuple):
+class PlaceBlock(NamedTuple):
     """Places that a call uses for sample e and direction d: base + e sample + i step + d direction, i < length."""
 
     base: int
@@ -133,12 +133,12 @@ class Call(NamedTuple):
     function: int
     samples: int
     directions: Integers | None  #: (samples,) number of directions of each, or None if the function takes none
-    inputs: tuple[Block, ...]  #: in their order; likewise ``outputs``
-    outputs: tuple[Block, ...]
+    inputs: tuple[PlaceBlock, ...]  #: in their order; likewise ``outputs``
+    outputs: tuple[PlaceBlock, ...]
 
 
 @dataclass(kw_only=True, eq=False)
-class Plan:
+class DerivativePlan:
     """The memory and the steps; ``Assembler`` fills it."""
 
     size: int = 1  #: of the memory, in doubles

@@ -33,7 +33,7 @@ LEAST_STEP = 1e-3  # [m]; a shorter step is evaluated as this one, so that the p
 SUFFIXES = {"m": "m", "m/s": "m_s", "rad": "rad", "rad/s": "rad_s"}
 
 
-class State(NamedTuple):
+class SwitchState(NamedTuple):
     """Hip (3,) and coordinates (k,) at a switch: position with velocity [m, m/s], angles with their rates [rad, rad/s]."""
 
     hip: SX
@@ -45,8 +45,8 @@ class State(NamedTuple):
 class PhaseMotion(NamedTuple):
     """A phase of a walk over the left foot: from state to state while the right foot swings, or stands if ``lift`` is None."""
 
-    start: State
-    end: State
+    start: SwitchState
+    end: SwitchState
     duration: SX  # [s]
     right_from: SX  # x of the right foot from the left one [m]
     right_to: SX  # at the end [m]
@@ -94,7 +94,7 @@ def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     """Return the plans of both phases."""
     images = DM([c.image for c in body.coordinates])
 
-    def read(at: InstantPoint) -> tuple[State, State, SX]:
+    def read(at: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
         """States at lift-off and touch-down, and the step length [m]."""
         lift_off, touch_down = (read_state(at, switch, body.coordinates) for switch in SWITCHES)
         return lift_off, touch_down, fmax(at[STEP], LEAST_STEP)
@@ -130,16 +130,16 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
     return plan
 
 
-def mirror_state(state: State, images: DM, step: SX) -> State:
+def mirror_state(state: SwitchState, images: DM, step: SX) -> SwitchState:
     """Return the mirror image of a state, a step further; ``images`` are the signs (k,) of the coordinates."""
     hip, velocity, others, rates = state
     mirror = SX([1, -1, 1])
-    return State(mirror * hip + vertcat(step, 0, 0), mirror * velocity, images * others, images * rates)
+    return SwitchState(mirror * hip + vertcat(step, 0, 0), mirror * velocity, images * others, images * rates)
 
 
-def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> State:
+def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> SwitchState:
     """State of the variables whose names contain ``name``."""
-    return State(
+    return SwitchState(
         vertcat(*(at[f"hip_{axis}_{name}_m"] for axis in "xyz")),
         vertcat(*(at[f"hip_v{axis}_{name}_m_s"] for axis in "xyz")),
         vertcat(*(at[f"{c.name}_{name}_rad"] for c in coordinates)),
@@ -147,7 +147,7 @@ def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -
     )
 
 
-def between(start: State, end: State, duration: SX, phase: SX) -> tuple[Motion, tuple[Motion, ...]]:
+def between(start: SwitchState, end: SwitchState, duration: SX, phase: SX) -> tuple[Motion, tuple[Motion, ...]]:
     """Motion of the hip (3,) [m] and of every coordinate [rad] from state to state."""
 
     def curves(*ends: SX) -> tuple[Motion, ...]:

@@ -34,7 +34,7 @@ from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
-from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, Motion, make_instant_function
+from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, RecordedMotion, make_instant_function
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader, Planner, Samples
 from nlp_gait.gaits.biped.support_phases import (
     limit_to_box,
@@ -55,7 +55,7 @@ def _refuse_plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
 class RecordedPhase(Phase):
     """A phase whose angles over time are given, so that it has no plan."""
 
-    recorded: Motion  # the motion, of the same joints
+    recorded: RecordedMotion  # the motion, of the same joints
     plan: Planner = _refuse_plan
 
     @cached_property
@@ -180,7 +180,7 @@ class HipLimits(Limit):
 class SwingLimits(Limit):
     """A swinging right foot: on the ground at both ends, above it and next to the other one in between, lifted high enough."""
 
-    def __init__(self, motion: Motion, lift: Variable) -> None:
+    def __init__(self, motion: RecordedMotion, lift: Variable) -> None:
         self._motion, self._lift = motion, lift
         self.parameters = (GROUND_TOLERANCE, *make_bound_parameters((lift,)))
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
@@ -232,7 +232,7 @@ class RecordedGait:
     # The recorded gait; its variables are the durations of its phases, and of a cycle the step length
     problem: GaitProblem
     x: tuple[float, ...]  # (n,) its own durations and step
-    motion: Motion  # on the left foot
+    motion: RecordedMotion  # on the left foot
     step_m: float  # from foot to foot
     lean_deg: float  # of the torso at the beginning
     # Makes the planned problem with the same robot, step and durations; InputError if there is none
@@ -257,7 +257,7 @@ def make_recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
     return {"ssp": make_single_support_loads(freed), "dsp": make_divided_loads(freed, rule)}
 
 
-def make_recorded_phase_problem(body: Body, name: PhaseName, motion: Motion, grid: Grid) -> GaitProblem:
+def make_recorded_phase_problem(body: Body, name: PhaseName, motion: RecordedMotion, grid: Grid) -> GaitProblem:
     """Return the problem of one recorded phase, whose time is its variable."""
     height, vz0, vz1, vx0, vx1, vy0, vy1 = body.hip_variables
     ends = ({"z": height, "vx": vx0, "vy": vy0, "vz": vz0}, {"z": height, "vx": vx1, "vy": vy1, "vz": vz1})
@@ -301,7 +301,7 @@ class RecordedCycles:
         Raises:
             InputError: a phase has too few samples.
         """
-        motion = Motion(body=self.body, t=t, q=q)
+        motion = RecordedMotion(body=self.body, t=t, q=q)
         parts = {name: motion.cut(*span) for name, span in motion.phases(touch_down_s).items()}
         step_m = float(motion.right_foot(t[-1:])[0, 0])
         x = np.array([*(part.duration_s for part in parts.values()), step_m])
@@ -310,7 +310,7 @@ class RecordedCycles:
         )
         return Result(problem=problem, x=x)
 
-    def make_problem(self, motions: Mapping[PhaseName, Motion], grid: Grid, repeats: bool) -> GaitProblem:
+    def make_problem(self, motions: Mapping[PhaseName, RecordedMotion], grid: Grid, repeats: bool) -> GaitProblem:
         """Return the problem of both phases of a motion and the rows that join them; if it repeats, another step can follow."""
         body, margins = self.body, make_cycle_margins(self.body)
         known = {variable.name: variable for variable in make_cycle_variables(body)}

@@ -19,7 +19,7 @@ from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.simplification import simplify
-from nlp_gait.symbolic.trajectories import Motion as Trajectory
+from nlp_gait.symbolic.trajectories import Motion
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -35,7 +35,7 @@ FINE = 400  # instants at which a whole motion is evaluated
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class RecordedMotion:
     """A motion of all joints of the gait on the left foot."""
 
     body: Body
@@ -56,7 +56,7 @@ class Motion:
 
         return CubicSpline(self.t, self.q)
 
-    def cut(self, start_s: float, end_s: float) -> Motion:
+    def cut(self, start_s: float, end_s: float) -> RecordedMotion:
         """Return the motion between two times, from the samples in between alone: accelerations may jump at its ends.
 
         Raises:
@@ -80,7 +80,7 @@ class Motion:
         ankle = make_places_function(self.body).map(len(times))(DM(self.spline(times).T))[2].full().T
         return np.asarray(ankle - (0.0, left_y, height))
 
-    def mirror_image(self) -> Motion:
+    def mirror_image(self) -> RecordedMotion:
         """Exchange left and right."""
         columns, signs = self.body.mirror
         return replace(self, q=signs * self.q[:, columns], mirrored=not self.mirrored)
@@ -171,7 +171,7 @@ def make_instant_function(body: Body, loads: Loader) -> ca.Function:
     joints, support = body.joints, SX(DM(body.support))
     q, qd, qdd = (SX.sym(name, len(joints)) for name in ("q", "qd", "qdd"))
     torso, hip, ankle, corners, _ = make_places_function(body)(q)
-    motions = {name: Trajectory(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
+    motions = {name: Motion(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
     found = loads(Instant(joints=motions, hip=torso, ankles={"L": support, "R": ankle}))
     torque = ca.vertcat(*(found.torques[name] for name in joints))
     angles = dict(zip(joints, ca.vertsplit(q), strict=True))

@@ -122,8 +122,8 @@ class FreePhase(Phase):
             tabulate_last_input(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
         )
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
-        motions = tie(values, ops)
-        torque, zmp, along, heights, sides = (tie(part, ops) for part in self.free.instant.map(n)(motions))
+        motions = tie_entries(values, ops)
+        torque, zmp, along, heights, sides = (tie_entries(part, ops) for part in self.free.instant.map(n)(motions))
         q, qd, qdd = (name_rows(part) for part in ca.vertsplit(motions, len(CURVES)))
         return Samples(
             joints=JOINTS,
@@ -199,7 +199,7 @@ def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
     return np.concatenate([own, fit_coefficients(dense.signals(x), SPANS[trajectory])])
 
 
-def tie(values: MX, ops: Nonsmooth) -> MX:
+def tie_entries(values: MX, ops: Nonsmooth) -> MX:
     """Return a matrix whose entries are variables of a gradient solver (see ``Nonsmooth.tie``)."""
     return ca.reshape(ops.tie(ca.vec(values)), *values.shape)
 

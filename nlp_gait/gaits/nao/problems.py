@@ -27,7 +27,7 @@ from nlp_gait.gaits.biped.recorded_cycle import (
     make_recorded_phase_problem,
     make_refinable,
 )
-from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Motion, make_places_function
+from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, RecordedMotion, make_places_function
 from nlp_gait.gaits.biped.support_phases import (
     hip_ends,
     make_double_support_phase,
@@ -274,7 +274,7 @@ def of_all_joints(angles: JointAngles) -> Array:
     )
 
 
-def motion_of(angles: JointAngles, body: Body) -> Motion:
+def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
     """Return the motion of a robot on its left foot; mirrored if the right one stands. Joints of the arms may be missing.
 
     Raises:
@@ -292,7 +292,7 @@ def motion_of(angles: JointAngles, body: Body) -> Motion:
     for name in JOINTS:
         if name in columns and not np.isfinite(columns[name]).all():
             raise InputError(f"{angles.owner}: an angle of {name} is missing")
-    motion = Motion(body=body, t=angles.t - angles.t[0], q=of_all_joints(angles), held=tuple(missing))
+    motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=of_all_joints(angles), held=tuple(missing))
     heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
     return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
 

@@ -28,7 +28,7 @@ def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
     return ca.vertcat(forward, -thigh * ca.sin(angles[0]) - shank * ca.sin(angles[1]))  # (eq. 28)
 
 
-def leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
+def compute_leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
     """Return (2,) rates of thigh and shank [rad/s] at which the ankle has a velocity (2,) from the hip [m/s].
 
     Damped where the knee is straight or folded within a thousandth of a radian, so that they are always finite.
@@ -162,7 +162,7 @@ def solve_legs_by_network(desired: MX, settings: NetworkSettings = ONLINE) -> MX
         q, v, velocity = SX.sym("q", 2), SX.sym("v", 2), SX.sym("velocity", 2)
         reached = leg_vector(q, *lengths)
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
-        rates = ca.Function("rates", [q, velocity], [leg_rates(q, velocity, *lengths)]).map(columns)
+        rates = ca.Function("rates", [q, velocity], [compute_leg_rates(q, velocity, *lengths)]).map(columns)
         train = make_training_path(
             settings.hidden, *lengths, columns, settings.rate, settings.iterations, settings.tolerance_m2
         )

@@ -29,7 +29,7 @@ GRAVITY = 9.81  # [m/s^2]
 Zmp = Literal["exact", "appendix", "appendix-as-printed", "moment-free"]
 
 
-class LegMotion(NamedTuple):
+class Walk12Leg(NamedTuple):
     """One leg."""
 
     ankle: Motion  # (3,) [m]
@@ -41,7 +41,7 @@ class LegMotion(NamedTuple):
 
 
 # From a leg and heights (1, k) above the ankle to (3, k) points of the shank, relative to the ankle and in the leg's axes [m].
-Shank: TypeAlias = Callable[[LegMotion, DM], Motion]
+Shank: TypeAlias = Callable[[Walk12Leg, DM], Motion]
 
 
 def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
@@ -65,7 +65,7 @@ def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBi
 
 def compute_legs(
     x: SX, phase: SX, step_time: SX, turn: SX, margin: SX, robot: PointMassBiped, ops: Nonsmooth
-) -> tuple[LegMotion, LegMotion]:
+) -> tuple[Walk12Leg, Walk12Leg]:
     """Return the stance leg and the swing leg at a phase t / T.
 
     The swing leg is yawed at its hip by K, ``turn`` [rad], positive to the left; for the margin see ``Nonsmooth.acos``.
@@ -91,7 +91,7 @@ def list_masses(robot: PointMassBiped) -> DM:
 
 
 def compute_mass_motion(
-    stance: LegMotion, swing: LegMotion, robot: PointMassBiped, shank: Shank | None = None
+    stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, shank: Shank | None = None
 ) -> Motion:
     """Return (3, 7) the motion of the masses [m], in the order of ``list_masses``; by default with exact forward kinematics."""
     heights = DM([robot.foot_com_height_m, robot.shank_m]).T
@@ -100,7 +100,7 @@ def compute_mass_motion(
     return Motion(*(ca.horzcat(a, p6, (p6 + other) / 2, other, b[:, 1], b[:, 0]) for a, p6, other, b in orders))
 
 
-def place_on_exact_shank(leg: LegMotion, heights: DM) -> Motion:
+def place_on_exact_shank(leg: Walk12Leg, heights: DM) -> Motion:
     """Return points of the shank by forward kinematics; see ``Shank``."""
 
     def points(angles: SX) -> SX:
@@ -110,7 +110,7 @@ def place_on_exact_shank(leg: LegMotion, heights: DM) -> Motion:
     return map_motion(points, _ankle_angles(leg))
 
 
-def place_on_appendix_shank(leg: LegMotion, heights: DM) -> Motion:
+def place_on_appendix_shank(leg: Walk12Leg, heights: DM) -> Motion:
     """Return points of the shank by (A3)-(A6), which take the line from ankle to hip as vertical; see ``Shank``."""
     upward = Motion(*(hip - ankle for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
     lean = map_motion(lambda v: ca.atan2(v[0], ca.sqrt(v[1] ** 2 + v[2] ** 2)), upward)
@@ -123,7 +123,7 @@ def place_on_appendix_shank(leg: LegMotion, heights: DM) -> Motion:
     return map_motion(points, stack(_ankle_angles(leg), lean))
 
 
-def compute_zmp(stance: LegMotion, swing: LegMotion, robot: PointMassBiped, reading: Zmp) -> SX:
+def compute_zmp(stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, reading: Zmp) -> SX:
     """Return (2,) the zero-moment point relative to the stance ankle, on the height of that ankle [m].
 
     Source:
@@ -148,25 +148,25 @@ def _across(robot: PointMassBiped) -> DM:
     return DM([0.0, -robot.hip_distance_m, 0.0])
 
 
-def _solve_leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> LegMotion:
+def _solve_leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, ops: Nonsmooth) -> Walk12Leg:
     """Solve joint angles (2), (3) by the closed form of NAO's legs; unlike (2), it is valid for a folded knee."""
     hip_to_ankle = Motion(*(to - origin for to, origin in zip(ankle, hip, strict=True)))
     angles = leg_angles(hip_to_ankle, robot.thigh_m, robot.shank_m, margin, ops).joints
     # From hip roll, hip pitch, knee, ankle pitch, ankle roll, turning about x and y of the upper link's axes.
     signs = DM([1, -1, 1, -1, 1])
-    return LegMotion(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
+    return Walk12Leg(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
 
 
-def _turn_leg(leg: LegMotion, turn: SX) -> LegMotion:
+def _turn_leg(leg: Walk12Leg, turn: SX) -> Walk12Leg:
     heading = axis_rotation((0.0, 0.0, 1.0), turn)
     ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
     return leg._replace(ankle=ankle, heading=heading)
 
 
-def _shift_to_ankle(leg: LegMotion, points: Motion) -> Motion:
+def _shift_to_ankle(leg: Walk12Leg, points: Motion) -> Motion:
     pairs = zip(leg.ankle, points, strict=True)
     return Motion(*(ca.repmat(ankle, 1, 2) + leg.heading @ offsets for ankle, offsets in pairs))
 
 
-def _ankle_angles(leg: LegMotion) -> Motion:
+def _ankle_angles(leg: Walk12Leg) -> Motion:
     return Motion(*(part[:2] for part in leg.joints))

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from compare.questions.local_optima import run_starts
+from compare.questions.local_optima import run_stored_starts
 from compare.study.store import Store
 from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible, solve_both_ways
 from nlp_gait.backends.optima.optimum import find_optimum
@@ -78,7 +78,7 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
     solution = solve(problem, starts=2, solver=Corners())
     assert solution.converged and solution.status == "tried" and solution.objective == pytest.approx(1.5)
     assert (solution.solver, solution.linear_solver, solution.functions) == ("corners", "", "interpreted")
-    ends = run_starts(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
+    ends = run_stored_starts(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
     assert ends.feasible.all() and ends.objective == pytest.approx([1.5] * 3)
 
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.papers.claims import Verdict
+from compare.papers.claims import ClaimVerdict
 from compare.papers.nao_pareto import nao_pareto_reproduction
-from compare.papers.nao_pareto.nao_pareto_claims import Measures, ParetoFindings, PhaseFindings, spread_evenly
+from compare.papers.nao_pareto.nao_pareto_claims import Measures, ParetoFindings, PhaseFronts, spread_evenly
 from compare.papers.nao_pareto.nao_pareto_reproduction import REPRODUCTION
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, PHASES, ParetoEffort, choose_looks
 from compare.papers.paper_runs import Runner
@@ -23,12 +23,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
     """The least work: single support is computed, and stands for double support as well."""
     real = nao_pareto_reproduction._run_phase
 
-    def run_first(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFindings:
+    def run_first(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFronts:
         if phase == PHASES[0]:
             known.append(real(runner, phase, effort))
         return replace(known[-1], problem=replace(known[-1].problem, name=phase))
 
-    known: list[PhaseFindings] = []
+    known: list[PhaseFronts] = []
     folder, drawn = tmp_path_factory.mktemp("nao-pareto"), ("running-nao-ssp", "fronts-nao-ssp")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(nao_pareto_reproduction, "_run_phase", run_first)
@@ -103,9 +103,9 @@ def test_verdicts_follow_from_the_numbers(finished: Finished) -> None:
         return replace(findings, phases=tuple(phases))
 
     right = made(("NSGA2", "CMOPSO", "DCNSGA3", "CMOEAD"), "CMOEAD", "DCNSGA3", "CMOPSO")
-    assert list_verdicts(right)[:-1] == [Verdict.HOLDS] * 7
+    assert list_verdicts(right)[:-1] == [ClaimVerdict.HOLDS] * 7
     wrong = made(("DCNSGA3", "CMOEAD", "NSGA2", "CMOPSO"), "NSGA2", "CMOPSO", "NSGA2")
-    assert list_verdicts(wrong)[:-1] == [Verdict.FAILS] * 7
+    assert list_verdicts(wrong)[:-1] == [ClaimVerdict.FAILS] * 7
 
 
 def test_distances_are_measured_from_points_evenly_along_the_front() -> None:

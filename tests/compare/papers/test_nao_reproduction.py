@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 import nlp_gait
 from compare import judge
 from compare.papers.nao import nao_figures, nao_runs
-from compare.papers.nao.nao_findings import NaoFindings, PhaseFindings, Points, choose_sweep_values
+from compare.papers.nao.nao_findings import FeasiblePoints, NaoFindings, PhaseFindings, choose_sweep_values
 from compare.papers.nao.nao_paper import DSP, PAPER, PHASES, SSP
 from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12, compute_values
-from compare.papers.nao.nao_runs import SweepPoint, evaluate_indexes
+from compare.papers.nao.nao_runs import FixedOptimum, evaluate_indexes
 from compare.study.record import RunRecord, read_record
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import Array, GaitProblem
@@ -162,7 +162,7 @@ def verdict(findings: NaoFindings, name: str) -> str:
 def with_sweep(findings: NaoFindings, position: int, powers: Sequence[float]) -> NaoFindings:
     """With a line of IPOPT in single support that has these powers; infinity where nothing is feasible."""
     line = [
-        SweepPoint(at=0.25 + 0.01 * k, power_W=power, feasible=np.isfinite(power)) for k, power in enumerate(powers)
+        FixedOptimum(at=0.25 + 0.01 * k, power_W=power, feasible=np.isfinite(power)) for k, power in enumerate(powers)
     ]
     phases = [replace(phase, sweeps={**phase.sweeps, position: line}) for phase in findings.phases]
     return replace(findings, ssp=phases[0], dsp=phases[1])
@@ -295,7 +295,7 @@ def test_effect_size_of_the_printed_rank_sums(finished: Finished) -> None:
 
 
 def test_reading_a_history_and_choosing_where_to_sweep() -> None:
-    points = Points(
+    points = FeasiblePoints(
         x=np.array([[0.0], [0.1], [0.1004], [1.0]]),
         power_W=np.array([1.0, 3.0, 2.0, 1.01]),
         run=np.array([0.0, 0.0, 1.0, 1.0]),
@@ -303,5 +303,5 @@ def test_reading_a_history_and_choosing_where_to_sweep() -> None:
     assert points.cheapest_near(0, 0.1, 0.0005) == 2.0
     assert points.cheapest_near(0, 0.1, 0.0005, run=0) == 3.0
     assert np.isnan(points.cheapest_near(0, 0.5, 0.0005))
-    dear = Points(x=np.array([[-1.0], [2.0]]), power_W=np.array([5.0, 5.0]), run=np.zeros(2))
+    dear = FeasiblePoints(x=np.array([[-1.0], [2.0]]), power_W=np.array([5.0, 5.0]), run=np.zeros(2))
     assert choose_sweep_values({"pso": points, "ga": dear}, 0, 0.3, (3, 2)) == [-1.0, 0.0, 0.3, 0.5, 1.0, 2.0]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from compare.papers.claims import Verdict
+from compare.papers.claims import ClaimVerdict
 from compare.papers.nao_walk import nao_walk_runs
 from compare.papers.nao_walk.nao_walk_claims import NaoWalkFindings
 from compare.papers.nao_walk.nao_walk_reproduction import REPRODUCTION
@@ -83,7 +83,7 @@ def test_verdicts_follow_the_numbers() -> None:
     assert "100.0, falls J/m" in claims["efficient"].found
     close = make_findings(drives={name: [drive(100.0, 1, 0.1), drive(90.0, 0, 0.12)] for name in ("none", "torque")})
     robust = REPRODUCTION.check_claims(close)["robust"]
-    assert robust.verdict == Verdict.NOT_SHOWN
+    assert robust.verdict == ClaimVerdict.NOT_SHOWN
     assert robust.detail == "(0 falls instead of 1 may be chance, Fisher: p = 0.5)"
 
 

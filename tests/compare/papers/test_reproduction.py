@@ -14,8 +14,8 @@ from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.papers.claims import (
     Check,
     Claim,
+    ClaimVerdict,
     Difference,
-    Verdict,
     compare_changes,
     compare_levels,
     compare_readings,
@@ -38,7 +38,7 @@ def test_the_table_of_claims_leaves_out_empty_columns() -> None:
     claims = [
         decide(True, powers=(2, 1), saving=50).apply(cheaper),
         decide(False, powers=(1, 2), saving=-100).apply(cheaper),
-        Claim(where="p. 5", text="It is fast", printed="1 m/s", found="no robot", verdict=Verdict.UNTESTABLE),
+        Claim(where="p. 5", text="It is fast", printed="1 m/s", found="no robot", verdict=ClaimVerdict.UNTESTABLE),
     ]
     table = make_claims_table(claims)
     assert list(table.columns) == ["where", "claim", "printed", "found here", "verdict"]
@@ -100,7 +100,7 @@ def test_every_claim_has_a_check_with_a_criterion_or_a_reason_why_it_cannot_be_t
     reproduction = load_reproduction(paper)
     claims = reproduction.printed.claims
     assert {name for name, claim in claims.items() if not claim.verdict} == set(reproduction.checks)
-    assert all(claim.verdict == Verdict.UNTESTABLE and claim.found for claim in claims.values() if claim.verdict)
+    assert all(claim.verdict == ClaimVerdict.UNTESTABLE and claim.found for claim in claims.values() if claim.verdict)
     if paper in PAPERS:
         assert [name for name in reproduction.checks if not describe_criterion(claims[name])] == []
 

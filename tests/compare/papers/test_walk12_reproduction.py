@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from compare.judge import evaluate
-from compare.papers.claims import Verdict
+from compare.papers.claims import ClaimVerdict
 from compare.papers.walk12 import walk12_runs, walk12_walks
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, PAPER, SHARES, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
@@ -87,7 +87,7 @@ def test_numbers_in_the_texts_are_those_of_our_model() -> None:
 
 def test_claims_are_decided_by_sizes(finished: Finished) -> None:
     claims = {row["claim"]: row for row in finished.rows("claims")}
-    assert len(claims) >= 10 and set(row["verdict"].partition(" (")[0] for row in claims.values()) <= set(Verdict)
+    assert len(claims) >= 10 and set(row["verdict"].partition(" (")[0] for row in claims.values()) <= set(ClaimVerdict)
     assert claims["The largest f1: IPOPT's optimum"]["verdict"].startswith("does not hold (printed 442.5, here 470")
     assert claims["Time steps in one generation"]["verdict"] == "holds"
     assert claims["Walking becomes slower with higher stability margin"]["verdict"] == "holds"

@@ -10,7 +10,7 @@ from casadi import MX
 
 import nlp_gait
 from compare.questions.certainty import Certainty
-from compare.questions.local_optima import Ends, LocalOptimum, cluster_ends, estimate_unseen, run_starts
+from compare.questions.local_optima import Ends, LocalOptimum, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Work, find
 from compare.study.references import find_reference
 from compare.study.store import Store
@@ -91,16 +91,16 @@ def test_estimates_by_hand() -> None:
 def test_interrupted_starts_continue_to_the_same_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.questions.local_optima.BATCH", 4)
     problem = toy(two_valleys)
-    whole = run_starts(problem, Store(tmp_path / "whole"), starts=8)
+    whole = run_stored_starts(problem, Store(tmp_path / "whole"), starts=8)
 
     def interrupt(note: str) -> None:
         if note == "4 starts":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_starts(problem, Store(tmp_path / "cut"), starts=8, progress=interrupt)
+        run_stored_starts(problem, Store(tmp_path / "cut"), starts=8, progress=interrupt)
     notes: list[str] = []
-    resumed = run_starts(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
+    resumed = run_stored_starts(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
     assert "starts-0: stored by an earlier run" in notes
     np.testing.assert_array_equal(whole.x, resumed.x)
 

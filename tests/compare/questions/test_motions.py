@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from compare.questions.motions import motion as module
-from compare.questions.motions.motion import Motion, extrapolate, find_start, load_phase, make_tasks
+from compare.questions.motions.motion import SolvedMotion, extrapolate, find_start, load_phase, make_tasks
 from compare.questions.motions.motions import Motions, describe_motions
 from compare.questions.question import Work, find
 from compare.study.store import Store
@@ -39,11 +39,11 @@ def question() -> Motions:
 
 
 @pytest.fixture(scope="module")
-def found(folder: Path, question: Motions) -> tuple[Motion, ...]:
+def found(folder: Path, question: Motions) -> tuple[SolvedMotion, ...]:
     return find(question, Work(store=Store(folder)))
 
 
-def test_a_quintic_needs_less_and_hides_power_between_few_samples(found: tuple[Motion, ...]) -> None:
+def test_a_quintic_needs_less_and_hides_power_between_few_samples(found: tuple[SolvedMotion, ...]) -> None:
     cubic, quintic, coarse = found
     assert all(motion.feasible for motion in found)
     assert quintic.power_W < 0.9 * cubic.power_W
@@ -53,7 +53,7 @@ def test_a_quintic_needs_less_and_hides_power_between_few_samples(found: tuple[M
 
 
 def test_a_question_continues_from_its_files(
-    folder: Path, question: Motions, found: tuple[Motion, ...], monkeypatch: pytest.MonkeyPatch
+    folder: Path, question: Motions, found: tuple[SolvedMotion, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def never(*_: Any, **__: Any) -> None:
         raise AssertionError("solved again")
@@ -66,7 +66,7 @@ def test_a_question_continues_from_its_files(
         find(replace(question, seed=1), Work(store=Store(folder)))
 
 
-def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...]) -> None:
+def test_table_pictures_and_command(folder: Path, found: tuple[SolvedMotion, ...]) -> None:
     command = [
         "motions",
         "nao-dsp",
@@ -93,7 +93,7 @@ def test_table_pictures_and_command(folder: Path, found: tuple[Motion, ...]) -> 
     assert all(words in printed for words in ("3 samples: quintic", "never rises", "and violates torque_change"))
 
 
-def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: tuple[Motion, ...]) -> None:
+def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: tuple[SolvedMotion, ...]) -> None:
     *_, task = make_tasks("nao-dsp", orders=ORDERS, free_orders=["quintic"], intervals=2)
     problem = ProblemSpec(name=task.problem, options=task.options).load()
     planned = ProblemSpec(name="nao-dsp", options=task.options).load()
@@ -103,7 +103,7 @@ def test_a_leaning_torso_starts_from_the_plan_that_it_contains(found: tuple[Moti
     assert build_exact_model(problem).at(x0, problem.p).cost == pytest.approx(expected.cost, rel=1e-9)
 
 
-def test_a_rise_is_reported(question: Motions, found: tuple[Motion, ...]) -> None:
+def test_a_rise_is_reported(question: Motions, found: tuple[SolvedMotion, ...]) -> None:
     cubic, quintic, coarse = found
     worse = replace(quintic, power_W=cubic.power_W + 0.01)
     assert "power rises by up to 0.01 W" in describe_motions([cubic, worse, coarse])[0]

@@ -23,7 +23,7 @@ from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS, measure_le
 from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import Body, tree_from
+from nlp_gait.robots.tree import TreeBody, tree_from
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -60,7 +60,7 @@ def upright_frames(
 
 
 def world_frame_dynamics(
-    tree: Sequence[Body],
+    tree: Sequence[TreeBody],
     frames: Mapping[str, Frame],
     qdd: Mapping[str, SX],
     gravity: float,
@@ -107,7 +107,7 @@ def world_frame_dynamics(
     return torques, Wrench(sum(forces, SX(3, 1)), sum(moments, SX(3, 1)))
 
 
-def _find_carried(tree: Sequence[Body]) -> list[list[int]]:
+def _find_carried(tree: Sequence[TreeBody]) -> list[list[int]]:
     """Return the bodies that each body carries, itself included."""
     found: list[list[int]] = [[] for _ in tree]
     for k in range(len(tree)):
@@ -118,7 +118,7 @@ def _find_carried(tree: Sequence[Body]) -> list[list[int]]:
     return found
 
 
-def _reference(body: Body, frames: Mapping[str, Frame]) -> SX:
+def _reference(body: TreeBody, frames: Mapping[str, Frame]) -> SX:
     """Return (3,) the joint through which the tree reaches a body [m]."""
     frame = frames[body.link.name]
     offset = np.array(body.link.com_m) - np.array(body.com_offset_m)

@@ -9,7 +9,7 @@ from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.leg_network import NetworkSettings, leg_rates, leg_vector, network_angles
+from nlp_gait.gaits.stairs.leg_network import NetworkSettings, compute_leg_rates, leg_vector, network_angles
 
 THIGH = SHANK = 0.4
 # A millimetre at the ankle, on a knee bent by at least 0.5 rad.
@@ -64,7 +64,7 @@ def test_gradients_by_weights_are_those_of_the_error() -> None:
 
 def test_rates_of_the_leg_move_its_ankle_as_requested() -> None:
     angles, velocity = SX.sym("angles", 2), SX.sym("velocity", 2)
-    rates = leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
+    rates = compute_leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
     moved = ca.jtimes(leg_vector(angles, THIGH, 1.2 * SHANK), angles, rates)
     at = ca.Function("moved", [angles, velocity], [moved, rates])
     assert at([1.2, 2.0], [0.3, -0.7])[0].full().ravel() == pytest.approx([0.3, -0.7], rel=1e-5)
