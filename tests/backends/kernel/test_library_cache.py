@@ -133,9 +133,9 @@ def test_a_full_or_read_only_cache_costs_one_line(
 
 def test_two_processes_at_once_end_with_good_libraries(cache: Path) -> None:
     code = (
-        "from nlp_gait.backends.kernel.library_cache import load_library\n"
+        "from nlp_gait.backends.kernel.library_cache import load_shared_library\n"
         "from nlp_gait.backends.kernel.compiler import find_compiler\n"
-        f"library, _ = load_library({SOURCE!r}, find_compiler(), {FLAGS!r}, ('answer',))\n"
+        f"library, _ = load_shared_library({SOURCE!r}, find_compiler(), {FLAGS!r}, ('answer',))\n"
         "print(library.answer())"
     )
     root = Path(__file__).parents[3]
