@@ -11,6 +11,7 @@ import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.robots.tree import TreeBody
+from nlp_gait.symbolic.formulas import build_formula
 from nlp_gait.symbolic.kinematics import relative_rotation
 
 
@@ -32,14 +33,10 @@ def equations_of_motion(kinetic: SX, potential: SX, q: SX, qd: SX) -> EquationsO
     M = ca.triu2symm(ca.cse(ca.triu(ca.hessian(kinetic, qd)[0])))
     n = range(q.shape[0])
     slopes = {(i, j): ca.jacobian(M[i, j], q) for i in n for j in n if i <= j}
-
-    def slope(i: int, j: int, k: int) -> SX:  # derivative of M_ij by q_k
-        return slopes[min(i, j), max(i, j)][k]
-
+    by_column = [ca.vertcat(*(slopes[min(i, k), max(i, k)] for i in n)) for k in n]  # derivatives of M_ik by q_j
     C = SX(q.shape[0], q.shape[0])
-    for i in n:
-        for j in n:
-            C[i, j] = sum(0.5 * (slope(i, k, j) + slope(i, j, k) - slope(j, k, i)) * qd[k] for k in n)
+    for k, A in enumerate(by_column):
+        C += 0.5 * (A + ca.horzcat(*(B[:, k] for B in by_column)) - A.T) * qd[k]
     return EquationsOfMotion(M, ca.sparsify(C), ca.gradient(potential, q))
 
 
@@ -181,7 +178,7 @@ def _accelerate(
         turning = _compute_turning(spin, spin_rate)
         moved.append((spin, spin_rate, turning, acceleration))
         forces.append(inertia.mass * acceleration + turning @ DM(inertia.first))
-        moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, inertia.second))
+        moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, DM(inertia.second)))
     return forces, moments
 
 
@@ -192,17 +189,15 @@ def _compute_turning(spin: SX, spin_rate: SX) -> SX:
     return ca.blockcat([[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]])
 
 
-def _compute_moment(turning: SX, second: np.ndarray[Any, Any]) -> SX:
-    """Return the moment that turning a body about its reference point needs: sum of p x (turning p) over its matter at p."""
-    U = [[turning[i, j] for j in range(3)] for i in range(3)]
-    J = second.tolist()  # CasADi converts plain floats faster than NumPy's
+@build_formula((3, 3), (3, 3))
+def _compute_moment(U: SX, J: SX) -> SX:
+    """Return the moment that turning U of a body about its reference point needs: sum of p x (U p) over its matter at p.
+
+    J is its second moments about the reference point.
+    """
     return ca.vertcat(
         *(
-            (U[k][k] - U[j][j]) * J[j][k]
-            + U[k][i] * J[i][j]
-            - U[j][i] * J[i][k]
-            + U[k][j] * J[j][j]
-            - U[j][k] * J[k][k]
+            (U[k, k] - U[j, j]) * J[j, k] + U[k, i] * J[i, j] - U[j, i] * J[i, k] + U[k, j] * J[j, j] - U[j, k] * J[k, k]
             for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
         )
     )
