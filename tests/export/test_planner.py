@@ -25,9 +25,9 @@ pytest.importorskip("daqp")
 pytestmark = pytest.mark.skipif(not (shutil.which("c++") and shutil.which("cc")), reason="no C and C++ compiler")
 
 
-def make_in_c(problem: GaitProblem, near: Outcome, folder: Path) -> ExportedPlanner:
-    """Export and build a planner, without optimisation and with all warnings."""
-    flags = {"CFLAGS": "-O0 -Wall -Wextra -Wno-unused-parameter -Werror", "CXXFLAGS": "-O0"}
+def make_in_c(problem: GaitProblem, near: Outcome, folder: Path, lanes: str = "") -> ExportedPlanner:
+    """Export and build a planner, without optimisation and with all warnings; for all CPUs unless lanes are given."""
+    flags = {"CFLAGS": "-O0 -Wall -Wextra -Wno-unused-parameter -Werror", "CXXFLAGS": f"-O0 {lanes}"}
     return ExportedPlanner(problem, near, folder, flags)
 
 
@@ -36,7 +36,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Replanner, 
     problem = nlp_gait.load("nao-dsp", trajectory="measured", intervals=4)
     solution = nlp_gait.solve(problem, starts=1)
     plan = replanner(problem, near=solution)
-    yield plan, make_in_c(problem, solution.starts[0], tmp_path_factory.mktemp("planner"))
+    yield plan, make_in_c(problem, solution.starts[0], tmp_path_factory.mktemp("planner"), "-DLANES=1")
 
 
 @pytest.mark.slow
