@@ -197,7 +197,11 @@ def _compute_moment(U: SX, J: SX) -> SX:
     """
     return ca.vertcat(
         *(
-            (U[k, k] - U[j, j]) * J[j, k] + U[k, i] * J[i, j] - U[j, i] * J[i, k] + U[k, j] * J[j, j] - U[j, k] * J[k, k]
+            (U[k, k] - U[j, j]) * J[j, k]
+            + U[k, i] * J[i, j]
+            - U[j, i] * J[i, k]
+            + U[k, j] * J[j, j]
+            - U[j, k] * J[k, k]
             for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
         )
     )
