@@ -145,9 +145,12 @@ def format_power_of_ten(value: float) -> str:
 
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
+    import matplotlib
+
     paths = stem.with_name(f"{stem.name}.png"), stem.with_name(f"{stem.name}.svg")
     write_text(paths[1], render_svg(figure))
-    figure.set_layout_engine("none")  # the layout is final; computing it again takes as long as drawing
+    with matplotlib.rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)  # the layout is final; with any engine Matplotlib draws twice
     with style(), replace_file(paths[0]) as file, delay_interrupts():
         figure.savefig(file, format="png")
     return paths

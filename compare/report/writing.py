@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +19,7 @@ from compare.study.citations import cite_problems
 from compare.study.settings import Session
 from nlp_gait.files import format_csv, write_text
 
+MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]#|~])")
 
 
@@ -50,21 +52,18 @@ def html(document: Document, drawings: Sequence[str]) -> str:
         figure.name: Markup(inline_svg(drawing, f"f{i}", f"figure {i}"))
         for i, (figure, drawing) in enumerate(zip(figures, drawings, strict=True), start=1)
     }
-    environment = _environment(page=True)
-    environment.filters["html"] = _html_of
-    environment.filters["anchor"] = _make_anchor
-    return environment.get_template("report.html.j2").render(document=document, svg=svg)
+    return _load_templates(page=True).get_template("report.html.j2").render(document=document, svg=svg)
 
 
 def markdown_page(document: Document) -> str:
     """Return Markdown that shows the figures' PNG files."""
-    environment = _environment(page=False)
-    environment.filters["md"] = _literal
-    text = environment.get_template("report.md.j2").render(document=document)
+    text = _load_templates(page=False).get_template("report.md.j2").render(document=document)
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
 
 
-def _environment(*, page: bool) -> Environment:
+@cache
+def _load_templates(*, page: bool) -> Environment:
+    """Return the templates of HTML or Markdown, which are compiled once."""
     environment = Environment(
         loader=PackageLoader("compare.report"),
         autoescape=page,
@@ -72,11 +71,11 @@ def _environment(*, page: bool) -> Environment:
         trim_blocks=not page,
         lstrip_blocks=not page,
     )
-    environment.filters["kind"] = _kind
+    environment.filters |= {"kind": _name_kind, "html": _render_html, "anchor": _make_anchor, "md": _literal}
     return environment
 
 
-def _kind(part: Part) -> str:
+def _name_kind(part: Part) -> str:
     return type(part).__name__
 
 
@@ -85,9 +84,9 @@ def _make_anchor(title: str) -> str:
     return "section-" + re.sub(r"\W+", "-", title).strip("-").lower()
 
 
-def _html_of(markdown: str) -> Markup:
+def _render_html(markdown: str) -> Markup:
     """HTML of a text in Markdown; HTML in it is shown, not obeyed."""
-    return Markup(MarkdownIt("commonmark", {"html": False}).enable("table").render(markdown))
+    return Markup(MARKDOWN.render(markdown))
 
 
 def _literal(text: str) -> str:
