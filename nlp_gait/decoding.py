@@ -110,6 +110,9 @@ def _decode_tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ..
         count = "" if any_length else f" of {len(parts)} values"
         raise ValueError(f"{where} must be a list{count}, got {format_value(raw)}")
     kinds = parts[:1] * len(raw) if any_length else parts
+    plain = WORDS.keys() & (get_args(parts[0]) if get_origin(parts[0]) in (Union, UnionType) else parts[:1])
+    if any_length and plain.issuperset(map(type, raw)):  # long histories of numbers
+        return tuple(raw)
     return tuple(
         decode_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, raw, strict=True))
     )
