@@ -13,90 +13,60 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from nlp_gait.backends.functions.compiled_function import CompiledFunction, compile_function
-    from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
-    from nlp_gait.backends.onboard.replanner import Replan, Replanner, replanner
-    from nlp_gait.backends.optima.gait_library import GaitLibrary, LibraryGait, load_library
-    from nlp_gait.backends.plan_walk import WalkPlan, plan_walk
-    from nlp_gait.backends.solve import solve
-    from nlp_gait.backends.solvers.ipopt import IpoptSettings
-    from nlp_gait.backends.solvers.registry import make_solver
-    from nlp_gait.errors import GaitError
-    from nlp_gait.formulation import GaitProblem, load, problem_names
-    from nlp_gait.formulation.solution import Solution
+    from nlp_gait.backends.functions.compiled_function import CompiledFunction as CompiledFunction
+    from nlp_gait.backends.functions.compiled_function import compile_function as compile_function
+    from nlp_gait.backends.kernel.compiled import CompiledObjective as CompiledObjective
+    from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
+    from nlp_gait.backends.onboard.replanner import Replan as Replan
+    from nlp_gait.backends.onboard.replanner import Replanner as Replanner
+    from nlp_gait.backends.onboard.replanner import replanner as replanner
+    from nlp_gait.backends.optima.gait_library import GaitLibrary as GaitLibrary
+    from nlp_gait.backends.optima.gait_library import LibraryGait as LibraryGait
+    from nlp_gait.backends.optima.gait_library import load_library as load_library
+    from nlp_gait.backends.plan_walk import WalkPlan as WalkPlan
+    from nlp_gait.backends.plan_walk import plan_walk as plan_walk
+    from nlp_gait.backends.solve import solve as solve
+    from nlp_gait.backends.solvers.ipopt import IpoptSettings as IpoptSettings
+    from nlp_gait.backends.solvers.registry import make_solver as make_solver
+    from nlp_gait.errors import GaitError as GaitError
+    from nlp_gait.formulation import GaitProblem as GaitProblem
+    from nlp_gait.formulation import load as load
+    from nlp_gait.formulation import problem_names as problem_names
+    from nlp_gait.formulation.solution import Solution as Solution
 
 # Imported on first use: a search needs no NLP solver, a solve no kernel, and the command line starts quickly.
-_LAZY = {
-    "GaitError": "nlp_gait.errors:GaitError",
-    "GaitProblem": "nlp_gait.formulation:GaitProblem",
-    "load": "nlp_gait.formulation:load",
-    "problem_names": "nlp_gait.formulation:problem_names",
-    "CompiledObjective": "nlp_gait.backends.kernel.compiled:CompiledObjective",
-    "compile_objective": "nlp_gait.backends.kernel.compiled:compile_objective",
-    "CompiledFunction": "nlp_gait.backends.functions.compiled_function:CompiledFunction",
-    "compile_function": "nlp_gait.backends.functions.compiled_function:compile_function",
-    "IpoptSettings": "nlp_gait.backends.solvers.ipopt:IpoptSettings",
-    "Solution": "nlp_gait.formulation.solution:Solution",
-    "WalkPlan": "nlp_gait.backends.plan_walk:WalkPlan",
-    "plan_walk": "nlp_gait.backends.plan_walk:plan_walk",
-    "solve": "nlp_gait.backends.solve:solve",
-    "GaitLibrary": "nlp_gait.backends.optima.gait_library:GaitLibrary",
-    "LibraryGait": "nlp_gait.backends.optima.gait_library:LibraryGait",
-    "load_library": "nlp_gait.backends.optima.gait_library:load_library",
-    "Replan": "nlp_gait.backends.onboard.replanner:Replan",
-    "Replanner": "nlp_gait.backends.onboard.replanner:Replanner",
-    "replanner": "nlp_gait.backends.onboard.replanner:replanner",
-    "make_solver": "nlp_gait.backends.solvers.registry:make_solver",
+_PUBLIC = {
+    "nlp_gait.errors": "GaitError",
+    "nlp_gait.formulation": "GaitProblem load problem_names",
+    "nlp_gait.formulation.solution": "Solution",
+    "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
+    "nlp_gait.backends.functions.compiled_function": "CompiledFunction compile_function",
+    "nlp_gait.backends.plan_walk": "WalkPlan plan_walk",
+    "nlp_gait.backends.solve": "solve",
+    "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
+    "nlp_gait.backends.solvers.registry": "make_solver",
+    "nlp_gait.backends.optima.gait_library": "GaitLibrary LibraryGait load_library",
+    "nlp_gait.backends.onboard.replanner": "Replan Replanner replanner",
 }
+_PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
+__all__ = sorted(_PLACES)
 # What lower packages use of higher ones, by name.
-PROBLEMS.update(
-    {
-        "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
-        "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
-        "nao-walk": "nlp_gait.gaits.nao.problems:nao_walk",
-        "nao-ssp-free": "nlp_gait.gaits.nao.problems:nao_ssp_free",
-        "nao-dsp-free": "nlp_gait.gaits.nao.problems:nao_dsp_free",
-        "nao-cycle": "nlp_gait.gaits.nao.problems:nao_cycle",
-        "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
-        "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
-        "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
-        "humanoid-walk": "nlp_gait.gaits.humanoid.problems:humanoid_walk",
-        "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
-        "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
-        "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
-        "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
-        "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
-    }
-)
+_MAKERS = {
+    "nlp_gait.gaits.nao.problems": "nao-ssp nao-dsp nao-walk nao-ssp-free nao-dsp-free nao-cycle",
+    "nlp_gait.gaits.humanoid.problems": "humanoid-ssp humanoid-dsp humanoid-cycle humanoid-walk",
+    "nlp_gait.gaits.walk12.walk12_problem": "walk12",
+    "nlp_gait.gaits.stairs.plan": "stairs-plan",
+    "nlp_gait.gaits.stairs.track": "stairs-track",
+    "nlp_gait.gaits.stairs.ideal": "stairs-ideal",
+    "nlp_gait.gaitbench.suite_problem": "gaitbench",
+}
+PROBLEMS |= {name: f"{module}:{name.replace('-', '_')}" for module, names in _MAKERS.items() for name in names.split()}
 FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
 FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
 FUNCTIONS["load_generated"] = "nlp_gait.gaitbench.instance:load_generated"
 FUNCTIONS["tabulate_sensitivities"] = "nlp_gait.backends.optima.sensitivities:tabulate_sensitivities"
 FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 FUNCTIONS["animate_gait"] = "compare.report.gait_page:animate_gait"
-
-__all__ = [
-    "CompiledFunction",
-    "CompiledObjective",
-    "GaitError",
-    "GaitLibrary",
-    "GaitProblem",
-    "IpoptSettings",
-    "LibraryGait",
-    "Replan",
-    "Replanner",
-    "Solution",
-    "WalkPlan",
-    "compile_function",
-    "compile_objective",
-    "load",
-    "load_library",
-    "plan_walk",
-    "problem_names",
-    "replanner",
-    "solve",
-    "make_solver",
-]
 
 
 def __getattr__(name: str) -> Any:
@@ -105,6 +75,6 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("nlp-gait")
-    if name not in _LAZY:
+    if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_object(_LAZY[name])
+    return import_object(_PLACES[name])

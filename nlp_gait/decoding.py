@@ -14,13 +14,12 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from nlp_gait.errors import GaitError, format_value, unknown
+from nlp_gait.errors import WORDS, GaitError, format_value, unknown
 from nlp_gait.files import convert_errors, read_json
 
 T = TypeVar("T")
 
 MISSPELLED = 0.8  # similarity, see ``difflib``
-WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 
 def decode(
@@ -92,7 +91,15 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
             raise ValueError(f"{where} must be {' or '.join(map(repr, parts))}, got {format_value(raw)}")
         return raw
     if origin is tuple:
-        return _decode_tuple(parts, raw, where)
+        any_length = parts[-1] is ...
+        if not isinstance(raw, list) or not (any_length or len(raw) == len(parts)):
+            count = "" if any_length else f" of {len(parts)} values"
+            raise ValueError(f"{where} must be a list{count}, got {format_value(raw)}")
+        kinds = parts[:1] * len(raw) if any_length else parts
+        plain = WORDS.keys() & (get_args(parts[0]) if get_origin(parts[0]) in (Union, UnionType) else parts[:1])
+        if any_length and plain.issuperset(map(type, raw)):  # long histories of numbers
+            return tuple(raw)
+        return tuple(decode_value(kinds[i], item, f"{where}[{i}]") for i, item in enumerate(raw))
     if origin in (Union, UnionType):
         return _decode_union(parts, raw, where)
     if not isinstance(raw, Mapping):
@@ -102,20 +109,6 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
         decode_value(keys, key, f"a key of {where}"): decode_value(values, value, f"{where}.{key}")
         for key, value in raw.items()
     }
-
-
-def _decode_tuple(parts: tuple[Any, ...], raw: Any, where: str) -> tuple[Any, ...]:
-    any_length = parts[-1] is ...
-    if not isinstance(raw, list) or not (any_length or len(raw) == len(parts)):
-        count = "" if any_length else f" of {len(parts)} values"
-        raise ValueError(f"{where} must be a list{count}, got {format_value(raw)}")
-    kinds = parts[:1] * len(raw) if any_length else parts
-    plain = WORDS.keys() & (get_args(parts[0]) if get_origin(parts[0]) in (Union, UnionType) else parts[:1])
-    if any_length and plain.issuperset(map(type, raw)):  # long histories of numbers
-        return tuple(raw)
-    return tuple(
-        decode_value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, raw, strict=True))
-    )
 
 
 def _decode_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:

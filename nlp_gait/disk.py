@@ -33,7 +33,12 @@ def flush(path: Path) -> None:
     try:
         descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
         try:
-            _fsync(descriptor)
+            if sys.platform == "darwin":  # where fsync does not flush the disk's cache
+                import fcntl
+
+                fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
+            else:
+                os.fsync(descriptor)
         finally:
             os.close(descriptor)
     except OSError as error:
@@ -56,15 +61,6 @@ def lock_folder(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _fsync(descriptor: int) -> None:
-    if sys.platform == "darwin":  # where fsync does not flush the disk's cache
-        import fcntl
-
-        fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
-    else:
-        os.fsync(descriptor)
 
 
 def make_folder(path: Path, mode: int = 0o777) -> None:

@@ -8,8 +8,11 @@ import logging
 from collections.abc import Iterable
 from functools import cache
 from numbers import Integral
+from types import NoneType
 
 LONGEST_VALUE = 80  # characters of a value in a message
+# Types in messages about data files.
+WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 # Takes the arguments of ``logging``; warns once per process, however often a file is read.
 warn_once = cache(logging.getLogger("nlp_gait").warning)
@@ -102,15 +105,7 @@ def format_value(value: object) -> str:
 
 def describe_type(kind: type) -> str:
     """Return a type in words, for messages: ``a whole number`` for int."""
-    names = {
-        bool: "true or false",
-        int: "a whole number",
-        float: "a finite number",
-        str: "a text",
-        dict: "a table",
-        list: "a list",
-    }
-    return names.get(kind, kind.__name__)
+    return {**WORDS, float: "a finite number", dict: "a table", list: "a list"}.get(kind, kind.__name__)
 
 
 NO_MEMORY = ("failed to map segment", "std::bad_alloc")  # in errors of the dynamic loader and of C++

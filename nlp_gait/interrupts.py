@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import FrameType
 
 
@@ -43,10 +43,8 @@ def _exit(number: int, frame: FrameType | None) -> None:
 @contextmanager
 def raise_interrupts() -> Iterator[None]:
     """Let Ctrl-C raise KeyboardInterrupt inside, where ``exit_on_interrupt`` was called before."""
-    if signal.getsignal(signal.SIGINT) is not _exit:
-        yield
-        return
-    with _handle_interrupts(signal.default_int_handler):
+    exits = signal.getsignal(signal.SIGINT) is _exit
+    with _handle_interrupts(signal.default_int_handler) if exits else nullcontext():
         yield
 
 
@@ -56,17 +54,16 @@ def defer_interrupts() -> Iterator[Callable[[], bool]]:
 
     For compiled code that would swallow the exception: CasADi takes it for a failed evaluation and continues.
     """
-    presses = 0
+    presses: list[int] = []
 
     def count(number: int, frame: FrameType | None) -> None:
-        nonlocal presses
-        presses += 1
-        if presses > 1:
+        presses.append(number)
+        if len(presses) > 1:
             raise KeyboardInterrupt
 
     count.defers = True  # type: ignore[attr-defined]
     with _handle_interrupts(count):
-        yield lambda: presses > 0
+        yield lambda: bool(presses)
 
 
 @contextmanager
@@ -87,11 +84,10 @@ def delay_interrupts() -> Iterator[None]:
 @contextmanager
 def remember_interrupts() -> Iterator[Callable[[], None]]:
     """Yield a function that raises KeyboardInterrupt again if something inside has swallowed the one of Ctrl-C."""
-    pressed = False
+    pressed: list[int] = []
 
     def remember(number: int, frame: FrameType | None) -> None:
-        nonlocal pressed
-        pressed = True
+        pressed.append(number)
         raise KeyboardInterrupt
 
     def check() -> None:

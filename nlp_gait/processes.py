@@ -16,7 +16,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
@@ -98,7 +98,10 @@ def run_in_forks(
         with block_interrupts_in_children():
             for _ in range(workers):
                 children.append(_fork(run))
-        yield from _collect(dict(children), check_stop)
+        for result in _collect(dict(children), check_stop):
+            if isinstance(result, Exception):
+                raise result
+            yield result
     finally:
         ending[0] = 1
         for results, process in children:
@@ -110,15 +113,14 @@ def run_in_forks(
 
 
 def _collect(processes: dict[Connection, BaseProcess], check_stop: Callable[[], None]) -> Iterator[Any]:
-    """Yield the results of all children by their numbers."""
+    """Yield what all children return or raise, by their numbers."""
     early: dict[int, Any] = {}
     following = 0
     while processes:
         for results in wait(list(processes), timeout=STOP_CHECKED_EVERY_S):
             assert isinstance(results, Connection)
             try:
-                number, result = results.recv()
-                early[number] = result
+                early.update([results.recv()])
             except EOFError:
                 process = processes.pop(results)
                 process.join()
@@ -128,16 +130,9 @@ def _collect(processes: dict[Connection, BaseProcess], check_stop: Callable[[], 
                     ) from None
         check_stop()
         while following in early:
-            yield _raise_errors(early.pop(following))
+            yield early.pop(following)
             following += 1
-    for number in sorted(early):  # stopped: earlier ones are missing
-        yield _raise_errors(early[number])
-
-
-def _raise_errors(result: Any) -> Any:
-    if isinstance(result, Exception):
-        raise result
-    return result
+    yield from (early[number] for number in sorted(early))  # stopped: earlier ones are missing
 
 
 def run_in_isolation(
@@ -180,7 +175,12 @@ def _isolate(sender: Connection, call: Callable[[], bytes], memory_bytes: int | 
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if memory_bytes is not None:
-            _limit_memory(memory_bytes)
+            import resource
+
+            with open("/proc/self/statm", encoding="ascii") as file:
+                most = int(file.read().split()[0]) * mmap.PAGESIZE + memory_bytes
+            _, hard = resource.getrlimit(resource.RLIMIT_AS)
+            resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in (0, 1, 2):
@@ -190,16 +190,6 @@ def _isolate(sender: Connection, call: Callable[[], bytes], memory_bytes: int | 
     sender.send_bytes(call())
     sender.close()
     os._exit(0)  # without the exit handlers of the parent
-
-
-def _limit_memory(further_bytes: int) -> None:
-    import resource
-
-    with open("/proc/self/statm", encoding="ascii") as file:
-        taken = int(file.read().split()[0]) * mmap.PAGESIZE
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = taken + further_bytes
-    resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
@@ -218,9 +208,16 @@ def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterat
     results: Generator[tuple[K, T], None, None] | None = None
     try:
         with block_interrupts_in_children():
-            folder = _find_working_folder()
             try:
-                _check_descriptors(workers + SPARE_DESCRIPTORS)
+                folder = os.getcwd()
+            except OSError as error:
+                raise NoWorkersError(
+                    f"worker processes cannot begin: the working folder is gone ({error.strerror}); use another"
+                ) from error
+            try:
+                with ExitStack() as opened:  # can this process open so many more files?
+                    for _ in range(workers + SPARE_DESCRIPTORS):
+                        opened.callback(os.close, os.open(os.devnull, os.O_RDONLY))
                 results = parallel(delayed(_call)(key, call, folder) for key, call in calls.items())
             except Exception as error:
                 shortage = describe_shortage(error) or (isinstance(error, OSError) and (error.strerror or error))
@@ -274,26 +271,6 @@ def kill_children() -> None:
         if child.pid is not None:
             with suppress(ProcessLookupError):
                 os.kill(child.pid, signal.SIGKILL)  # joblib's processes have no method for it
-
-
-def _check_descriptors(count: int) -> None:
-    """Raise OSError unless this process can open so many more files."""
-    opened = []
-    try:
-        for _ in range(count):
-            opened.append(os.open(os.devnull, os.O_RDONLY))
-    finally:
-        for descriptor in opened:
-            os.close(descriptor)
-
-
-def _find_working_folder() -> str:
-    try:
-        return os.getcwd()
-    except OSError as error:
-        raise NoWorkersError(
-            f"worker processes cannot begin: the working folder is gone ({error.strerror}); use another"
-        ) from error
 
 
 def _call(key: K, call: Callable[[], T], folder: str) -> tuple[K, T]:

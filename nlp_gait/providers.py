@@ -6,14 +6,17 @@ imports this module before everything else, so it imports nothing that takes tim
 
 from __future__ import annotations
 
+TYPE_CHECKING = False  # in place of typing's, as in ``nlp_gait/__init__.py``
+if TYPE_CHECKING:
+    from typing import Any
+
 PROBLEMS: dict[str, str] = {}  # makers of problems, by the problem's name
-FILE_HASHES: dict[
-    str, str
-] = {}  # by option of problems that may name a file: hash of its content, "" for another value
+# By option of problems that may name a file: hash of its content, "" for another value.
+FILE_HASHES: dict[str, str] = {}
 FUNCTIONS: dict[str, str] = {}  # by their task, such as ``plot_gait``
 
 
-def import_object(place: str) -> object:
+def import_object(place: str) -> Any:
     """Return the object at ``"module:object"``."""
     from importlib import import_module
 

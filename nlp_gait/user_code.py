@@ -18,8 +18,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
-from functools import cache, lru_cache
-from importlib.abc import SourceLoader
+from functools import cache, lru_cache, partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -153,8 +152,7 @@ def parse_command(text: str) -> tuple[str, ...]:
 def _find_program_file(text: str) -> str:
     """Return the absolute path of a command's own file: the script that it names, else the program."""
     words = parse_command(text)
-    own = _find_own_word(words)
-    return os.path.abspath(own or shutil.which(words[0]) or words[0])
+    return os.path.abspath(_find_own_word(words) or shutil.which(words[0]) or words[0])
 
 
 def _find_own_word(words: Sequence[str]) -> str | None:
@@ -223,7 +221,7 @@ def _find_imports(content: bytes, path: Path) -> Iterator[Path]:
         words = set(re.findall(rb"\w+", content)) if path.suffix else ()
         yield from (file for file in sorted(path.parent.glob(f"*{path.suffix}")) if os.fsencode(file.stem) in words)
         return
-    for name in filter(None, _parse_imports(content)):
+    for name in _parse_imports(content):
         stem = path.parent.joinpath(*name.split("."))
         yield from (file for file in (stem.with_suffix(ENDING), stem / "__init__.py") if file.is_file())
 
@@ -239,9 +237,9 @@ def _parse_imports(content: bytes) -> tuple[str, ...]:
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            module = [node.module] if node.module else []
-            names += [".".join([*module, *more]) for more in ([], *([alias.name] for alias in node.names))]
-    return tuple(names)
+            module = node.module or ""
+            names += [module, *(f"{module}.{alias.name}".strip(".") for alias in node.names)]
+    return tuple(filter(None, names))
 
 
 def check_reference(text: str, kind: Kind) -> None:
@@ -287,10 +285,8 @@ def load_object(text: str, kind: Kind) -> object:
         raise UserCodeError(f"{text!r} is a program: it can be an algorithm, not a {kind}")
     place = parse_reference(text, kind)
     path, content = _read_source(place, text)
-    if place.is_file:
-        module = call_user_code(text, path, lambda: _run_file(path, content))
-    else:
-        module = call_user_code(text, path, lambda: importlib.import_module(place.home))
+    run = partial(_run_file, path, content) if place.is_file else partial(importlib.import_module, place.home)
+    module = call_user_code(text, path, run)
     if not hasattr(module, place.name):
         raise unknown(f"name in {place.home}", place.name, [n for n in vars(module) if not n.startswith("_")])
     return getattr(module, place.name)
@@ -308,35 +304,14 @@ def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
     except (KeyboardInterrupt, GaitError):
         raise
     except BaseException as error:  # SystemExit too: it must not end the command
-        raise UserCodeError(f"{text!r} fails{_locate(error, path)}: {_describe(error)}") from error
-
-
-def _locate(error: BaseException, path: str) -> str:
-    """Return the last line of a file in a traceback, as `` at line 3, `x = 1 / 0` ``; empty if there is none."""
-    lines = [frame for frame in traceback.extract_tb(error.__traceback__) if os.path.abspath(frame.filename) == path]
-    return f" at line {lines[-1].lineno}, `{lines[-1].line}`" if lines else ""
-
-
-def _describe(error: BaseException) -> str:
-    text = " ".join(str(error).split())
-    if "Wrong number or type of arguments" in text:  # of CasADi's wrapper, which then lists all overloads
-        text = "a function of CasADi does not take these arguments"
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
-class _ContentLoader(SourceLoader):
-    """Loader of the bytes that were hashed; a compiled file in the cache may belong to an older text."""
-
-    def __init__(self, path: str, content: bytes) -> None:
-        self._path, self._content = path, content
-
-    def get_filename(self, fullname: str) -> str:
-        return self._path
-
-    def get_data(self, path: str | bytes) -> bytes:
-        if path != self._path:
-            raise OSError(path)
-        return self._content
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame for frame in frames if os.path.abspath(frame.filename) == path]
+        where = f" at line {lines[-1].lineno}, `{lines[-1].line}`" if lines else ""
+        message = " ".join(str(error).split())
+        if "Wrong number or type of arguments" in message:  # of CasADi's wrapper, which then lists all overloads
+            message = "a function of CasADi does not take these arguments"
+        what = type(error).__name__ + (message and f": {message}")
+        raise UserCodeError(f"{text!r} fails{where}: {what}") from error
 
 
 def _run_file(path: str, content: bytes) -> ModuleType:
@@ -344,15 +319,16 @@ def _run_file(path: str, content: bytes) -> ModuleType:
     name = f"nlp_gait_own_{digest}_{Path(path).stem}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_loader(name, _ContentLoader(path, content), origin=path)
-    assert spec is not None and spec.loader is not None  # for the type checker
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None  # for the type checker
     module = importlib.util.module_from_spec(spec)
     folder = str(Path(path).parent)
     if folder not in sys.path:
         sys.path.append(folder)  # last, so that no file in it hides a package
     sys.modules[name] = module  # before it runs: its data classes look there
     try:
-        spec.loader.exec_module(module)
+        # The bytes that were hashed: a compiled file in the cache may belong to an older text.
+        exec(compile(content, path, "exec", dont_inherit=True), vars(module))
     except BaseException:
         del sys.modules[name]
         raise

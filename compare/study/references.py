@@ -98,8 +98,7 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
 @cache
 def _find_generated(id: str, sha256: str) -> Reference | None:
     """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
-    load_generated: Any = import_object(FUNCTIONS["load_generated"])
-    instance = load_generated(id)
+    instance = import_object(FUNCTIONS["load_generated"])(id)
     if instance is None or identify_problem(instance.gait_problem)[HASH] != sha256:
         return None
     sign = instance.gait_problem.objective.sign

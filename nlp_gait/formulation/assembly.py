@@ -48,8 +48,8 @@ class Variable:
 
     def __post_init__(self) -> None:
         owner = f"variable {self.name!r}"
-        for end in ("lower", "upper"):
-            _check_number(owner, end, getattr(self, end))
+        _check_number(owner, "lower", self.lower)
+        _check_number(owner, "upper", self.upper)
         if not self.lower < self.upper:
             raise InputError(
                 f"{owner}: lower must be below upper, got {self.lower} and {self.upper}; use fix() to hold a variable at a value"
@@ -178,15 +178,12 @@ class Constraint:
 def _count_rows(owner: str, field: str, value: object) -> int:
     if not isinstance(value, MX):
         remedy = f"; write MX({value})" if isinstance(value, (int, float)) else ""
-        raise InputError(f"{owner}: {field} must be a CasADi MX, got {type(value).__name__} {_short(value)}{remedy}")
+        raise InputError(
+            f"{owner}: {field} must be a CasADi MX, got {type(value).__name__} {format_value(value)}{remedy}"
+        )
     if value.shape[1] != 1:
         raise InputError(f"{owner}: {field} must be a column, got shape {value.shape}; casadi.vec makes one")
     return int(value.shape[0])
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:40]} ..."
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,13 +197,13 @@ class Assembly:
     def __post_init__(self) -> None:
         for owner, value in (("objective", self.objective), *((f"index {n!r}", v) for n, v in self.indexes.items())):
             if not isinstance(value, MX) or value.shape != (1, 1):
-                got = f"shape {value.shape}" if isinstance(value, MX) else f"{type(value).__name__} {_short(value)}"
+                shown = f"{type(value).__name__} {format_value(value)}"
+                got = f"shape {value.shape}" if isinstance(value, MX) else shown
                 raise InputError(f"{owner} must be a scalar MX, got {got}")
         for constraint in self.constraints:
             if not isinstance(constraint, Constraint):
-                raise InputError(
-                    f"constraints must be Constraint, got {type(constraint).__name__} {_short(constraint)}"
-                )
+                shown = f"{type(constraint).__name__} {format_value(constraint)}"
+                raise InputError(f"constraints must be Constraint, got {shown}")
 
     def group(self, name: str) -> Constraint:
         """Return the constraint of a name; raises KeyError."""

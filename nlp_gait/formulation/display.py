@@ -103,8 +103,7 @@ class Skeleton:
         if self.zmp is None:
             return np.full(len(self.t), np.nan)
         last = len(self.t) - 1
-        bearing = [min(max(k, 1), max(last - 1, 0)) for k in range(last + 1)]
-        return np.array([self._margin_at(k, self.zmp[k], bearing[k]) for k in range(last + 1)])
+        return np.array([self._margin_at(k, zmp, min(max(k, 1), max(last - 1, 0))) for k, zmp in enumerate(self.zmp)])
 
     def _margin_at(self, k: int, zmp: Array, bearing: int) -> float:
         loaded = [sole.corners[k] for sole in self.soles if sole.supports[bearing]]
@@ -156,27 +155,17 @@ def find_hull(points: Array) -> Array | None:
 def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[Sole]) -> Skeleton:
     """Return a gait on a flat floor, with the centre of mass and the zero-moment point of its time histories."""
     arrays = signals.arrays
+    x = np.concatenate([sole.corners[..., 0].ravel() for sole in soles])
     return Skeleton(
         t=arrays["t"],
         limbs=tuple(limbs),
         soles=tuple(soles),
-        ground=make_flat_ground(*(sole.corners for sole in soles)),
+        ground=np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]]),
         com=arrays["com"],
-        zmp=append_zero_height(arrays["zmp"]),
+        zmp=np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))]),
     )
-
-
-def make_flat_ground(*points: Array) -> Array:
-    """Return a line (x, z) at height zero below all points (..., 3)."""
-    x = np.concatenate([p[..., 0].ravel() for p in points])
-    return np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
 
 
 def make_rectangle(back: float, front: float, right: float, left: float) -> Array:
     """Return corners (4, 3) at height zero."""
     return np.array([[front, left, 0.0], [back, left, 0.0], [back, right, 0.0], [front, right, 0.0]])
-
-
-def append_zero_height(zmp: Array) -> Array:
-    """Return (T, 3) from (T, 2)."""
-    return np.column_stack([zmp, np.zeros(len(zmp))])

@@ -11,23 +11,15 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError, format_value, unknown
-from nlp_gait.formulation.assembly import (
-    Assembly,
-    Grid,
-    NumericPoint,
-    Objective,
-    Parameter,
-    Point,
-    RowsOverTime,
-    Variable,
-)
+from nlp_gait.formulation import assembly as parts
+from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
 from nlp_gait.formulation.display import Display
 from nlp_gait.formulation.locking import Cache, lock_casadi
 from nlp_gait.formulation.numbers import is_number, to_floats
@@ -87,9 +79,9 @@ class GaitProblem:
     with_other_options: Mapping[str, str] = field(default_factory=dict)
     #: Makes the same problem with a number of times as many samples; None if there is no finer grid
     refine: Callable[[int], GaitProblem] | None = None
-    grid: Grid | None = None  #: samples, or None if the problem has none
+    grid: parts.Grid | None = None  #: samples, or None if the problem has none
     #: The motion's rows as functions of time, one entry per phase; empty if they are defined on samples only
-    rows_over_time: tuple[RowsOverTime, ...] = ()
+    rows_over_time: tuple[parts.RowsOverTime, ...] = ()
     #: Makes the problem's least-power form for proofs; None if it has none
     power_form: Callable[[GaitProblem], PowerForm] | None = None
     display: Display = Display()  #: what shows its gaits
@@ -171,7 +163,13 @@ class GaitProblem:
                 )
         merged = {**self.values, **{name: float(value) for name, value in values.items()}}
         changed = self._copy(self._origin, values=merged)
-        changed._check_pairs()
+        for name, low in changed.parameter_values.items():
+            stem = name.removesuffix(".lower")
+            if stem != name and low > (high := changed.parameter_values[f"{stem}.upper"]):
+                raise InputError(
+                    f"bounds of {stem!r} are inverted: lower {low:g} is above upper {high:g}; "
+                    f"set {name} and {stem}.upper so that lower <= upper"
+                )
         return changed
 
     def fix(self, /, **values: float) -> GaitProblem:
@@ -199,8 +197,7 @@ class GaitProblem:
 
     def dense(self, factor: int) -> GaitProblem | None:
         """Return the same problem with ``factor`` times as many intervals; None if it cannot be refined."""
-        refine = self.refine
-        if refine is None:
+        if (refine := self.refine) is None:
             return None
         return self._cache.get((refine, factor), lambda: refine(factor)).with_values(**self.values)
 
@@ -234,12 +231,9 @@ class GaitProblem:
             return assembly if change is None else change(assembly, point, ops)
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-            base = (
-                self.hints.start(parameters, rng)
-                if self.hints.start is not None
-                else draw_uniform(self.names, parameters, rng)
-            )
-            return np.concatenate([base, draw_uniform([variable.name for variable in variables], parameters, rng)])
+            draw = self.hints.start or partial(draw_uniform, self.names)
+            own = draw(parameters, rng)
+            return np.concatenate([own, draw_uniform([variable.name for variable in variables], parameters, rng)])
 
         def refine(factor: int) -> GaitProblem:
             finer = self.dense(factor)
@@ -396,16 +390,6 @@ class GaitProblem:
                     f"{name!r} is no parameter of {self.name} with these options; add --option {self.with_other_options[name]}"
                 )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
-
-    def _check_pairs(self) -> None:
-        values = self.parameter_values
-        for name, low in values.items():
-            stem = name.removesuffix(".lower")
-            if stem != name and low > (high := values[f"{stem}.upper"]):
-                raise InputError(
-                    f"bounds of {stem!r} are inverted: lower {low:g} is above upper {high:g}; "
-                    f"set {name} and {stem}.upper so that lower <= upper"
-                )
 
 
 def _unpickle(

@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 from casadi import MX, Function, vertcat
 
+from nlp_gait import user_code
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
 from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
@@ -22,15 +23,6 @@ from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import is_number
 from nlp_gait.providers import FILE_HASHES, FUNCTIONS, PROBLEMS, import_object
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.user_code import (
-    allow_code,
-    call_user_code,
-    find_entry_points,
-    hash_source,
-    is_user_code,
-    load_object,
-    parse_reference,
-)
 
 # More intervals and samples than this are of no use, and such a problem takes too long to build.
 LARGEST_COUNT = 10_000
@@ -86,23 +78,22 @@ def find_maker(name: str) -> Maker:
         UserCodeError: user code that cannot be found or fails.
     """
     if name in PROBLEMS:
-        make: Maker = import_object(PROBLEMS[name])  # type: ignore[assignment]
-        return make
-    if is_user_code(name, "problem"):
+        return import_object(PROBLEMS[name])
+    if user_code.is_user_code(name, "problem"):
         return _user_maker(name)
-    raise unknown("problem", name, [*PROBLEMS, *find_entry_points("problem")])
+    raise unknown("problem", name, [*PROBLEMS, *user_code.find_entry_points("problem")])
 
 
 def _user_maker(name: str) -> Maker:
     """Return the maker of a user-defined problem, which checks the mathematics."""
-    allow_code(name, "problem")
-    found = load_object(name, "problem")
-    path = parse_reference(name, "problem").home
+    user_code.allow_code(name, "problem")
+    found: Any = user_code.load_object(name, "problem")
+    path = user_code.parse_reference(name, "problem").home
+    make: Maker
     if isinstance(found, GaitProblem):
-        problem = found
 
         def make() -> GaitProblem:
-            return problem
+            return found
 
     elif callable(found):
         make = found if hasattr(found, "checks_options") else maker(found)
@@ -112,14 +103,14 @@ def _user_maker(name: str) -> Maker:
     else:
         raise InputError(f"{name!r} must be a GaitProblem or a function that makes one, got {type(found).__name__}")
 
-    origin = UserMaker(name, hash_source(name, "problem"))
+    origin = UserMaker(name, user_code.hash_source(name, "problem"))
 
     @lock_casadi
     @functools.wraps(make)
     def make_checked(**options: Any) -> GaitProblem:
         check_options(make, options)
-        problem = call_user_code(name, path, lambda: make(**options))
-        call_user_code(name, path, lambda: check_mathematics(problem))
+        problem = user_code.call_user_code(name, path, lambda: make(**options))
+        user_code.call_user_code(name, path, lambda: check_mathematics(problem))
         return replace(problem, loaded_as=name).with_origin(origin, options)
 
     return make_checked
@@ -134,7 +125,7 @@ class UserMaker:
 
     def __call__(self, **options: Any) -> GaitProblem:
         """Return the problem; raise InputError if its source has changed."""
-        if hash_source(self.name, "problem") != self.source:
+        if user_code.hash_source(self.name, "problem") != self.source:
             raise InputError(f"{self.name!r} has changed since the problem was pickled; load it again")
         return load(self.name, **options)
 
@@ -168,10 +159,8 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
 
 def hash_files(options: Mapping[str, Any]) -> dict[str, str]:
     """Return the hashes of the files that options of a problem name, by option."""
-    found = {}
-    for name in FILE_HASHES.keys() & options.keys():
-        hash_file: Callable[[object], str] = import_object(FILE_HASHES[name])  # type: ignore[assignment]
-        found[name] = hash_file(options[name])
+    names = FILE_HASHES.keys() & options.keys()
+    found = {name: import_object(FILE_HASHES[name])(options[name]) for name in names}
     return {name: digest for name, digest in found.items() if digest}
 
 
@@ -202,8 +191,7 @@ def resolve_name(name: str) -> tuple[str, dict[str, str]]:
     """Return a name for ``find_maker`` and the options that it stands for: those of an instance, none for other names."""
     if name in PROBLEMS:
         return name, {}
-    resolve: Callable[[str], dict[str, str]] = import_object(FUNCTIONS["resolve_instance"])  # type: ignore[assignment]
-    options = resolve(name)
+    options = import_object(FUNCTIONS["resolve_instance"])(name)
     return ("gaitbench", options) if options else (name, {})
 
 
@@ -227,7 +215,8 @@ def check_mathematics(problem: GaitProblem) -> None:
     duplicates = [name for name, count in counts.items() if count > 1]
     if duplicates:
         raise InputError(f"{owner}: duplicated rows: {', '.join(duplicates[:5])}")
-    inputs = {point.x.name(): point.x, point.p.name(): point.p}
+    inputs = [point.x, point.p]
+    bounds: dict[str, MX] = {}
     parts = {"objective": assembly.objective, **{f"index {name!r}": value for name, value in assembly.indexes.items()}}
     for constraint in assembly.constraints:
         row = f"constraint {constraint.name!r}"
@@ -236,38 +225,25 @@ def check_mathematics(problem: GaitProblem) -> None:
             bound = getattr(constraint, end)
             if bound is None:
                 continue
-            parts[f"{row}, {end}"] = bound
-            function = Function("bound", list(inputs.values()), [bound], {"allow_free": True})
-            if function.sparsity_jac(0, 0).nnz():
+            bounds[f"{row}: {end}"] = parts[f"{row}, {end}"] = bound
+            if Function("bound", inputs, [bound], {"allow_free": True}).sparsity_jac(0, 0).nnz():
                 raise InputError(
                     f"{owner}: {row}: {end} must depend on parameters only; move terms with variables into value"
                 )
     for part, value in parts.items():
-        free = Function("part", list(inputs.values()), [vertcat(value)], {"allow_free": True}).free_mx()
+        free = Function("part", inputs, [vertcat(value)], {"allow_free": True}).free_mx()
         if free:
             raise InputError(
                 f"{owner}: {part} contains {free[0].name()!r}, which is neither a variable nor a parameter"
             )
-    _check_numbers(owner, problem, inputs, assembly)
+    for part, bound in bounds.items():
+        if np.isnan(np.array(Function("bound", inputs, [vertcat(bound)])(problem.lower, problem.p))).any():
+            raise InputError(f"{owner}: {part} is NaN; give a number, or leave it out for no bound")
     _check_texts(owner, problem, assembly)
     if problem.hints.start is not None:
         start = np.asarray(problem.hints.start(problem.parameter_values, np.random.default_rng(0)))
         if start.shape != (len(problem.names),):
             raise InputError(f"{owner}: start must return {len(problem.names)} values, it returned shape {start.shape}")
-
-
-def _check_numbers(owner: str, problem: GaitProblem, inputs: Mapping[str, MX], assembly: Assembly) -> None:
-    """Check that no bound of a row is NaN at the current parameter values."""
-    for constraint in assembly.constraints:
-        for end in ("lower", "upper"):
-            bound = getattr(constraint, end)
-            if bound is None:
-                continue
-            values = Function("bound", list(inputs.values()), [vertcat(bound)])(problem.lower, problem.p)
-            if np.isnan(np.array(values)).any():
-                raise InputError(
-                    f"{owner}: constraint {constraint.name!r}: {end} is NaN; give a number, or leave it out for no bound"
-                )
 
 
 def _check_texts(owner: str, problem: GaitProblem, assembly: Assembly) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -73,28 +74,27 @@ def load_result(path: Path) -> Result:
         InputError: the file cannot be read, is damaged, or contains values that the problem does not allow.
     """
     raw = read_json(path, "result")
+    with explain_errors(f"result {str(path)!r}", "`nlp-gait solve ... --out FILE` writes a valid one"):
+        if isinstance(raw, dict) and "definition" in raw:
+            record = decode(_RecordFile, raw, ignore_unknown=True)
+            stored = decode(StoredProblem, record.definition.get("problem"), "definition.problem")
+            return _make_result(stored.name, stored.options, stored.parameters, record.x)
+        file = decode(_ResultFile, raw, ignore_unknown=True)
+        result = _make_result(file.problem, file.options, file.parameters, file.x)
+        if file.robot not in (None, result.problem.options.get("robot")):
+            raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
+        return result
+
+
+@contextmanager
+def explain_errors(owner: str, remedy: str) -> Iterator[None]:
+    """Convert errors in a file's content to InputError, with the owner and, where it is not valid, what to do."""
     try:
-        return _from_record(raw) if isinstance(raw, dict) and "definition" in raw else _from_result(raw)
+        yield
     except ValueError as error:
-        raise InputError(
-            f"result {str(path)!r}: {error}; `nlp-gait solve ... --out FILE` writes a valid one"
-        ) from error
+        raise InputError(f"{owner}: {error}; {remedy}") from error
     except GaitError as error:
-        raise InputError(f"result {str(path)!r}: {error}") from error
-
-
-def _from_record(raw: Mapping[str, Any]) -> Result:
-    record = decode(_RecordFile, raw, ignore_unknown=True)
-    problem = decode(StoredProblem, record.definition.get("problem"), "definition.problem")
-    return _make_result(problem.name, problem.options, problem.parameters, record.x)
-
-
-def _from_result(raw: Any) -> Result:
-    file = decode(_ResultFile, raw, ignore_unknown=True)
-    result = _make_result(file.problem, file.options, file.parameters, file.x)
-    if file.robot not in (None, result.problem.options.get("robot")):
-        raise InputError(f"'robot' is {file.robot!r}, but the option of that name decides: write it into 'options'")
-    return result
+        raise InputError(f"{owner}: {error}") from error
 
 
 def _make_result(
@@ -115,7 +115,14 @@ def sample_signals(result: Result, period_s: float) -> Signals:
         raise InputError(f"the time between samples must be > 0 s, got {period_s!r}")
     signals = result.problem.signals(result.x)
     times = signals.arrays["t"]
-    _check_times(times)
+    with np.errstate(over="ignore", invalid="ignore"):
+        duration_s = float(times[-1] - times[0])
+        forward = bool((times[1:] >= times[:-1]).all())  # NaN fails too
+    if not (forward and SHORTEST_S <= duration_s <= LONGEST_S):
+        reason = f"it lasts {duration_s:g} s" if forward or duration_s < 0.0 else "time runs backwards in one phase"
+        raise InputError(
+            f"a gait that is drawn, simulated or exported must last {SHORTEST_S:g} to {LONGEST_S:g} s, but {reason}"
+        )
     longest = float((times[1:] - times[:-1]).max())
     factor = math.ceil(longest / period_s - 1e-9)  # rounding must not halve a step that equals the period
     dense = result.problem.dense(factor) if factor > 1 else None
@@ -154,14 +161,3 @@ def sample_at_period(result: Result, period_ms: int) -> Signals:
             found = np.stack([np.interp(t, fine.arrays["t"], column) for column in columns], axis=1)
             arrays[name] = np.round(found) if np.isin(values, (0.0, 1.0)).all() else found
     return replace(fine, arrays=arrays)
-
-
-def _check_times(times: Array) -> None:
-    with np.errstate(over="ignore", invalid="ignore"):
-        duration_s = float(times[-1] - times[0])
-        forward = bool((times[1:] >= times[:-1]).all())  # NaN fails too
-    if not (forward and SHORTEST_S <= duration_s <= LONGEST_S):
-        reason = f"it lasts {duration_s:g} s" if forward or duration_s < 0.0 else "time runs backwards in one phase"
-        raise InputError(
-            f"a gait that is drawn, simulated or exported must last {SHORTEST_S:g} to {LONGEST_S:g} s, but {reason}"
-        )

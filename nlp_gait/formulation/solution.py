@@ -196,16 +196,14 @@ class Solution:
 
         The problem and the errors are as for ``signals``.
         """
-        plot_gait: Any = import_object(FUNCTIONS["plot_gait"])
-        return plot_gait(self._restore(problem), self.x, self.solver)
+        return import_object(FUNCTIONS["plot_gait"])(self._restore(problem), self.x, self.solver)
 
     def animate(self, problem: GaitProblem | None = None) -> Any:
         """Return a page that plays the gait in 3-D, with power and balance margin; notebooks display it, ``write`` saves it.
 
         The problem and the errors are as for ``signals``.
         """
-        animate_gait: Any = import_object(FUNCTIONS["animate_gait"])
-        return animate_gait(self._restore(problem), self.x, self.solver)
+        return import_object(FUNCTIONS["animate_gait"])(self._restore(problem), self.x, self.solver)
 
     def sensitivity(self, problem: GaitProblem | None = None) -> Any:
         """Return a table of the derivatives of x and the objective with respect to all parameters.
@@ -218,8 +216,7 @@ class Solution:
         Raises:
             InputError: the solver returned no multipliers, or x is not an isolated optimum.
         """
-        tabulate: Any = import_object(FUNCTIONS["tabulate_sensitivities"])
-        return tabulate(self._restore(problem), self)
+        return import_object(FUNCTIONS["tabulate_sensitivities"])(self._restore(problem), self)
 
     def _restore(self, problem: GaitProblem | None) -> GaitProblem:
         from nlp_gait.formulation.registry import load

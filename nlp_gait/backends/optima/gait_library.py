@@ -13,9 +13,10 @@ import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.decoding import decode
-from nlp_gait.errors import GaitError, InputError, unknown
+from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import read_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
+from nlp_gait.formulation.result import explain_errors
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
 from nlp_gait.user_code import resolve_code
 
@@ -122,14 +123,10 @@ class _LibraryFile:
 
 def load_library(path: str | Path) -> GaitLibrary:
     """Return the library of a file that ``nlp-gait walk --library`` wrote; raises InputError if it is not one."""
-    try:
+    with explain_errors(f"library {str(path)!r}", "`nlp-gait walk --library` writes a valid one"):
         file = decode(_LibraryFile, read_json(Path(path), "library"), ignore_unknown=True)
         problem = load(resolve_code(file.problem, "problem", "it"), **file.options).with_values(**file.parameters)
         return make_library(problem, file.axes, file.points)
-    except ValueError as error:
-        raise InputError(f"library {str(path)!r}: {error}; `nlp-gait walk --library` writes a valid one") from error
-    except GaitError as error:
-        raise InputError(f"library {str(path)!r}: {error}") from error
 
 
 def make_library(
