@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +90,7 @@ def prove(out: Path, name: str, tolerance: float, hours: float, part: float | No
         problem, x, tolerance=tolerance, time_limit_s=3600.0 * hours, progress=progress, checkpoint=checkpoint
     )
     if found.closed:
-        write_json(out / f"{stem}.json", make_certificate_file(problem, found).to_json())
+        write_json(out / f"{stem}.json", asdict(make_certificate_file(problem, found)))
         checkpoint.unlink()
     print(
         f"{stem}: objective {found.objective:.9g}, proven {found.bound:.9g}, {found.boxes:,} boxes, {found.left:,} left, "

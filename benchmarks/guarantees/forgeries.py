@@ -3,7 +3,7 @@
 A forged certificate has a feasible incumbent that is worse than the best known one by a given share, and a bound right below its
 objective, which is false. The hardest one has another local optimum as incumbent, around which nothing is better: that of the
 12-joint walk at lambda = 1, which is 3e-5 worse. The table says how many of COUNT forgeries of each size are refused by the check
-of ``check.py``, by the same without shipped certificates, and by paths alone. The command line compares a search by PSO, too.
+as shipped, by the same without shipped certificates, and by paths alone. The command line compares a search by PSO, too.
 """
 
 from __future__ import annotations
@@ -23,10 +23,9 @@ from nlp_gait.errors import InputError
 from nlp_gait.files import write_text
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs import check
+from nlp_gait.proofs import certificate as certificates
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate
-from nlp_gait.proofs.certificate import CertificateFile, make_certificate_file
-from nlp_gait.proofs.check import STARTS, check_certificate
+from nlp_gait.proofs.certificate import STARTS, CertificateFile, check_certificate, make_certificate_file
 from tests.proofs.soundness import best_x, feasible_gaits, load
 
 COUNT, SEED = 10, 11
@@ -82,7 +81,7 @@ def forge_local_optimum() -> CertificateFile:
 
 def is_refused(file: CertificateFile, seed: int, starts: int = STARTS, ship: bool = True) -> bool:
     """Return whether a check refuses a certificate."""
-    with nullcontext() if ship else mock.patch.object(check, "find_certificate", lambda problem: None):
+    with nullcontext() if ship else mock.patch.object(certificates, "find_certificate", lambda problem: None):
         try:
             check_certificate(file, paths=PATHS, starts=starts, seed=seed)
         except InputError:

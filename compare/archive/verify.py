@@ -24,8 +24,7 @@ from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import make_temporary_folder
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
-from nlp_gait.proofs.certificate import load_certificates, read_certificate
-from nlp_gait.proofs.check import check_certificate
+from nlp_gait.proofs.certificate import check_certificate, load_certificates, read_certificate
 from nlp_gait.user_code import hash_file, parse_reference
 
 REPORT = "report.md"

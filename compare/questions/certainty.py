@@ -201,7 +201,7 @@ class Certainty(Question[FoundCertainty]):
         shown = "Ends of the starts, the proven bound and the end of the long search."
         certificates = {}
         if proof is not None and proof.closed:
-            certificates[f"{problem.name}-certificate"] = make_certificate_file(problem, proof).to_json()
+            certificates[f"{problem.name}-certificate"] = asdict(make_certificate_file(problem, proof))
         return Answer(
             stem=stem,
             title=f"{problem.name}: certainty of the optimum",

@@ -10,8 +10,8 @@ import numpy as np
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.time_functions import TimeFunctions, TimeRows, make_time_functions
-from nlp_gait.proofs.time_search import GRAIN, ROUNDING, TimeSearch, bound_violation, make_pieces
+from nlp_gait.proofs import time_search
+from nlp_gait.proofs.time_search import GRAIN, ROUNDING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +73,7 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
     if not problem.rows_over_time:
         return Guarantee(satisfied=None, reason="the problem defines its constraints on samples only")
     try:
-        phases = problem.build_once(_build_time_functions)
+        phases = [problem.build_once(time_search.make_time_functions, rows) for rows in problem.rows_over_time]
     except CompilerError as error:
         return Guarantee(satisfied=None, reason=str(error))
     results = [_search_phase(problem, phase, np.asarray(x, dtype=float)) for phase in phases]
@@ -93,12 +93,8 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
     )
 
 
-def _build_time_functions(problem: GaitProblem) -> list[TimeFunctions]:
-    return [make_time_functions(problem, rows) for rows in problem.rows_over_time]
-
-
 def _search_phase(
-    problem: GaitProblem, phase: TimeFunctions, x: Array
+    problem: GaitProblem, phase: time_search.TimeFunctions, x: Array
 ) -> tuple[list[RowViolation], dict[str, tuple[float, float]], int]:
     """Return violations, bounds of means by name, and the number of pieces."""
     start, end = phase.source.times({**problem.by_name(x), **problem.parameter_values})
@@ -111,8 +107,8 @@ def _search_phase(
         if rows is None:
             continue
         plain, (lower, upper) = rows.plain, rows.bound(problem.p)
-        search = TimeSearch(rows, given, shift, lower[:plain], upper[:plain])
-        search.run(make_pieces(phase.source.kinks, shift))
+        search = time_search.TimeSearch(rows, given, shift, lower[:plain], upper[:plain])
+        search.run(time_search.make_pieces(phase.source.kinks, shift))
         limits = np.stack([lower[plain:], upper[plain:]], axis=-1)
         limits[[k - plain for k in phase.squares if shift is None]] **= 2
         search.sharpen_integrals(limits)
@@ -127,13 +123,15 @@ def _search_phase(
                 if np.isfinite(low) and np.isfinite(high):
                     means[rows.names[k]] = (float(low), float(high))
                 continue
-            most, least = (float(v) for v in bound_violation(lower[k], upper[k], low, high))
+            most, least = (float(v) for v in time_search.bound_violation(lower[k], upper[k], low, high))
             if not most <= FEASIBILITY_TOLERANCE:
                 violations.append(_violation(rows, k, (start, end), least, most))
     return violations, means, pieces
 
 
-def _violation(rows: TimeRows, k: int, piece: tuple[float, float], least: float, most: float) -> RowViolation:
+def _violation(
+    rows: time_search.TimeRows, k: int, piece: tuple[float, float], least: float, most: float
+) -> RowViolation:
     known, (from_s, to_s) = most if np.isfinite(most) else None, piece
     return RowViolation(
         row=rows.names[k], unit=rows.units[k], from_s=from_s, to_s=to_s, least=max(least, 0.0), most=known

@@ -17,7 +17,7 @@ from compare.study.definition import hash_definition
 from compare.study.task import ProblemSpec, Task
 from nlp_gait import load, solve, user_code
 from nlp_gait.errors import GaitError, InputError, UnknownNameError, UserCodeError
-from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable, registry
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Parameter, Variable
 from nlp_gait.formulation.registry import check_mathematics
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import hash_source, is_reference
@@ -78,7 +78,6 @@ def test_an_installed_packages_problem_has_a_name(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(user_code, "entry_points", lambda group: EntryPoints([point]).select(group=group))
     find = user_code.find_entry_points.__wrapped__  # without its cache
     monkeypatch.setattr(user_code, "find_entry_points", find)
-    monkeypatch.setattr(registry, "find_entry_points", find)
     assert load("leg").name == "two-link" and ProblemSpec(name="leg").title == "leg"
     with pytest.raises(UnknownNameError, match="did you mean 'leg'"):
         load("lag")

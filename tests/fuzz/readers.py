@@ -24,8 +24,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.export.webots import format_motion, parse_motion, read_motion
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import load, load_result
-from nlp_gait.proofs.certificate import read_certificate
-from nlp_gait.proofs.check import check_certificate
+from nlp_gait.proofs.certificate import check_certificate, read_certificate
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
 from tests.fuzz.mutation import Mutator, mutated_bytes, mutated_json, mutated_lines, mutated_xml

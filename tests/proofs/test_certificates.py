@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import casadi as ca
@@ -17,8 +17,13 @@ from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import branch_and_bound
 from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates, make_certificate_file, read_certificate
-from nlp_gait.proofs.check import check_certificate
+from nlp_gait.proofs.certificate import (
+    CERTIFICATES,
+    check_certificate,
+    load_certificates,
+    make_certificate_file,
+    read_certificate,
+)
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
 from tests.proofs.soundness import best_x, count_lost_boxes, feasible_gaits, load, narrow_around, narrow_bounds
@@ -96,7 +101,7 @@ def test_walk12_is_proven_and_its_certificate_checked(tmp_path: Path) -> None:
     proof = certify(problem, best, tolerance=0.05, time_limit_s=120.0)
     assert proof.closed and proof.gap == pytest.approx(0.05)
     path = tmp_path / "certificate.json"
-    path.write_text(json.dumps(make_certificate_file(problem, proof).to_json()))
+    path.write_text(json.dumps(asdict(make_certificate_file(problem, proof))))
     found = check_certificate(read_certificate(path), starts=1, paths=40)
     assert found.paths == 40 and found.same_code
     assert 0.2 * proof.boxes < found.boxes < 5 * proof.boxes  # an estimate

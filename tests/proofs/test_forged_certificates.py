@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,15 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.proofs import check
+from nlp_gait.proofs import certificate as certificates
 from nlp_gait.proofs.branch_and_bound import certify
-from nlp_gait.proofs.certificate import CertificateFile, make_certificate_file, read_certificate
-from nlp_gait.proofs.check import check_certificate, repeat_proof
+from nlp_gait.proofs.certificate import (
+    CertificateFile,
+    check_certificate,
+    make_certificate_file,
+    read_certificate,
+    repeat_proof,
+)
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
 from tests.proofs.soundness import feasible_gaits
@@ -31,7 +36,7 @@ PATHS = 10
 
 @pytest.fixture(autouse=True)
 def ship_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check, "find_certificate", lambda description: None)
+    monkeypatch.setattr(certificates, "find_certificate", lambda description: None)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +102,7 @@ FORGERIES: dict[str, tuple[Callable[[Raw], None], str]] = {
 @pytest.mark.parametrize("name", FORGERIES)
 def test_changed_numbers_are_named(name: str, honest: CertificateFile, tmp_path: Path) -> None:
     forge, message = FORGERIES[name]
-    raw = json.loads(json.dumps(honest.to_json()))
+    raw = json.loads(json.dumps(asdict(honest)))
     forge(raw)
     with pytest.raises(GaitError, match=message) as refusal:
         check_certificate(write(raw, tmp_path), paths=PATHS, starts=0)
@@ -140,19 +145,23 @@ def forge_bound(problem: GaitProblem, honest: CertificateFile, size: float) -> C
 def test_a_contradiction_to_a_shipped_certificate_is_named(
     problem: GaitProblem, honest: CertificateFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(check, "find_certificate", lambda description: honest)
+    monkeypatch.setattr(certificates, "find_certificate", lambda description: honest)
     with pytest.raises(InputError, match="is wrong: the shipped certificate is feasible and has"):
         check_certificate(forge_bound(problem, honest, 1e-3), paths=PATHS, starts=0)
     proof = honest.certificate
     impossible = replace(honest, certificate=replace(proof, bound=0.999 * proof.objective))
-    monkeypatch.setattr(check, "find_certificate", lambda description: impossible)
+    monkeypatch.setattr(certificates, "find_certificate", lambda description: impossible)
     with pytest.raises(InputError, match="better than the bound .* of the shipped certificate"):
         check_certificate(honest, paths=PATHS, starts=0)
 
 
 def test_paths_refute_a_false_bound_without_a_better_point(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = toy(two_valleys, limit=-9.0)
+<<<<<<< HEAD
     monkeypatch.setattr(check, "load_certified_problem", lambda file: problem)
+=======
+    monkeypatch.setattr(certificates, "load_problem", lambda file: problem)
+>>>>>>> 89583770 (Certificates and their checks in one file, rows over time and their search in another)
     honest = make_certificate_file(problem, certify(problem, np.array([-1.0124, 0.0]), tolerance=1e-3))
     assert check_certificate(honest, paths=20, starts=0).paths == 20
     valley = np.array([0.987, 0.0])  # the worse one

@@ -17,8 +17,7 @@ from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point,
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
-from nlp_gait.proofs.time_functions import make_time_functions
-from nlp_gait.proofs.time_search import bound_violation
+from nlp_gait.proofs.time_search import bound_violation, make_time_functions
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 from tests.proofs.soundness import feasible_gaits, find_contradictions
