@@ -34,12 +34,7 @@ class CsvTable:
         return tuple(row[self.header.index(name)] for row in self.rows) if name in self.header else None
 
     def check_header(self, needed: Collection[str], allowed: Collection[str]) -> None:
-        """Check that the needed columns exist, and no others than the allowed ones.
-
-        Raises:
-            InputError: a column is missing.
-            UnknownNameError: a column is unknown.
-        """
+        """Check that all needed columns exist, else InputError, and no others than the allowed ones, else UnknownNameError."""
         missing = [name for name in needed if name not in self.header]
         if missing:
             raise InputError(
@@ -70,11 +65,7 @@ class CsvTable:
 
 
 def read_table(path: Path, what: str) -> CsvTable:
-    """Read a CSV file of numbers separated by commas, semicolons or tabs; a first line that is not all numbers is the header.
-
-    Raises:
-        InputError: the file cannot be read, has no row, or a cell that is not a number.
-    """
+    """Read a CSV file of numbers, separated by one of ``DELIMITERS``, with or without a header; raises InputError."""
     text = read_text(path, what)
     owner = f"{what} {str(path)!r}"
     first = text.partition("\n")[0]

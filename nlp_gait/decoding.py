@@ -33,16 +33,9 @@ def decode(
 ) -> T:
     """Return an instance of a dataclass with fields of texts, numbers, booleans, tuples, mappings from text, dataclasses, unions.
 
-    Args:
-        cls: the dataclass.
-        raw: data from JSON.
-        where: place in the file, for messages.
-        given: fields that are not in the file.
-        unread: allowed keys that are not fields.
-        ignore_unknown: allow all other keys, except those that look like a misspelled field.
-
-    Raises:
-        ValueError: with the place: a key is missing or unknown, or a value has another type.
+    ``where`` is the place in the file, ``given`` are fields that are not in it, and ``unread`` keys that are not fields. With
+    ``ignore_unknown`` all other keys are allowed, too, except those that look like a misspelled field. Raises ValueError with the
+    place of a key that is missing or unknown, or of a value of another type.
     """
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where or 'it'} must be an object, got {format_value(raw)}")

@@ -24,11 +24,7 @@ def rename(path: Path, target: Path) -> None:
 
 
 def flush(path: Path) -> None:
-    """Wait until a file's content, or the names in a folder, are on the disk.
-
-    Raises:
-        OSError: the disk is full or broken. Folders that cannot be flushed (Windows, some network file systems) are ignored.
-    """
+    """Wait until a file's content, or the names in a folder if it can be flushed, are on the disk; raises OSError."""
     is_folder = path.is_dir()
     try:
         descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)

@@ -47,9 +47,7 @@ def read_bytes(
 ) -> bytes:
     """Return the content of a regular file of at most so many bytes, or of a link to one.
 
-    Raises:
-        GaitError: of class ``error``: it cannot be read, is not a regular file, or is too long. The message contains the kind of
-            file, ``what``, and ends with what to do, ``remedy``.
+    Raises ``error`` if that is impossible; its message contains ``what``, the kind of file, and ends with ``remedy``.
     """
     with convert_errors(f"{what} {str(path)!r} cannot be read", error, remedy):
         # Opening a pipe would wait for its writer.
@@ -86,11 +84,7 @@ def read_json(path: Path, what: str, *, error: type[GaitError] = InputError, rem
 
 
 def check_plain(data: Any) -> None:
-    """Check that data are plain: texts, finite numbers, true and false, null, lists, objects.
-
-    Raises:
-        ValueError: with the place of the first other value.
-    """
+    """Check that data are plain: texts, finite numbers, booleans, null, lists, objects; raises ValueError with the place."""
     waiting: list[tuple[str, Any, int]] = [("", data, 1)]
     while waiting:
         where, value, level = waiting.pop()
@@ -186,12 +180,9 @@ def _find_place(path: Path) -> Path:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a new empty file next to ``path`` with a hidden name in ``.tmp``, which replaces ``path`` at the end.
+    """Yield a new empty file next to ``path`` with a hidden name in ``.tmp``, which replaces it at the end; raises OutputError.
 
     A power cut leaves either the complete new file or the old state.
-
-    Raises:
-        OutputError: no space, no permission, no folder.
     """
     check_output(path)
     temporary = None
@@ -264,11 +255,7 @@ def _shorten(text: str) -> str:
 
 @contextmanager
 def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
-    """Yield a temporary folder, removed at the end.
-
-    Raises:
-        GaitError: of that class: the system has no folder for temporary files, or no space in it.
-    """
+    """Yield a temporary folder, removed at the end; raises ``error`` if the system has no place for it."""
     with convert_errors(
         "no folder for temporary files", error, "free some disk space, or set TMPDIR to another folder"
     ):
@@ -289,11 +276,7 @@ def check_path(path: str, owner: str, error: type[GaitError]) -> None:
 
 
 def make_writable_folder(path: Path) -> Path:
-    """Make a folder and check, before the work, that files can be written there.
-
-    Raises:
-        OutputError: it cannot be made or written to, or its name is not valid UTF-8.
-    """
+    """Make a folder and check, before the work, that files can be written there; raises OutputError."""
     check_output_name(path)
     with convert_errors(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
         make_folder(path)

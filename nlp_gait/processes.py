@@ -60,14 +60,8 @@ def run_in_forks(
 ) -> Iterator[T]:
     """Yield work(0), ..., work(count - 1) in this order; after ``stop`` returns True, only those that were started.
 
-    Args:
-        work: receives its number, and a function that returns whether to end early. What it returns or raises is pickled.
-        count: number of calls.
-        workers: number of processes; each takes the next number that has not been taken.
-        stop: checked in this process.
-
-    Raises:
-        WorkerError: a process died, perhaps out of memory.
+    ``work`` receives its number, and a function that returns whether to end early; what it returns or raises is pickled. Each of
+    the processes takes the next number. Raises WorkerError if one died, perhaps out of memory.
     """
     # Anonymous memory: a Value would be a temporary file, for which there may be no space.
     lock, taken, ending = multiprocessing.get_context("fork").Lock(), mmap.mmap(-1, COUNTER_BYTES), mmap.mmap(-1, 1)
@@ -141,11 +135,8 @@ def run_in_isolation(
     """Return what a call returns, at most so many bytes, in a forked process with its own session, without input and output.
 
     The call may hang, crash, exit or print. Its process and everything that it has started are killed at the end.
-    With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only).
-
-    Raises:
-        TimeoutError: the time limit, if there is one, has passed.
-        WorkerError: the process ended without a result; the message says how.
+    With ``memory_bytes``, it may take so much address space beyond what this process has (Linux only). Raises TimeoutError after
+    the time limit, and WorkerError, which says how, if the process ended without a result.
     """
     results, process = _fork(lambda sender: _isolate(sender, call, memory_bytes))
     try:
@@ -193,11 +184,7 @@ def _isolate(sender: Connection, call: Callable[[], bytes], memory_bytes: int | 
 
 
 def run_in_processes(calls: Mapping[K, Callable[[], T]], workers: int) -> Iterator[tuple[K, T]]:
-    """Call picklable functions in so many processes; yield key and result of each as it finishes.
-
-    Raises:
-        WorkerError: a worker process died, or none starts.
-    """
+    """Call picklable functions in so many processes; yield key and result as each finishes; raises WorkerError if one dies."""
     from joblib import Parallel, delayed  # costs 0.1 s to import
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 

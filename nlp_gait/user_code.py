@@ -113,12 +113,9 @@ def allow_code(text: str, kind: Kind) -> None:
 
 
 def resolve_code(text: str, kind: Kind, owner: str) -> str:
-    """Return the reference of code in a data file (the owner) as the user gave it in this process.
+    """Return code of a data file (the owner) as the user named it in this process; UserCodeError if that is missing.
 
     Entry points are always allowed.
-
-    Raises:
-        UserCodeError: the user did not name this code.
     """
     if not is_reference(text) or text in find_entry_points(kind):
         return text
@@ -132,11 +129,7 @@ def resolve_code(text: str, kind: Kind, owner: str) -> str:
 
 
 def parse_command(text: str) -> tuple[str, ...]:
-    """Return the words of ``cmd:COMMAND``.
-
-    Raises:
-        UserCodeError: the command is empty, has an open quote, or names a program that is not found.
-    """
+    """Return the words of ``cmd:COMMAND``; raises UserCodeError if there is no such program, or a quote is open."""
     try:
         words = tuple(shlex.split(text.removeprefix(PROGRAM)))
     except ValueError as error:
@@ -243,12 +236,7 @@ def _parse_imports(content: bytes) -> tuple[str, ...]:
 
 
 def check_reference(text: str, kind: Kind) -> None:
-    """Check that an object can exist, without running anything.
-
-    Raises:
-        UserCodeError: no such file or module.
-        UnknownNameError: no such name at its top level.
-    """
+    """Check, without running anything, that an object can exist; raises UserCodeError (no file) or UnknownNameError (no name)."""
     place = parse_reference(text, kind)
     if is_program(text):
         return
@@ -275,12 +263,7 @@ def _find_names(body: Iterable[ast.AST]) -> Iterator[str]:
 
 
 def load_object(text: str, kind: Kind) -> object:
-    """Return an object; runs its file or imports its module on the first call.
-
-    Raises:
-        UserCodeError: no such file or module, or it fails.
-        UnknownNameError: no such name in it.
-    """
+    """Return an object; runs its file or imports its module on the first call; raises UserCodeError or UnknownNameError."""
     if is_program(text):
         raise UserCodeError(f"{text!r} is a program: it can be an algorithm, not a {kind}")
     place = parse_reference(text, kind)
@@ -293,11 +276,7 @@ def load_object(text: str, kind: Kind) -> object:
 
 
 def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
-    """Return the result of a call of user code; what it prints goes to standard error.
-
-    Raises:
-        UserCodeError: it fails in any way, with the line of the file.
-    """
+    """Return the result of user code, which prints to standard error; raises UserCodeError with the line where it fails."""
     try:
         with redirect_stdout(sys.stderr):
             return call()

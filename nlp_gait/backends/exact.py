@@ -107,16 +107,12 @@ def _build(problem: GaitProblem) -> ExactModel:
         "indexes": ca.vertcat(*assembly.indexes.values()),
     }
     function = ca.Function("exact", [point.x, point.p], list(outputs.values()), ["x", "p"], list(outputs))
+    row_names = [name for c in constraints for name in c.row_names]
+    row_units = [c.unit for c in constraints for _ in c.row_names]
     return ExactModel(
         function=function,
-        row_names=(
-            *(name for c in constraints for name in c.row_names),
-            *(f"bounds[{name}]" for name in problem.names),
-        ),
-        row_units=(
-            *(c.unit for c in constraints for _ in range(c.value.shape[0])),
-            *(variable.unit for variable in problem.variables),
-        ),
+        row_names=(*row_names, *(f"bounds[{name}]" for name in problem.names)),
+        row_units=(*row_units, *(variable.unit for variable in problem.variables)),
         row_scales=np.array(ca.evalf(scale)).ravel(),
         index_names=tuple(assembly.indexes),
     )

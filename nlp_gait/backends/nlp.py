@@ -9,6 +9,7 @@ with x = default lower bound + z * default range. Samples are mapped, never unro
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -80,11 +81,7 @@ class NlpModel:
 
 
 def build_nlp(problem: GaitProblem) -> NlpModel:
-    """Return the NLP of a problem, built once for all copies that differ in parameter values only.
-
-    Raises:
-        LiftedSenseError: the problem lifts a function where the reformulation is not exact.
-    """
+    """Return the NLP of a problem, built once for all its copies; raises LiftedSenseError where a lift would not be exact."""
     return problem.build_once(_build)
 
 
@@ -108,6 +105,14 @@ def _build(problem: GaitProblem) -> NlpModel:
         _check_sense(problem, ops.lifts, ca.vertcat(z, p, width), cost, values, bounds, row_names)
     lifted = ca.vertcat(*(lift.variable for lift in ops.lifts))
     ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
+    exact: list[MX] = []
+    owners, count = [np.zeros(0, np.intp)], 0
+    for i, lift in enumerate(ops.lifts):
+        earlier = [other.variable for other in ops.lifts[:i]]  # which a lift may contain
+        exact += ca.graph_substitute([lift.value], earlier, exact) if earlier else [lift.value]
+        # Rows of a lift repeat the order of its variables.
+        owners.append(count + np.arange(lift.rows.shape[0]) % max(1, lift.variable.shape[0]))
+        count += lift.variable.shape[0]
     return NlpModel(
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
         variables=n,
@@ -115,40 +120,22 @@ def _build(problem: GaitProblem) -> NlpModel:
         offset=offset,
         scale=problem.scale,
         row_bounds=bounds,
-        lift_start=_build_lift_start(ops.lifts, [z, p, width]),
+        lift_start=ca.Function("lift_start", [z, p, width], [ca.vertcat(*exact)]),
         lifted=lifted.shape[0],
-        tie_upper=_repeat_per_row(ops.lifts, [0.0 if lift.tight else np.inf for lift in ops.lifts]),
-        tie_owner=_list_owners(ops.lifts),
-        lift_sense=np.concatenate(
-            [np.zeros(0), *(np.full(lift.variable.shape[0], _sense(lift)) for lift in ops.lifts)]
-        ),
+        tie_upper=_per_row(ops.lifts, [0.0 if lift.tight else np.inf for lift in ops.lifts]),
+        tie_owner=np.concatenate(owners),
+        lift_sense=_per_variable(ops.lifts, [lift.sense for lift in ops.lifts]),
         smoothed=ops.smoothed,
         build_s=time.perf_counter() - started,
     )
 
 
-def _repeat_per_row(lifts: list[Lift], values: list[float]) -> Array:
-    return np.repeat(np.array(values, dtype=float), [lift.rows.shape[0] for lift in lifts])
+def _per_row(lifts: list[Lift], values: Sequence[float]) -> Array:
+    return np.repeat(np.array(values, dtype=float), np.array([lift.rows.shape[0] for lift in lifts], dtype=int))
 
 
-def _sense(lift: Lift) -> float:
-    return 0.0 if lift.tight else 1.0 if lift.from_above else -1.0
-
-
-def _list_owners(lifts: list[Lift]) -> IntArray:
-    """Return the lifted variable of each row that ties one: rows of a lift repeat the order of its variables."""
-    first = np.cumsum([0, *(lift.variable.shape[0] for lift in lifts)])
-    rows = [np.arange(lift.rows.shape[0]) % max(1, lift.variable.shape[0]) for lift in lifts]
-    return np.concatenate([np.zeros(0, np.intp), *(start + row for start, row in zip(first, rows, strict=False))])
-
-
-def _build_lift_start(lifts: list[Lift], inputs: list[MX]) -> ca.Function:
-    """Return a function of the inputs to the exact values of all lifted variables; a lift may contain earlier ones."""
-    values: list[MX] = []
-    for i, lift in enumerate(lifts):
-        earlier = [other.variable for other in lifts[:i]]
-        values += ca.graph_substitute([lift.value], earlier, values) if earlier else [lift.value]
-    return ca.Function("lift_start", inputs, [ca.vertcat(*values)])
+def _per_variable(lifts: list[Lift], values: Sequence[float]) -> Array:
+    return np.repeat(np.array(values, dtype=float), np.array([lift.variable.shape[0] for lift in lifts], dtype=int))
 
 
 def _check_sense(
@@ -167,15 +154,16 @@ def _check_sense(
     """
     loose = [i for i, lift in enumerate(lifts) if not lift.tight]
     variables = ca.vertcat(*(lift.variable for lift in lifts))
-    columns = np.concatenate([np.full(lift.variable.shape[0], i) for i, lift in enumerate(lifts)])
-    away = np.concatenate([np.full(lifts[i].variable.shape[0], 1.0 if lifts[i].from_above else -1.0) for i in loose])
-    column_owner = columns[np.isin(columns, loose)]
+    columns = _per_variable(lifts, list(range(len(lifts))))
+    senses = _per_variable(lifts, [lift.sense for lift in lifts])
+    is_loose = np.isin(columns, loose)
+    column_owner, away = columns[is_loose], senses[is_loose]
     outputs = ca.vertcat(cost, values, *(lift.rows for lift in lifts))
     slopes = ca.Function(
         "slopes", [inputs, variables], [ca.jacobian(outputs, ca.vertcat(*(lifts[i].variable for i in loose)))]
     )
     lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
-    tight = _repeat_per_row(lifts, [lift.tight for lift in lifts]) > 0
+    tight = _per_row(lifts, [lift.tight for lift in lifts]) > 0
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
     hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), tight - 1.0])
     two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), tight])

@@ -261,11 +261,7 @@ class GaitProblem:
 
     @lock_casadi
     def signals(self, x: Sequence[float] | Array | Mapping[str, float]) -> Signals:
-        """Return time histories at x (n,) and the current parameter values.
-
-        Raises:
-            InputError: x has the wrong length or is not finite, or the problem has no time histories.
-        """
+        """Return time histories at x (n,) and the current parameter values; InputError for a wrong x, or if there are none."""
         if self.display.motion is None:
             raise InputError(f"problem {self.name!r} has no time histories")
         return self.display.motion(self.at(x))
@@ -315,11 +311,7 @@ class GaitProblem:
         return array
 
     def check_within(self, x: Sequence[float] | Array | Mapping[str, float]) -> Array:
-        """Return ``check_x`` clipped to the bounds that it misses by rounding, and to the value of fixed variables.
-
-        Raises:
-            InputError: as ``check_x``, or a value outside the bounds.
-        """
+        """Return ``check_x`` clipped to bounds that it misses by rounding; raises InputError as that, and outside the bounds."""
         array = self.check_x(x)
         violation = np.maximum(self.lower - array, array - self.upper)
         outside = np.flatnonzero((violation > ROUNDING * self.scale) & (self.lower < self.upper))

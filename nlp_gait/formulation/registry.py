@@ -131,12 +131,7 @@ class UserMaker:
 
 
 def check_options(make: Maker, options: Mapping[str, Any]) -> None:
-    """Check that a maker has these options, with values of the default's type and among those allowed.
-
-    Raises:
-        UnknownNameError: no such option.
-        InputError: a value of another type, not among those allowed, or a count too large to build.
-    """
+    """Check that a maker has these options, and allows their values; raises UnknownNameError or InputError."""
     known, allowed = inspect.signature(make).parameters, _choices(make)
     for option, given in options.items():
         value = _to_python(given)
@@ -196,12 +191,7 @@ def resolve_name(name: str) -> tuple[str, dict[str, str]]:
 
 
 def check_mathematics(problem: GaitProblem) -> None:
-    """Assemble a problem once and check that backends can use it.
-
-    Raises:
-        InputError: no assembly, duplicated rows, symbols that are neither variables nor parameters, a bound of a row that
-            depends on variables, or a start point of the wrong length.
-    """
+    """Assemble a problem once and check that backends can use it; raises InputError that says what is wrong."""
     owner = f"problem {problem.name!r}"
     if not NAME.fullmatch(problem.name):  # files are named after it
         raise InputError(f"{owner}: a name has 1 to 64 letters, digits and . _ + -, and starts with a letter or digit")

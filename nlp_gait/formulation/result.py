@@ -70,8 +70,7 @@ class Result:
 def load_result(path: Path) -> Result:
     """Return the result in a JSON object with ``problem``, ``x`` by variable name and optional ``options``, ``parameters``.
 
-    Raises:
-        InputError: the file cannot be read, is damaged, or contains values that the problem does not allow.
+    Raises InputError for a file that cannot be read or is damaged, and for values that the problem does not allow.
     """
     raw = read_json(path, "result")
     with explain_errors(f"result {str(path)!r}", "`nlp-gait solve ... --out FILE` writes a valid one"):

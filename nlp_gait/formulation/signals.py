@@ -74,11 +74,7 @@ class Signals:
         return columns[name]
 
     def to_frame(self) -> Any:
-        """Return a pandas data frame of ``named_columns``, indexed by time; ``frame.attrs["units"]`` has the units by column.
-
-        Raises:
-            MissingExtraError: pandas is not installed.
-        """
+        """Return ``named_columns`` as a pandas data frame indexed by time; ``frame.attrs["units"]`` has the units by column."""
         columns = {name: (unit, values) for name, unit, values in self.named_columns()}
         unit, t = columns.pop("t")
         module = import_pandas()

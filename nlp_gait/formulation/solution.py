@@ -192,17 +192,11 @@ class Solution:
         return self._restore(problem).signals(self.x)
 
     def plot(self, problem: GaitProblem | None = None) -> Any:
-        """Plot the gait with Matplotlib: stick figures from the side, power and balance margin over time.
-
-        The problem and the errors are as for ``signals``.
-        """
+        """Plot the gait with Matplotlib: stick figures, power and balance margin; problem and errors as for ``signals``."""
         return import_object(FUNCTIONS["plot_gait"])(self._restore(problem), self.x, self.solver)
 
     def animate(self, problem: GaitProblem | None = None) -> Any:
-        """Return a page that plays the gait in 3-D, with power and balance margin; notebooks display it, ``write`` saves it.
-
-        The problem and the errors are as for ``signals``.
-        """
+        """Return a page that plays the gait in 3-D, with power and margin, for notebooks; ``write`` saves it. See ``plot``."""
         return import_object(FUNCTIONS["animate_gait"])(self._restore(problem), self.x, self.solver)
 
     def sensitivity(self, problem: GaitProblem | None = None) -> Any:

@@ -174,11 +174,7 @@ def check_certificate(
 def repeat_proof(
     file: CertificateFile, *, progress: Progress = ignore_progress, checkpoint: Path | None = None
 ) -> Certificate:
-    """Prove the bound of a certificate again, as a whole; arguments as ``certify``.
-
-    Raises:
-        InputError: the certificate is not valid, see ``check_certificate``, or its bound is tighter than the proven one.
-    """
+    """Prove the bound of a certificate again, as a whole; arguments and errors as ``certify`` and ``check_certificate``."""
     (problem, _), proof = _check_numbers(file), file.certificate
     x = np.array(proof.x)
     return certify(

@@ -130,12 +130,7 @@ class TimeFunctions(NamedTuple):
 
 @lock_casadi
 def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunctions:
-    """Read the functions from the rows with all samples at one phase, and with the later samples an interval later.
-
-    Raises:
-        InputError: an operation that cannot be enclosed.
-        CompilerError: there is no compiler, or it fails.
-    """
+    """Read the functions from the rows with all samples at one phase, and with the later samples an interval later."""
     point = problem.symbols()
     now, later = MX.sym("phase"), MX.sym("later")
     still = source.assemble(point, ca.horzcat(now, now, now), Exact())

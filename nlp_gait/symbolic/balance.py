@@ -95,13 +95,8 @@ def combine_zmps(zmps: Sequence[SX], ground_loads: Sequence[SX]) -> SX:
 def zmp_of_point_masses(masses: DM, p: SX, a: SX, gravity: float, *, static_load: bool = False) -> SX:
     """Return the zero-moment point (2,) [m] of point masses (N,) [kg] on flat ground at height zero.
 
-    Args:
-        masses: (N,) [kg].
-        p: (3, N) positions [m], z up.
-        a: (3, N) accelerations [m/s^2], gravity excluded.
-        gravity: g [m/s^2].
-        static_load: use the weight as the load of the ground, as eq. (14) does. The moment of gravity and inertia about that
-            point vanishes only if the centre of mass has no vertical acceleration.
+    Takes their positions (3, N) [m], z up, and accelerations without gravity [m/s^2]. With ``static_load`` the ground's load
+    is the weight, as in eq. (14): the moment about that point vanishes only without vertical acceleration of the centre of mass.
 
     Source:
         Goswami, Vadakkepat, Phung (2008), eqs. (12)-(14); (B.5) and (W.4) in docs/model.

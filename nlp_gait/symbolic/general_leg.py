@@ -88,13 +88,8 @@ class _Chain(NamedTuple):
 def leg_motion(leg: Leg, steps: int, torso: TorsoMotion, margin: SX, ops: Nonsmooth, *, held: bool) -> LegMotion:
     """Return the angles, velocities and accelerations of a leg, defined for every finite input.
 
-    Args:
-        leg: data of the leg.
-        steps: of Newton's method after the guess.
-        torso: its motion.
-        margin: on the reach of the knee (see ``Nonsmooth.acos``).
-        ops: interpretation of acos and root.
-        held: whether the rates of a leg that misses its foot are zero; else they are those of its angles.
+    Newton's method takes so many steps after the guess; ``margin`` is on the reach of the knee (see ``Nonsmooth.acos``). If
+    ``held``, the rates of a leg that misses its foot are zero; else they are those of its angles.
     """
     arm = torso.rotation @ DM(leg.hip_m - torso.point_m)
     swept = ca.cross(torso.spin, arm)

@@ -92,12 +92,8 @@ def knee_cosine(distance_squared: SX, thigh: float, tibia: float) -> SX:
 def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops: Nonsmooth) -> LegAngles:
     """Return the angles, velocities and accelerations of a leg, defined for every finite input.
 
-    Args:
-        hip_to_ankle: (3,) vector from the hip joint to the ankle in world axes [m], with its time derivatives.
-        thigh: hip to knee [m].
-        tibia: knee to ankle [m].
-        margin: reach margin on the cosine of the knee angle (see ``Nonsmooth.acos``).
-        ops: interpretation of acos.
+    Takes the vector (3,) from the hip joint to the ankle in world axes [m], the lengths from hip to knee and from there to the
+    ankle [m], and the reach margin on the cosine of the knee angle (see ``Nonsmooth.acos``).
 
     Source:
         Gupta, Pratihar, Deb (2023), eqs. (5)-(14) with the hip yaw-pitch angle at zero; the arcsine of eq. (9) replaced by

@@ -127,6 +127,11 @@ class Lift:
     from_above: bool = True
     tight: bool = False  #: whether the rows determine the variable: it equals the exact value at every feasible point
 
+    @property
+    def sense(self) -> float:
+        """1 if the variable is its exact value or more, -1 if it is that or less, 0 if it is equal."""
+        return 0.0 if self.tight else 1.0 if self.from_above else -1.0
+
 
 class Lifted(Nonsmooth):
     """Absolute values and minima as variables with inequalities; a jump as a sigmoid: (L.3) to (L.11), (S.2) in docs/model.

@@ -8,17 +8,20 @@ import pytest
 from casadi import SX
 
 from nlp_gait.gaits.stairs.planar_biped import LINKS, centres, points, toe_foot_biped
-from nlp_gait.symbolic.contact import (
+from nlp_gait.symbolic.dynamics import equations_of_motion
+from nlp_gait.symbolic.quantised import (
     CREEP_SPEED,
     YIELD_DEPTH,
     Contact,
+    Controller,
     Equations,
     Ground,
+    QuantisedState,
+    advance,
     implicit_equations,
+    implicit_quantum,
     solve_definite,
 )
-from nlp_gait.symbolic.dynamics import equations_of_motion
-from nlp_gait.symbolic.quantised import Controller, QuantisedState, advance, implicit_quantum
 
 QUANTUM, GRAVITY = 0.01, 9.81
 STIFFNESS, DAMPING, FRICTION = 5e4, 500.0, 0.6

@@ -8,9 +8,17 @@ import pytest
 from casadi import SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.symbolic.contact import Contact, Ground, solve_definite
 from nlp_gait.symbolic.dynamics import EquationsOfMotion
-from nlp_gait.symbolic.quantised import Controller, QuantisedState, advance, explicit_quantum, implicit_quantum
+from nlp_gait.symbolic.quantised import (
+    Contact,
+    Controller,
+    Ground,
+    QuantisedState,
+    advance,
+    explicit_quantum,
+    implicit_quantum,
+    solve_definite,
+)
 
 QUANTUM = 0.01
 # Two links in numbers that have nothing in common.

@@ -15,8 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.first_order import StagePlaces
-from nlp_gait.backends.derivatives.glue import Assembler, Glue, union
+from nlp_gait.backends.derivatives.first_order import Assembler, Glue, StagePlaces, union
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Call, DerivativePlan, Integers, PlaceBlock, Row
 from nlp_gait.backends.derivatives.structure import Structure, nonzeros
 

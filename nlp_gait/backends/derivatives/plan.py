@@ -219,7 +219,8 @@ class DerivativePlan:
 
     def add_row(self, phase: int, row: Row, targets: Integers, factor: int) -> bool:
         """Add factor times a row to targets: in a step (returns True), or in the initial values if all is constant."""
-        if factor in self.initial and (row.places == ONE).all() and self._is_constant(factor):
+        is_constant = factor in self.initial and self._constants.get(self.initial[factor]) == factor
+        if is_constant and (row.places == ONE).all():
             for place in targets.tolist():
                 self.initial[place] = self.initial.get(place, 0.0) + self.initial[factor]
             return False
@@ -240,9 +241,6 @@ class DerivativePlan:
         self.products += [(t, s, first, second, length) for t, s, length in find_runs(targets, row.places)]
         self._add_step(phase, PRODUCTS, begin, len(self.products))
 
-    def _is_constant(self, place: int) -> bool:
-        return self._constants.get(self.initial[place]) == place
-
     def _add_step(self, phase: int, kind: int, begin: int, end: int) -> None:
         """Add a step, or extend the last one if it is of the same kind."""
         steps = self.steps[phase]
@@ -255,10 +253,8 @@ class DerivativePlan:
 
 def find_runs(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
     """Split two lists of places into runs in which both increase by one; return target, source, length of each."""
-    if not len(targets):
-        return []
-    if len(targets) == 1:
-        return [(int(targets[0]), int(sources[0]), 1)]
     ends = np.flatnonzero((np.diff(targets) != 1) | (np.diff(sources) != 1)) + 1
-    begins = [0, *ends.tolist()]
-    return [(int(targets[i]), int(sources[i]), j - i) for i, j in zip(begins, [*begins[1:], len(targets)], strict=True)]
+    begins = [0, *ends.tolist()] if len(targets) else []
+    return [
+        (int(targets[i]), int(sources[i]), j - i) for i, j in zip(begins, [*begins[1:], len(targets)], strict=False)
+    ]

@@ -103,7 +103,7 @@ def _concatenate(function: ca.Function) -> ca.Function:
 
 
 def _by_sample(matrices: list[SX], count: int) -> SX:
-    """Return the nonzeros of matrices with a block of columns for each sample as one vector, sample by sample."""
+    """Return the nonzeros of matrices, a block of columns for each sample, as one vector, sample by sample."""
     parts = [nonzeros(matrix) for matrix in matrices]
     starts = np.cumsum([0, *(part.shape[0] for part in parts)])
     order = [np.arange(*ends).reshape(count, -1) for ends in zip(starts[:-1], starts[1:], strict=True)]

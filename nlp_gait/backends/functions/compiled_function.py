@@ -44,11 +44,7 @@ LOOPS = ("Map", "ThreadMap", "MapSum")
 
 
 def make_kernel(function: ca.Function) -> ca.Function:
-    """Return a function named ``kernel`` with the same arguments and dense results, of supported operations only.
-
-    Raises:
-        InputError: an argument is sparse, or an operation is not supported.
-    """
+    """Return a function ``kernel`` with the same arguments and dense results; raises InputError where that is impossible."""
     for i in range(function.n_in()):
         if not function.sparsity_in(i).is_dense():
             raise InputError(
@@ -102,7 +98,6 @@ def _count_operations(function: ca.Function) -> int:
 
 
 def _find_unsupported(function: ca.Function) -> Iterator[str]:
-    """Yield what is not supported, in words."""
     for part in (function, *function.find_functions()):
         kind = part.class_name()
         if kind in OPERATIONS:

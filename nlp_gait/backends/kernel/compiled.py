@@ -59,19 +59,9 @@ class NativeKernel:
         """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n); all arrays contiguous, aligned doubles."""
         if not hasattr(self._local, "memory"):  # scratch memory of the calling thread
             self._local.memory = np.empty(-(-self._workspace_bytes // 8))
-        failed = self._evaluate(
-            get_address(X),
-            len(X),
-            get_address(p),
-            get_address(lower),
-            get_address(upper),
-            get_address(self._weights),
-            get_address(f),
-            get_address(violation),
-            None if g is None else get_address(g),
-            get_address(self._local.memory),
-        )
-        if failed:
+        arrays = (p, lower, upper, self._weights, f, violation, g, self._local.memory)
+        addresses = (None if array is None else get_address(array) for array in arrays)
+        if self._evaluate(get_address(X), len(X), *addresses):
             raise RuntimeError("the compiled kernel reported a failure")
 
 
@@ -84,9 +74,14 @@ def get_address(array: Array) -> int:
 class InterpretedKernel:
     """Evaluates a kernel in CasADi's virtual machine, one thread at a time: many times slower, the same numbers."""
 
-    def __init__(self, kernel: Kernel) -> None:
-        self._blocks = {size: _map_kernel(kernel, size) for size in BLOCKS}
+    def __init__(self, problem: GaitProblem) -> None:
+        kernel = build_kernel(problem)
         self._weights = kernel.weights
+        self._blocks = {}
+        for size in BLOCKS:
+            x, p = ca.MX.sym("x", kernel.function.size1_in(0), size), ca.MX.sym("p", kernel.function.size1_in(1))
+            cost, g = kernel.function.map(size)(x, ca.repmat(p, 1, size))
+            self._blocks[size] = ca.Function("block", [x, p], [cost, g])
         self.description = "interpreted by CasADi's virtual machine"
 
     @lock_casadi
@@ -109,12 +104,6 @@ class InterpretedKernel:
                 first += size
 
 
-def _map_kernel(kernel: Kernel, size: int) -> ca.Function:
-    x, p = ca.MX.sym("x", kernel.function.size1_in(0), size), ca.MX.sym("p", kernel.function.size1_in(1))
-    cost, g = kernel.function.map(size)(x, ca.repmat(p, 1, size))
-    return ca.Function("block", [x, p], [cost, g])
-
-
 # Least work of a thread; handing over work costs about 0.05 ms.
 LEAST_THREAD_TIME_S = 3e-4
 
@@ -126,7 +115,7 @@ class RowThreads:
         """Use at most this number of threads."""
         self._threads = threads
         self._time_per_row_s = 0.0
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+        self._pools: dict[int, ThreadPoolExecutor] = {}
 
     def run(self, rows: int, evaluate: Callable[[slice], None]) -> None:
         """Call ``evaluate`` with slices that together are all rows, from several threads at once."""
@@ -143,11 +132,11 @@ class RowThreads:
             self._time_per_row_s = (time.perf_counter() - started) * parts / rows
 
     def _get_pool(self) -> ThreadPoolExecutor:
-        process = os.getpid()  # a forked process has no threads of its parent, and starts its own
-        if self._pool is None or self._pool[0] != process:
+        pools, process = self._pools, os.getpid()  # a forked process has no threads of its parent, and starts its own
+        if process not in pools:
             # Two threads at once may start two pools; the one that is overwritten ends with its work.
-            self._pool = process, ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")
-        return self._pool[1]
+            self._pools = pools = {process: ThreadPoolExecutor(self._threads - 1, thread_name_prefix="nlp-gait")}
+        return pools[process]
 
 
 LOG = logging.getLogger("nlp_gait")
@@ -279,14 +268,10 @@ def compile_objective(
         if require_compiler:
             raise
         LOG.warning("the objective is interpreted, which is many times slower: %s", error)
-        evaluator = problem.build_once(_build_interpreted)
+        evaluator = problem.build_once(InterpretedKernel)
         used = 1  # the virtual machine does not release Python's lock
     rebuild = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
     return CompiledObjective(problem, evaluator, used, rebuild)
-
-
-def _build_interpreted(problem: GaitProblem) -> InterpretedKernel:
-    return InterpretedKernel(build_kernel(problem))
 
 
 def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeKernel:

@@ -68,21 +68,24 @@ def read_native_source(package: str, *names: str) -> str:
 
 
 def find_compiler() -> Compiler:
-    """Return the first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, and the ``ziglang`` package.
-
-    Raises:
-        CompilerError: there is no compiler; the message says what was tried.
-    """
+    """Return the first C++ compiler that works: ``$CXX``, ``$CC``, c++, g++, clang++, ``ziglang``; else raises CompilerError."""
     return _find(os.environ.get("CXX", ""), os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 
 @functools.lru_cache(maxsize=8)
 def _find(cxx: str, cc: str, path: str) -> Compiler:
     tried: list[str] = []
+    commands: list[tuple[str, ...]] = []
     for name, text in (("CXX", cxx), ("CC", cc)):
-        if _split(text) == ():
+        try:
+            words = shlex.split(text)
+        except ValueError:  # a quote is not closed
+            words = [""]
+        if words and words[0]:
+            commands.append(tuple(words))
+        elif text.strip():
             tried.append(f"{name}={text!r}: not a command line")
-    commands = [command for text in (cxx, cc) if (command := _split(text))] + [(name,) for name in COMMON_NAMES]
+    commands += [(name,) for name in COMMON_NAMES]
     if find_spec("ziglang") is not None:
         commands.append((sys.executable, "-P", "-m", "ziglang", "cc"))
     for command in commands:
@@ -94,17 +97,6 @@ def _find(cxx: str, cc: str, path: str) -> Compiler:
         except CompilerError as error:
             tried.append(str(error))
     raise CompilerError(f"no C++ compiler ({'; '.join(tried)}); {HOW_TO_GET_ONE}")
-
-
-def _split(text: str) -> tuple[str, ...] | None:
-    """Split a command line: () if a quote is not closed or there is no program, None if there is no text."""
-    if not text.strip():
-        return None
-    try:
-        words = tuple(shlex.split(text))
-    except ValueError:
-        return ()
-    return words if words and words[0] else ()
 
 
 def _run(command: Sequence[str], time_limit_s: float) -> str:
@@ -137,9 +129,7 @@ def _run(command: Sequence[str], time_limit_s: float) -> str:
     if process.returncode != 0:
         lines = [line.strip() for line in messages.splitlines() if line.strip()]
         reason = next((line for line in lines if "error" in line.lower()), lines[-1] if lines else "no message")
-        status = (
-            process.returncode if process.returncode <= 128 else 128 - process.returncode
-        )  # sh adds 128 to a signal
+        status = process.returncode if process.returncode <= 128 else 128 - process.returncode  # sh: 128 + signal
         raise CompilerError(f"{program} failed with exit status {status}: {reason}")
     return output
 

@@ -39,17 +39,9 @@ def load_shared_library(
     symbols: Sequence[str],
     write_source: Callable[[], str] | None = None,
 ) -> tuple[ctypes.CDLL, Path]:
-    """Return the library of a C++ source and its file, from the cache or built.
+    """Return the library of a C++ source, which must have some functions, and its file, cached or built; raises CompilerError.
 
-    Args:
-        source: C++; or everything that it depends on, if ``write_source`` is given.
-        compiler: builds it.
-        flags: of the compiler.
-        symbols: functions that the library must have.
-        write_source: returns the source; called only if the library is not in the cache.
-
-    Raises:
-        CompilerError: the compiler fails, or the library cannot be loaded.
+    With ``write_source``, which is called to build it, ``source`` is everything that it depends on.
     """
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
     parts = (source, *compiler.command, compiler.version, *flags, *machine)

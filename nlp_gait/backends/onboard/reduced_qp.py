@@ -54,9 +54,8 @@ class Step:
     multipliers: Array  #: (m,) of all rows, positive at an upper bound
     decrease: float  #: predicted decrease of the cost
     relaxed: bool  #: whether rows had to be violated
-    estimate_rest: Callable[
-        [], float
-    ]  #: how much less the cost would be with the Hessian itself, if the same rows are active
+    #: How much less the cost would be with the Hessian itself, if the same rows are active
+    estimate_rest: Callable[[], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +64,8 @@ class _Program:
 
     ties: IntArray  #: (lifted,) chosen rows
     own: Array  #: (lifted,) derivatives of the chosen rows by their lifted variables
-    divide: Callable[
-        ..., Array
-    ]  #: by the derivatives of the chosen rows by the lifted variables, or ("T") by their transpose
+    #: By the derivatives of the chosen rows by the lifted variables, or ("T") by their transpose
+    divide: Callable[..., Array]
     lifts: Array  #: (lifted, n) lifted variables from z
     rows: Array  #: (m, n) change of the rows from z
     hessian: Array  #: (n, n)
@@ -83,7 +81,10 @@ class StepSolver:
 
     def __init__(self, functions: NlpFunctions) -> None:
         """Raise InputError if DAQP is not installed."""
-        self._daqp = _load_daqp()
+        try:
+            self._daqp: Any = importlib.import_module("daqp")
+        except ImportError as error:
+            raise InputError("planning again requires DAQP; install it: pip install 'nlp-gait[qp]'") from error
         self._functions = functions
         model = functions.model
         self.n, self.lifted = model.variables, model.lifted
@@ -269,10 +270,3 @@ def _make_convex(hessian: Array, normals: Array, damping: float) -> Array:
             axes = basis @ directions
             bent += (axes * np.maximum(np.abs(values) if is_along else values, lowest * least)) @ axes.T
     return bent
-
-
-def _load_daqp() -> Any:
-    try:
-        return importlib.import_module("daqp")
-    except ImportError as error:
-        raise InputError("planning again requires DAQP; install it: pip install 'nlp-gait[qp]'") from error

@@ -105,9 +105,8 @@ class LibraryPoint:
     feasible: bool  #: whether an optimum was found
     objective: float  #: exact, in the problem's sense
     x: Mapping[str, float]  #: by variable
-    slopes: Mapping[
-        str, Mapping[str, float | None]
-    ]  #: change of each variable per unit of an axis, by axis; None if undefined
+    #: Change of each variable per unit of an axis, by axis; None if undefined
+    slopes: Mapping[str, Mapping[str, float | None]]
 
 
 @dataclass(frozen=True, kw_only=True)

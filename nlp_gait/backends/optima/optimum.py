@@ -53,12 +53,8 @@ class KktFunctions:
         outputs = [*self.values(w, p), self.gradient(w, p, lam)]
         return ca.Function("by_parameters", [w, p, lam], [ca.jacobian(output, p) for output in outputs])
 
-    def _symbols(self) -> tuple[MX, MX, MX]:
-        return (
-            MX.sym("w", self.values.size1_in(0)),
-            MX.sym("p", self.values.size1_in(1)),
-            MX.sym("lam", self.values.size1_out(1)),
-        )
+    def _symbols(self) -> list[MX]:
+        return [MX.sym(self.gradient.name_in(i), self.gradient.size1_in(i)) for i in range(3)]
 
 
 def build_kkt_functions(problem: GaitProblem) -> KktFunctions:
@@ -81,7 +77,7 @@ def _build(problem: GaitProblem) -> KktFunctions:
     return KktFunctions(
         model=model,
         values=ca.Function("values", [w, p], [model.nlp["f"], values, lower, upper]),
-        gradient=ca.Function("gradient", [w, p, lam], [ca.gradient(lagrangian, w)]),
+        gradient=ca.Function("gradient", [w, p, lam], [ca.gradient(lagrangian, w)], ["w", "p", "lam"], ["gradient"]),
     )
 
 
@@ -256,7 +252,8 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
             break
     slack = np.minimum(upper - values, values - lower)
     weak = np.where(side == 0, np.abs(slack) < WEAK, np.abs(lam) < WEAK) & ~equation
-    names = list_row_names(problem, functions)
+    ties = (f"lifted[{i}]" for i in range(len(functions.model.tie_upper)))
+    names = (*functions.model.row_names, *ties, *(f"bounds[{name}]" for name in problem.names))
     return Optimum(
         problem=problem,
         functions=functions,
@@ -297,9 +294,3 @@ def _fix_flat_lifts(found: Optimum) -> Optimum:
         if tie.size:
             side[tie[np.argmin((values - lower)[tie])]] = -1
     return replace(moved, side=side)
-
-
-def list_row_names(problem: GaitProblem, functions: KktFunctions) -> tuple[str, ...]:
-    """Return the names of all rows: the problem's, those that tie lifted variables, and the variables' bounds."""
-    ties = (f"lifted[{i}]" for i in range(len(functions.model.tie_upper)))
-    return (*functions.model.row_names, *ties, *(f"bounds[{name}]" for name in problem.names))

@@ -59,13 +59,8 @@ class SensitivityTable:
 
     def write_csv(self, path: Path) -> None:
         """Write one row for each parameter; the unit is part of a column's name. Raises OutputError."""
-        header = [
-            "parameter",
-            "parameter_unit",
-            "reach_down",
-            "reach_up",
-            *(f"{name} [{u}]" for name, u in self.quantities),
-        ]
+        header = ["parameter", "parameter_unit", "reach_down", "reach_up"]
+        header += [f"{name} [{unit}]" for name, unit in self.quantities]
         rows = [
             [name, unit, *self.reach[:, k].tolist(), *self.values[:, k].tolist()]
             for k, (name, unit) in enumerate(self.parameters)

@@ -286,12 +286,7 @@ class Ipopt(Solver):
 
 @cache
 def find_linear_solver(wanted: str | None = None) -> str:
-    """Return the linear solver that IPOPT uses here, read from its log: the wanted one, or its default.
-
-    Raises:
-        InputError: the wanted one does not run here.
-        OutputError: there is no disk space for the log.
-    """
+    """Return the linear solver that IPOPT uses here, by its log: its default, or the wanted one; InputError if that fails."""
     x = ca.MX.sym("x")
     with make_temporary_folder("nlp-gait-ipopt-") as folder:
         log = folder / "ipopt.log"

@@ -18,14 +18,8 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.backends.solvers.solver import (
-    INTERRUPTED,
-    REASONS,
-    IterationWatch,
-    Solver,
-    count_evaluations,
-    judge_point,
-)
+from nlp_gait.backends.solvers import solver as base
+from nlp_gait.backends.solvers.solver import IterationWatch, Solver
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -70,7 +64,6 @@ class CasadiSolver(Solver):
     """A solver of the wheel with its default settings, in IPOPT's stages of sigmoid width, each started from x alone."""
 
     quiet: ClassVar[Mapping[str, Any]]
-    watched: ClassVar[bool] = False
     time_limit_s: ClassVar[float | None] = None
 
     def check(self, problem: GaitProblem) -> None:
@@ -90,7 +83,7 @@ class CasadiSolver(Solver):
         iterations, evaluations = 0, Evaluations()
         stats: dict[str, Any] = {}
         started = time.perf_counter()
-        alone = stop is never and self.watched
+        alone = stop is never and isinstance(self, WatchedSolver)
         with defer_interrupts() if alone else contextlib.nullcontext(stop) as pressed:
             watch.begin(pressed, math.inf if self.time_limit_s is None else started + self.time_limit_s)
             for width in widths:
@@ -103,14 +96,14 @@ class CasadiSolver(Solver):
                 primal = np.array(result["x"]).ravel()
                 stats = solver.stats()
                 iterations += int(stats.get("iter_count") or 0)
-                evaluations += count_evaluations(stats)
+                evaluations += base.count_evaluations(stats)
                 if watch.reason:
                     break
-        if stop is never and (watch.reason == INTERRUPTED or pressed()):
+        if stop is never and (watch.reason == base.INTERRUPTED or pressed()):
             raise KeyboardInterrupt
         finite = bool(np.isfinite(primal).all())
-        status = REASONS.get(watch.reason, f"{self.name} returned {stats.get('return_status')!r}")
-        return judge_point(
+        status = base.REASONS.get(watch.reason, f"{self.name} returned {stats.get('return_status')!r}")
+        return base.judge_point(
             self.name,
             problem,
             x0,
@@ -151,8 +144,6 @@ class WatchedSolver(CasadiSolver):
     Attributes:
         time_limit_s: limit of wall time for all stages, checked after each iteration [s]; None for no limit.
     """
-
-    watched: ClassVar[bool] = True
 
     time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of other solvers
 

@@ -39,15 +39,9 @@ class WorkingSet:
         watch: IterationWatch,
         always: Rows,
     ) -> None:
-        """Take what solvers of some rows are made from.
+        """Take the NLP, its functions by the names of ``nlpsol``, and IPOPT's options without derivatives and the watch.
 
-        Args:
-            nlp: CasADi's dictionary of x, p, f, g.
-            functions: of the NLP, and their derivatives, by the names that ``nlpsol`` gives them.
-            options: of ``nlpsol``, without derivatives and the watch.
-            whole: IPOPT on all rows.
-            watch: of ``whole``; it also ends runs on some of the rows.
-            always: (m,) True for rows with which every run begins.
+        ``whole`` is IPOPT on all rows, ``watch`` its watch, which also ends other runs; these begin with ``always`` (m,).
         """
         self._nlp, self._functions, self._options = nlp, functions, options
         self._whole, self._watch = whole, watch

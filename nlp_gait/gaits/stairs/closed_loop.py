@@ -25,15 +25,18 @@ from nlp_gait.gaits.stairs.planar_biped import (
 )
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, posture, stair_height
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
-from nlp_gait.symbolic.contact import Contact, Equations, Ground, solve_definite
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import (
+    Contact,
     Controller,
+    Equations,
+    Ground,
     QuantisedState,
     advance,
     controller_torque,
     explicit_quantum,
     implicit_quantum,
+    solve_definite,
 )
 
 Scheme = Literal["implicit", "explicit"]
