@@ -157,11 +157,7 @@ def test_a_contradiction_to_a_shipped_certificate_is_named(
 
 def test_paths_refute_a_false_bound_without_a_better_point(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = toy(two_valleys, limit=-9.0)
-<<<<<<< HEAD
-    monkeypatch.setattr(check, "load_certified_problem", lambda file: problem)
-=======
     monkeypatch.setattr(certificates, "load_certified_problem", lambda file: problem)
->>>>>>> 89583770 (Certificates and their checks in one file, rows over time and their search in another)
     honest = make_certificate_file(problem, certify(problem, np.array([-1.0124, 0.0]), tolerance=1e-3))
     assert check_certificate(honest, paths=20, starts=0).paths == 20
     valley = np.array([0.987, 0.0])  # the worse one
