@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import casadi as ca
 
 from nlp_gait.backends.kernel.compiler import find_compiler
-from nlp_gait.backends.kernel.library_cache import load_shared_library
+from nlp_gait.backends.kernel.library_cache import load_library
 
 FLAGS = ("-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-fno-math-errno", "-ffp-contract=off", "-w")
 
@@ -26,7 +26,7 @@ def compiled_functions(functions: Sequence[ca.Function], flags: Sequence[str] = 
     compiler = find_compiler()
 
     def library(function: ca.Function) -> str:
-        return str(load_shared_library(_source(function), compiler, flags, (function.name(),))[1])
+        return str(load_library(_source(function), compiler, flags, (function.name(),))[1])
 
     with ThreadPoolExecutor() as pool:
         libraries = list(pool.map(library, functions))

@@ -14,7 +14,7 @@ from pathlib import Path
 import casadi as ca
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags
-from nlp_gait.backends.kernel.library_cache import load_shared_library
+from nlp_gait.backends.kernel.library_cache import load_library
 
 MEASURED = ("multiply", "divide", "sqrt", "sin", "cos", "acos", "atan2")
 KINDS = {
@@ -50,7 +50,7 @@ def operation_times(lanes: int) -> dict[str, float]:
     body = Path(__file__).with_name("operations.cpp").read_text(encoding="utf-8")
     names = tuple(f"time_{name}" for name in MEASURED)
     flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}")
-    library, _ = load_shared_library(f"#include <time.h>\n{header}\n{body}", find_compiler(), flags, names)
+    library, _ = load_library(f"#include <time.h>\n{header}\n{body}", find_compiler(), flags, names)
     times = {}
     for name in MEASURED:
         function = getattr(library, f"time_{name}")

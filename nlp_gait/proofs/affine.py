@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.library_cache import load_shared_library
+from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.symbolic.tape import read_tape
@@ -103,7 +103,7 @@ def load_native(sources: Sequence[str], functions: Mapping[str, tuple[Any, Seque
     """
     text = "\n".join((NATIVE / name).read_text(encoding="utf-8") for name in sources)
     names = [f"nlp_gait_{name}" for name in functions]
-    library, _ = load_shared_library(text, find_compiler(), (*BASE_FLAGS, *lane_flags(native_lanes()), *flags), names)
+    library, _ = load_library(text, find_compiler(), (*BASE_FLAGS, *lane_flags(native_lanes()), *flags), names)
     for name, (result, arguments) in zip(names, functions.values(), strict=True):
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments

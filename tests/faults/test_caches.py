@@ -62,4 +62,4 @@ def test_a_load_makes_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.Mo
         warnings.simplefilter("error")
         source = 'extern "C" int one(void) { return 1; }\n'
         for _ in range(2):
-            assert library_cache.load_shared_library(source, find_compiler(), ("-O0",), ("one",))[0].one() == 1
+            assert library_cache.load_library(source, find_compiler(), ("-O0",), ("one",))[0].one() == 1

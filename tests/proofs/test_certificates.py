@@ -21,9 +21,11 @@ from nlp_gait.proofs.certificate import (
     CERTIFICATES,
     check_certificate,
     load_certificates,
+    load_certified_problem,
     make_certificate_file,
     read_certificate,
 )
+from nlp_gait.proofs.checkpoint import hash_code
 from tests.backends.toys import toy
 from tests.compare.questions.test_certainty import two_valleys
 from tests.proofs.soundness import best_x, count_lost_boxes, feasible_gaits, load, narrow_around, narrow_bounds
@@ -190,3 +192,9 @@ def test_a_certificate_of_another_problem_is_refused() -> None:
     part = {**make_certificate_file(problem, honest).problem, "sha256": "0" * 64}
     with pytest.raises(InputError, match="has changed since the certificate"):
         check_certificate(replace(make_certificate_file(problem, honest), problem=part))
+
+
+def test_shipped_certificates_are_of_this_code() -> None:
+    """Also a changed name in a file of ``checkpoint.CODE`` makes a proof one of other code: prove all again, or keep the file."""
+    file = load_certificates()["walk12-lambda-1"]
+    assert file.code_sha256 == hash_code(make_bounds(load_certified_problem(file)))

@@ -11,7 +11,7 @@ import pytest
 
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import find_compiler
-from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_shared_library
+from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_library
 from tests.faults.processes import in_own_mounts
 
 SOURCE = 'extern "C" int answer(void) { return 42; }\n'
@@ -28,7 +28,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def built() -> Path:
-    library, path = load_shared_library(SOURCE, find_compiler(), ("-O0",), ("answer",))
+    library, path = load_library(SOURCE, find_compiler(), ("-O0",), ("answer",))
     assert library.answer() == 42
     return path
 

@@ -20,7 +20,7 @@ from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
 from nlp_gait.backends.derivatives.plan import CODES, EXPRESSIONS, FIRST, SECOND, VALUES, format_number, write_function
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes, read_native_source
-from nlp_gait.backends.kernel.library_cache import load_shared_library
+from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array
 
@@ -152,7 +152,7 @@ class CompiledNlp:
         names = [*NLP_VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
         graph = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]]).serialize()
         # The library is found without generating its source, by what the source depends on.
-        loaded, _ = load_shared_library(
+        loaded, _ = load_library(
             "\0".join([graph, version("casadi"), _hash_generator(), str(second)]),
             find_compiler(),
             (*FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"),

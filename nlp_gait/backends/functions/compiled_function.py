@@ -16,7 +16,7 @@ import numpy as np
 from nlp_gait.backends.kernel.compiled import CHECK_POINTS, RowThreads, check_agreement, check_parallelism, get_address
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, read_native_source
 from nlp_gait.backends.kernel.kernel_source import generate_lane_code
-from nlp_gait.backends.kernel.library_cache import load_shared_library
+from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import InputError, format_value, unknown
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.locking import lock_casadi
@@ -140,7 +140,7 @@ class CompiledFunction:
         """Use ``compile_function`` instead; ``kernel`` is the function that is compiled."""
         compiler = find_compiler()
         flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}")
-        library, self.library = load_shared_library(write_rows_source(kernel), compiler, flags, SYMBOLS)
+        library, self.library = load_library(write_rows_source(kernel), compiler, flags, SYMBOLS)
         self.function = function  #: CasADi's
         self.argument_names = tuple(function.name_in())
         self.result_names = tuple(function.name_out())

@@ -22,7 +22,7 @@ import numpy as np
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, Compiler, find_compiler, lane_flags, native_lanes
 from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, build_kernel, write_kernel_source
-from nlp_gait.backends.kernel.library_cache import load_shared_library
+from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -43,7 +43,7 @@ class NativeKernel:
         With ``scalar_functions``, sines and the like take one lane after the other, so that no bit depends on the lane count.
         """
         flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *SCALAR_FUNCTIONS[: int(scalar_functions)])
-        loaded, self.library = load_shared_library(write_kernel_source(kernel.function), compiler, flags, SYMBOLS)
+        loaded, self.library = load_library(write_kernel_source(kernel.function), compiler, flags, SYMBOLS)
         self._evaluate = loaded.nlp_gait_evaluate
         self._evaluate.argtypes = [_POINTER, _INTEGER, *[_POINTER] * 8]
         loaded.nlp_gait_workspace_bytes.restype = _INTEGER

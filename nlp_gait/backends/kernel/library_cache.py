@@ -32,7 +32,7 @@ UNKNOWN_OWNER = 65534  # owner of the system's files in a container that does no
 SUFFIX = ".dylib" if sys.platform == "darwin" else ".so"
 
 
-def load_shared_library(
+def load_library(
     source: str,
     compiler: Compiler,
     flags: Sequence[str],

@@ -158,7 +158,7 @@ def test_parameters_change_without_a_new_library(monkeypatch: pytest.MonkeyPatch
     before = read_objective("nao-ssp")
     X = candidates(problem, 40)
     f, violation = before(X)
-    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.load_shared_library", None)  # would raise if it were called
+    monkeypatch.setattr("nlp_gait.backends.kernel.compiled.load_library", None)  # would raise if it were called
     strict = compile_objective(problem.with_values(torque_change_limit_Nm=0.1, heat_loss_W_per_Nm2=0.05), threads=1)
     strict_f, strict_violation = strict(X)
     assert (strict_f > f).all() and (strict_violation > violation).all()

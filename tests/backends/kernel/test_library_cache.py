@@ -14,7 +14,7 @@ import pytest
 from nlp_gait.backends.kernel import compiler as compiler_module
 from nlp_gait.backends.kernel import library_cache
 from nlp_gait.backends.kernel.compiler import Compiler, find_compiler
-from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_shared_library
+from nlp_gait.backends.kernel.library_cache import find_cache_folder, load_library
 from nlp_gait.errors import CompilerError
 
 SOURCE = 'extern "C" int answer(void) { return 42; }\n'
@@ -38,7 +38,7 @@ def compiler() -> Compiler:
 
 
 def answer(compiler: Compiler) -> tuple[int, Path]:
-    library, path = load_shared_library(SOURCE, compiler, FLAGS, ("answer",))
+    library, path = load_library(SOURCE, compiler, FLAGS, ("answer",))
     return library.answer(), path
 
 
@@ -72,7 +72,7 @@ def test_a_broken_library_is_built_again(cache: Path, compiler: Compiler, damage
 
 def test_a_library_without_the_function_is_not_trusted(cache: Path, compiler: Compiler) -> None:
     with pytest.raises(CompilerError, match="cannot be loaded"):
-        load_shared_library(SOURCE, compiler, FLAGS, ("question",))
+        load_library(SOURCE, compiler, FLAGS, ("question",))
 
 
 def test_a_link_in_place_of_a_library_is_not_followed(cache: Path, compiler: Compiler, tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_a_link_in_place_of_a_library_is_not_followed(cache: Path, compiler: Com
 
 def test_source_and_flags_make_the_key(cache: Path, compiler: Compiler) -> None:
     paths = {
-        load_shared_library(source, compiler, flags, ())[1]
+        load_library(source, compiler, flags, ())[1]
         for source in (SOURCE, SOURCE + "\n")
         for flags in (FLAGS, ("-O1",))
     }
@@ -133,9 +133,9 @@ def test_a_full_or_read_only_cache_costs_one_line(
 
 def test_two_processes_at_once_end_with_good_libraries(cache: Path) -> None:
     code = (
-        "from nlp_gait.backends.kernel.library_cache import load_shared_library\n"
+        "from nlp_gait.backends.kernel.library_cache import load_library\n"
         "from nlp_gait.backends.kernel.compiler import find_compiler\n"
-        f"library, _ = load_shared_library({SOURCE!r}, find_compiler(), {FLAGS!r}, ('answer',))\n"
+        f"library, _ = load_library({SOURCE!r}, find_compiler(), {FLAGS!r}, ('answer',))\n"
         "print(library.answer())"
     )
     root = Path(__file__).parents[3]
