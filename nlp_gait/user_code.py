@@ -19,10 +19,11 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from functools import cache, lru_cache, partial
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Literal, NamedTuple, TypeVar
 
 from nlp_gait.errors import GaitError, UserCodeError, unknown
@@ -293,12 +294,23 @@ def call_user_code(text: str, path: str, call: Callable[[], T]) -> T:
         raise UserCodeError(f"{text!r} fails{where}: {what}") from error
 
 
+class _ContentLoader(SourceFileLoader):
+    """Loader of the bytes that were hashed; a compiled file in the cache may belong to an older text."""
+
+    content = b""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.content, self.path)
+
+
 def _run_file(path: str, content: bytes) -> ModuleType:
     digest = hashlib.sha256(path.encode() + b"\0" + content).hexdigest()[:16]
     name = f"nlp_gait_own_{digest}_{Path(path).stem}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
+    loader = _ContentLoader(name, path)
+    loader.content = content
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     assert spec is not None  # for the type checker
     module = importlib.util.module_from_spec(spec)
     folder = str(Path(path).parent)
@@ -306,8 +318,7 @@ def _run_file(path: str, content: bytes) -> ModuleType:
         sys.path.append(folder)  # last, so that no file in it hides a package
     sys.modules[name] = module  # before it runs: its data classes look there
     try:
-        # The bytes that were hashed: a compiled file in the cache may belong to an older text.
-        exec(compile(content, path, "exec", dont_inherit=True), vars(module))
+        loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise
