@@ -21,8 +21,7 @@ from compare.papers.walk12.walk12_paper import TABLE_3
 from compare.questions.certainty import MOST_VARIABLES
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaitbench.definitions import get_definition, names
-from nlp_gait.gaitbench.facts import load_facts
+from nlp_gait.gaitbench.facts import get_definition, load_facts, names
 from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, certify
 from nlp_gait.proofs.certificate import load_certificates, make_certificate_file

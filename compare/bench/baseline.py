@@ -25,7 +25,7 @@ from nlp_gait.backends.identity import HASH
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_file
-from nlp_gait.gaitbench.definitions import Subset
+from nlp_gait.gaitbench.facts import Subset
 from nlp_gait.gaitbench.generated import is_generated, list_test_seeds, make_id
 
 # Rules: the same runs, budget and seeds for all solvers.

@@ -13,7 +13,7 @@ from compare.study.description import split_sections
 from nlp_gait.decoding import decode
 from nlp_gait.errors import unknown
 from nlp_gait.formulation.registry import find_maker
-from nlp_gait.gaitbench.definitions import BY_ID
+from nlp_gait.gaitbench.facts import BY_ID
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import is_user_code
 

@@ -20,8 +20,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, load, problem_names
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.solution import ConstraintValue
-from nlp_gait.gaitbench.definitions import DEFINITIONS
-from nlp_gait.gaitbench.facts import load_facts
+from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Exact
 

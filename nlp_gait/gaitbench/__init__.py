@@ -9,8 +9,7 @@ problem = gaitbench.load_front("ssp-power-time")  # two objectives; gaitbench.fr
 problem = gaitbench.generate("ssp", seed=3)  # the same as load("gb2:ssp:3"); gaitbench.families() has the others
 """
 
-from nlp_gait.gaitbench.definitions import Definition, names
-from nlp_gait.gaitbench.facts import Evidence, Features
+from nlp_gait.gaitbench.facts import Definition, Evidence, Features, names
 from nlp_gait.gaitbench.fronts import FrontInstance, FrontQuality, fronts, load_front
 from nlp_gait.gaitbench.generated import families, list_test_seeds
 from nlp_gait.gaitbench.instance import Instance, generate, load

@@ -1,10 +1,10 @@
-"""The best known point of an instance, strictly feasible, by IPOPT from random starts, and values that identify it."""
+"""The best known point of an ``Instance``, strictly feasible, by IPOPT from random starts, and values that identify it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from nlp_gait.decoding import read_dataclass
 from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
 from nlp_gait.files import replace_nan, write_json
-from nlp_gait.formulation import Array, GaitProblem
+from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 
@@ -26,26 +26,10 @@ SLACK = 1e-10
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
-class Judged(Protocol):
-    """What is needed of an instance here."""
-
-    id: str
-    gait_problem: GaitProblem
-    lower: Array
-    upper: Array
-
-    def make_one_sided(self, g: Array) -> Array:
-        """Return the rows G (P, m)."""
-
-    def jacobian(self, x: Array) -> Array:
-        """Return the derivatives (m, n) of the rows."""
-
-
-def find_facts(instance: Judged) -> Facts:
+def find_facts(instance: Any) -> Facts:
     """Return the facts about an instance: shipped ones, or those of this call or of an earlier one on this machine.
 
-    Raises:
-        InputError: no start of IPOPT converged, so that the instance has no best known point.
+    Raises InputError if no start of IPOPT converged, so that the instance has no best known point.
     """
     if (shipped := find_shipped_facts(instance.id)) is not None:
         return shipped
@@ -60,7 +44,7 @@ def find_facts(instance: Judged) -> Facts:
     return facts
 
 
-def compute_facts(instance: Judged, starts: int) -> Facts:
+def compute_facts(instance: Any, starts: int) -> Facts:
     """Return the best point of IPOPT from random starts and its evidence; raises InputError if no start converges."""
     problem = instance.gait_problem
     for seed in range(MOST_ROUNDS):
@@ -92,14 +76,14 @@ def count_distinct(costs: Sequence[float]) -> int:
     return 1 + sum(b - a > 1e-4 * abs(a) for a, b in zip(order, order[1:], strict=False))
 
 
-def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
+def evaluate_interpreted(instance: Any, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     kernel = build_kernel(instance.gait_problem)
     cost, g = kernel.function(x, instance.gait_problem.p)
     return float(cost), instance.make_one_sided(np.array(g).reshape(1, -1))[0]
 
 
-def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
+def make_strictly_feasible(instance: Any, x: Array) -> Array | None:
     """Return the nearest point with a slack in every row, by linear programs with the smallest possible step, or None.
 
     IPOPT may leave a row violated by about 1e-8; the best known point has a violation of exactly zero. The programs ignore the
@@ -107,8 +91,7 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     """
     from scipy.optimize import linprog
 
-    width = instance.upper - instance.lower
-    first = np.clip(x, instance.lower, instance.upper)
+    width, first = instance.upper - instance.lower, np.clip(x, instance.lower, instance.upper)
     n, found = len(width), list[tuple[float, Array]]()
     for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
         x = first
@@ -134,7 +117,7 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
+def make_probes(instance: Any, best: Array) -> tuple[Probe, ...]:
     """Return values at random points, between them and the best one, and at the best one."""
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))

@@ -1,15 +1,63 @@
-"""Facts about each instance: the best known point, its evidence, and values that must never change."""
+"""GaitBench 1: the definition of each instance, its best known point with its evidence, and values that must never change.
+
+A definition never changes; an instance that has to change gets a new id.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from typing import Any, Literal
 
 from nlp_gait.decoding import decode
+from nlp_gait.errors import unknown
+
+Difficulty = Literal["easy", "medium", "hard"]
+Subset = Literal["small", "full"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Definition:
+    """What an instance is made from."""
+
+    id: str  #: its name, which never changes
+    what: str  #: one line
+    problem: str  #: name, as in ``nlp-gait list``
+    options: Mapping[str, str | int | float | bool] = field(default_factory=dict)  #: of the problem
+    values: Mapping[str, float] = field(default_factory=dict)  #: parameters that differ from their defaults
+    held: Mapping[str, float] = field(default_factory=dict)  #: variables that are constants here
+    #: graded by the results of the shipped baseline: variables, share of feasible points, local optima
+    difficulty: Difficulty
+    small: bool = False  #: whether it also belongs to the subset ``small``
+    source: str  #: paper that the problem comes from
+
+
+def read_data(file: str) -> Any:
+    """Return the content of one of the package's JSON files."""
+    return json.loads(files("nlp_gait.gaitbench").joinpath(file).read_text(encoding="utf-8"))
+
+
+DEFINITIONS = tuple(decode(Definition, entry) for entry in read_data("definitions.json"))
+BY_ID = {definition.id: definition for definition in DEFINITIONS}
+
+
+def names(subset: Subset = "full") -> tuple[str, ...]:
+    """Return the ids of all instances or of the ``"small"`` subset (ten, minutes), from easy to hard; raises UnknownNameError."""
+    if subset not in ("small", "full"):
+        raise unknown("subset of GaitBench", str(subset), ("small", "full"))
+    return tuple(definition.id for definition in DEFINITIONS if definition.small or subset == "full")
+
+
+def get_definition(id: str) -> Definition:
+    """Return the definition of an instance; raises UnknownNameError."""
+    if id not in BY_ID:
+        raise unknown("instance of GaitBench", id, BY_ID)
+    return BY_ID[id]
+
 
 # A proof with at most this relative gap has six digits: 1e-6, and what rounding adds.
 SIX_DIGITS = 1.01e-6
@@ -85,8 +133,7 @@ class Features:
 @cache
 def load_facts(file: str = "facts.json") -> Mapping[str, Facts]:
     """Return the facts about all instances of GaitBench 1 by id, or those of another file."""
-    raw = json.loads(files("nlp_gait.gaitbench").joinpath(file).read_text(encoding="utf-8"))
-    return {id: decode(Facts, entry, id) for id, entry in raw.items()}
+    return {id: decode(Facts, entry, id) for id, entry in read_data(file).items()}
 
 
 def find_shipped_facts(id: str) -> Facts | None:

@@ -6,12 +6,10 @@ The front's points were found by IPOPT, each as the best value of the first obje
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
-from importlib.resources import files
 from typing import Any, Literal
 
 import numpy as np
@@ -22,6 +20,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import check_name, unknown
 from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Parameter, Point, load
 from nlp_gait.gaitbench.adapters import find_adapter
+from nlp_gait.gaitbench.facts import read_data
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 SECOND, LIMIT, UNLIMITED = "second_objective", "second_limit", 1e12
@@ -155,16 +154,13 @@ def compute_hypervolume(F: Array, reference: float) -> float:
 
 @cache
 def _load_definitions() -> Mapping[str, FrontDefinition]:
-    raw = json.loads(files("nlp_gait.gaitbench").joinpath("fronts.json").read_text(encoding="utf-8"))
-    return {entry["id"]: decode(FrontDefinition, entry, entry["id"]) for entry in raw}
+    return {entry["id"]: decode(FrontDefinition, entry, entry["id"]) for entry in read_data("fronts.json")}
 
 
 @cache
 def load_points() -> Mapping[str, list[list[float]]]:
     """Return the points (k, n) of the true fronts by id."""
-    points: dict[str, list[list[float]]] = json.loads(
-        files("nlp_gait.gaitbench").joinpath("front_points.json").read_text(encoding="utf-8")
-    )
+    points: Mapping[str, list[list[float]]] = read_data("front_points.json")
     return points
 
 

@@ -11,21 +11,19 @@ gets a new name.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_count, unknown
 from nlp_gait.formulation import GaitProblem, load
-from nlp_gait.gaitbench.definitions import BY_ID, Definition, get_definition
+from nlp_gait.gaitbench.facts import BY_ID, Definition, get_definition, read_data
 from nlp_gait.gaitbench.transform import AffineMap, rotate_pairs
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.perturbation import perturbed_name
@@ -93,8 +91,7 @@ class Draw:
 @cache
 def load_families() -> Mapping[str, Family]:
     """Return the families by name."""
-    raw = json.loads(files("nlp_gait.gaitbench").joinpath("families.json").read_text(encoding="utf-8"))
-    return {entry["name"]: decode(Family, entry, entry["name"]) for entry in raw}
+    return {entry["name"]: decode(Family, entry, entry["name"]) for entry in read_data("families.json")}
 
 
 def families() -> tuple[str, ...]:

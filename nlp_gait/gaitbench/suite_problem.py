@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 
 import casadi as ca
-import numpy as np
 
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Constraint,
-    GaitProblem,
-    NumericPoint,
-    Parameter,
-    Point,
-    Signals,
-    load,
-    maker,
-)
-from nlp_gait.gaitbench.definitions import Definition
+from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Point, load, maker
+from nlp_gait.gaitbench.facts import Definition
 from nlp_gait.gaitbench.generated import define, draw_box, is_generated
-from nlp_gait.gaitbench.transform import change_variables
+from nlp_gait.gaitbench.transform import change_variables, hold_constant
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # No search satisfies an equation to the last bit: it becomes a band of this share of its row's scale to either side.
@@ -53,59 +40,9 @@ def _convert(base: GaitProblem, definition: Definition) -> GaitProblem:
         name="gaitbench", title=f"GaitBench: {definition.what}", change=_widen_equations
     )
     problem = replace(banded, hints=replace(banded.hints, searchable=True))
-    refine = base.refine
-    if refine is None:
+    if (refine := base.refine) is None:
         return problem
     return replace(problem, refine=lambda factor: _convert(refine(factor), definition))
-
-
-def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
-    """Return the same problem with some variables as parameters, which have these values.
-
-    Raises:
-        UnknownNameError: no such variable.
-        InputError: a value outside its bounds.
-    """
-    if not values:
-        return problem
-    problem.fix(**values)  # raises
-    names = problem.names
-    free = [i for i, name in enumerate(names) if name not in values]
-    constants = tuple(
-        Parameter(
-            name=v.name,
-            unit=v.unit,
-            default=values[v.name],
-            description=v.description,
-            minimum=v.lower,
-            maximum=v.upper,
-        )
-        for v in problem.variables
-        if v.name in values
-    )
-    bounds = {f"{name}.{end}": value for name, value in values.items() for end in ("lower", "upper")}
-    motion, start = problem.display.motion, problem.hints.start
-
-    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return problem.assemble(point.select(names), ops)
-
-    def signals(at: NumericPoint) -> Signals:
-        assert motion is not None  # for the type checker
-        return motion(at.select(names))
-
-    def start_point(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        assert start is not None
-        return start({**parameters, **bounds}, rng)[free]
-
-    return replace(
-        problem,
-        variables=tuple(problem.variables[i] for i in free),
-        own_parameters=(*problem.own_parameters, *constants),
-        assemble=assemble,
-        display=replace(problem.display, motion=None if motion is None else signals),
-        hints=replace(problem.hints, start=None if start is None else start_point),
-        values={name: value for name, value in problem.values.items() if name.rpartition(".")[0] not in values},
-    )
 
 
 def _widen_equations(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:

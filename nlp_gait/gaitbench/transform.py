@@ -1,20 +1,18 @@
-"""The same problem in other variables: x = A z + b, with the bounds of x as constraints.
-
-Objective, feasible set and optimum stay what they are; only where they are in the box of z changes.
-"""
+"""The same problem in other variables: with some held constant, or x = A z + b with the bounds of x as constraints."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from casadi import DM
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, NumericPoint, Point, Signals, Variable
+from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Point, Start, Variable, parameters
 from nlp_gait.formulation.assembly import Expression, PointOf
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -48,8 +46,54 @@ def rotate_pairs(order: Sequence[int], angles: Sequence[float]) -> Array:
     return matrix
 
 
+def replace_variables(
+    problem: GaitProblem, variables: Sequence[Variable], see: Callable[[Any], Any], start: Start | None, **changes: Any
+) -> GaitProblem:
+    """Return a problem with other variables, which reads the points that ``see`` makes of theirs; other fields may change."""
+    motion = problem.display.motion
+
+    def assemble(point: Point, ops: Nonsmooth) -> Assembly:
+        return problem.assemble(see(point), ops)
+
+    display = replace(problem.display, motion=None if motion is None else lambda at: motion(see(at)))
+    hints = replace(problem.hints, start=start)
+    own = {"variables": tuple(variables), "assemble": assemble, "display": display, "hints": hints}
+    return replace(problem, **{**own, **changes})
+
+
+def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
+    """Return the same problem with some variables as parameters, which have these values.
+
+    Raises:
+        UnknownNameError: no such variable.
+        InputError: a value outside its bounds.
+    """
+    if not values:
+        return problem
+    problem.fix(**values)  # raises
+    names, start = problem.names, problem.hints.start
+    held = [v for v in problem.variables if v.name in values]
+    constants = parameters(*((v.name, v.unit, values[v.name], v.description, v.lower, v.upper) for v in held))
+    bounds = {f"{name}.{end}": value for name, value in values.items() for end in ("lower", "upper")}
+
+    def start_point(given: Mapping[str, float], rng: np.random.Generator) -> Array:
+        assert start is not None  # for the type checker
+        return start({**given, **bounds}, rng)[[i for i, name in enumerate(names) if name not in values]]
+
+    return replace_variables(
+        problem,
+        [v for v in problem.variables if v.name not in values],
+        lambda point: point.select(names),
+        None if start is None else start_point,
+        own_parameters=(*problem.own_parameters, *constants),
+        values={name: value for name, value in problem.values.items() if name.rpartition(".")[0] not in values},
+    )
+
+
 def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[str] = ()) -> GaitProblem:
     """Return the problem in the variables z of an affine map, whose current bounds of x are rows.
+
+    Objective, feasible set and optimum stay what they are; only where they are in the box of z changes.
 
     Args:
         problem: in x.
@@ -66,22 +110,20 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
     bounds = {
         f"{v}.{end}": float(at) for end in ("lower", "upper") for v, at in zip(old, getattr(problem, end), strict=True)
     }
-    variables = tuple(
+    rows = zip(names or [f"z{k + 1}" for k in range(n)], affine.lower, affine.upper, affine.matrix.T, strict=True)
+    variables = [
         Variable(name=name, unit="1", lower=float(a), upper=float(b), description=describe(problem, row))
-        for name, a, b, row in zip(
-            names or [f"z{k + 1}" for k in range(n)], affine.lower, affine.upper, affine.matrix.T, strict=True
-        )
-    )
-    motion, start, base = problem.display.motion, problem.hints.start, problem.with_values()
+        for name, a, b, row in rows
+    ]
+    start, base, matrix = problem.hints.start, problem.with_values(), ca.sparsify(DM(affine.matrix))
 
-    def map_point(point: PointOf[Expression], matrix: DM, offset: DM) -> PointOf[Expression]:
+    def map_point(point: PointOf[Expression]) -> PointOf[Expression]:
         parameters = {name: place for name, place in point.positions.items() if place[0] == "p"}
-        return PointOf(
-            x=matrix @ point.x + offset, p=point.p, positions=parameters | {v: ("x", i) for i, v in enumerate(old)}
-        )
+        x, positions = matrix @ point.x + DM(affine.offset), parameters | {v: ("x", i) for i, v in enumerate(old)}
+        return PointOf(x=x, p=point.p, positions=positions)
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        inner = map_point(point, ca.sparsify(DM(affine.matrix)), DM(affine.offset))
+        inner = map_point(point)
         assembly = problem.assemble(inner, ops)
         within = Constraint(
             name=RANGE,
@@ -95,10 +137,6 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
         )
         return replace(assembly, constraints=(*assembly.constraints, within))
 
-    def signals(at: NumericPoint) -> Signals:
-        assert motion is not None  # for the type checker
-        return motion(map_point(at, DM(affine.matrix), DM(affine.offset)))
-
     def start_point(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         values = {**parameters, **bounds}
         return affine.backward(draw_uniform(old, values, rng) if start is None else start(values, rng))
@@ -108,22 +146,20 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
         assert finer is not None  # for the type checker
         return change_variables(finer, affine, names)
 
-    return replace(
+    return replace_variables(
         problem,
-        variables=variables,
+        variables,
+        map_point,
+        start_point,
         assemble=assemble,
         refine=None if problem.refine is None else refine,
         rows_over_time=(),
         power_form=None,
-        display=replace(problem.display, motion=None if motion is None else signals),
-        hints=replace(problem.hints, start=start_point),
         values={name: value for name, value in problem.values.items() if name not in bounds},
     )
 
 
 def describe(problem: GaitProblem, column: Array) -> str:
     """Return which variables of the problem a new one changes, by how much of their ranges for a unit of it."""
-    parts = [
-        f"{share:+.2f} {v.name}" for v, share in zip(problem.variables, column / problem.scale, strict=True) if share
-    ]
-    return f"moves {', '.join(parts)} (shares of their ranges)"
+    shares = zip(problem.names, column / problem.scale, strict=True)
+    return f"moves {', '.join(f'{share:+.2f} {name}' for name, share in shares if share)} (shares of their ranges)"

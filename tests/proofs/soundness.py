@@ -10,8 +10,7 @@ import numpy as np
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaitbench.definitions import get_definition
-from nlp_gait.gaitbench.facts import load_facts
+from nlp_gait.gaitbench.facts import get_definition, load_facts
 from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.guarantee import guarantee
 

@@ -18,8 +18,8 @@ ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
     "pymoo": ("pymoo:PymooProblem", ("pymoo",)),
     "optuna": ("optuna:OptunaProblem", ("optuna", "optunahub")),
     "nevergrad": ("plain:to_nevergrad", ("nevergrad",)),
-    "pymoo-front": ("two_objectives:to_pymoo", ("pymoo",)),
-    "pygmo-front": ("two_objectives:to_pygmo", ("pygmo",)),
+    "pymoo-front": ("pymoo:PymooProblem", ("pymoo",)),
+    "pygmo-front": ("plain:to_pygmo_front", ("pygmo",)),
 }
 
 

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from compare.study.citations import cite_problems, find_citations
-from nlp_gait.gaitbench.definitions import DEFINITIONS
+from nlp_gait.gaitbench.facts import DEFINITIONS
 from nlp_gait.providers import PROBLEMS
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
