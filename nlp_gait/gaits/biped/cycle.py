@@ -12,23 +12,8 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX
 
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Constraint,
-    Display,
-    GaitProblem,
-    Grid,
-    Objective,
-    Parameter,
-    Point,
-    RowsOverTime,
-    Signals,
-    SolverHints,
-    Start,
-    Variable,
-)
-from nlp_gait.formulation.assembly import parameters
+from nlp_gait.formulation import Array, Assembly, Constraint, Display, GaitProblem, Grid, Signals, SolverHints, Start
+from nlp_gait.formulation.assembly import Objective, Parameter, Point, RowsOverTime, Variable, parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables

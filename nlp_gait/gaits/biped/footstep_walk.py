@@ -16,18 +16,8 @@ import numpy as np
 from casadi import MX, SX, fmax
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import (
-    Array,
-    GaitProblem,
-    Grid,
-    InstantPoint,
-    NumericPoint,
-    Parameter,
-    Point,
-    Signals,
-    Variable,
-)
-from nlp_gait.formulation.assembly import parameters
+from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point, Signals
+from nlp_gait.formulation.assembly import Variable, parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
 from nlp_gait.gaits.biped.cycle_motion import between, make_cycle_variables, make_state_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings

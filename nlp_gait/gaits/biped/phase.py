@@ -11,19 +11,8 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Grid,
-    InstantPoint,
-    NumericPoint,
-    Parameter,
-    Point,
-    RowsOverTime,
-    Signals,
-    Variable,
-    vector_columns,
-)
+from nlp_gait.formulation import Array, Assembly, Grid, InstantPoint, NumericPoint, Parameter, Signals, vector_columns
+from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import Goal

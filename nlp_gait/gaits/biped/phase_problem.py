@@ -12,19 +12,8 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Display,
-    GaitProblem,
-    NumericPoint,
-    Point,
-    SimulationModel,
-    SolverHints,
-    Start,
-    Variable,
-)
-from nlp_gait.formulation.display import Tread
+from nlp_gait.formulation import Array, Assembly, GaitProblem, NumericPoint, Point, SolverHints, Start, Variable
+from nlp_gait.formulation.display import Display, SimulationModel, Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal

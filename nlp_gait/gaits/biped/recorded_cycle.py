@@ -11,20 +11,8 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import (
-    Array,
-    Constraint,
-    GaitProblem,
-    Grid,
-    InstantPoint,
-    NumericPoint,
-    Parameter,
-    Point,
-    Result,
-    RowsOverTime,
-    Signals,
-    Variable,
-)
+from nlp_gait.formulation import Array, Constraint, GaitProblem, Grid, InstantPoint, Parameter, Point, Result, Signals
+from nlp_gait.formulation.assembly import NumericPoint, RowsOverTime, Variable
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem

@@ -22,17 +22,8 @@ from dataclasses import dataclass, replace
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import (
-    Assembly,
-    Display,
-    GaitProblem,
-    Grid,
-    InstantPoint,
-    Objective,
-    Parameter,
-    Point,
-    Variable,
-)
+from nlp_gait.formulation import Assembly, Display, GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
+from nlp_gait.formulation.assembly import Variable
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import (

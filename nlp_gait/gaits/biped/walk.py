@@ -17,22 +17,8 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import check_count
-from nlp_gait.formulation import (
-    Assembly,
-    Constraint,
-    Display,
-    GaitProblem,
-    Grid,
-    InstantPoint,
-    NumericPoint,
-    Parameter,
-    Point,
-    RowsOverTime,
-    Signals,
-    SolverHints,
-    Variable,
-)
-from nlp_gait.formulation.assembly import parameters
+from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Point, Signals, SolverHints, Variable
+from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, RowsOverTime, parameters
 from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
 from nlp_gait.gaits.biped.cycle import make_cycle_margins

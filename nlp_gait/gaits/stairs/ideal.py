@@ -12,18 +12,8 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import (
-    Array,
-    Display,
-    GaitProblem,
-    Grid,
-    NumericPoint,
-    Objective,
-    Signals,
-    SolverHints,
-    maker,
-    parameters,
-)
+from nlp_gait.formulation import Array, Display, GaitProblem, Grid, NumericPoint, Objective, Signals, SolverHints, maker
+from nlp_gait.formulation.assembly import parameters
 from nlp_gait.formulation.blocks import Block, Layout
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simulation_model, skeleton

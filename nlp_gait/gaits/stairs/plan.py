@@ -12,23 +12,8 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Constraint,
-    Display,
-    GaitProblem,
-    Grid,
-    NumericPoint,
-    Objective,
-    Point,
-    RowsOverTime,
-    Signals,
-    SolverHints,
-    Variable,
-    maker,
-    parameters,
-)
+from nlp_gait.formulation import Array, Assembly, Constraint, Display, GaitProblem, Grid, Signals, SolverHints, maker
+from nlp_gait.formulation.assembly import NumericPoint, Objective, Point, RowsOverTime, Variable, parameters
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import (
     StepMotion,

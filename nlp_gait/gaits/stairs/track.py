@@ -11,21 +11,8 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import (
-    Array,
-    Assembly,
-    Columns,
-    Display,
-    GaitProblem,
-    NumericPoint,
-    Objective,
-    Point,
-    Signals,
-    SolverHints,
-    Variable,
-    maker,
-    parameters,
-)
+from nlp_gait.formulation import Array, Assembly, Columns, Display, GaitProblem, Objective, Signals, SolverHints, maker
+from nlp_gait.formulation.assembly import NumericPoint, Point, Variable, parameters
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.closed_loop import (
     ANGLES,

@@ -11,20 +11,8 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import (
-    Assembly,
-    Constraint,
-    Display,
-    GaitProblem,
-    Grid,
-    Objective,
-    Point,
-    RowsOverTime,
-    SolverHints,
-    Variable,
-    maker,
-    parameters,
-)
+from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Objective, Point, SolverHints, maker
+from nlp_gait.formulation.assembly import RowsOverTime, Variable, parameters
 from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_display import make_simulation_model, make_skeleton
 from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_knee_cosines, compute_legs, compute_zmp
