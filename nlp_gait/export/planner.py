@@ -7,19 +7,9 @@ from collections.abc import Callable, Mapping
 import casadi as ca
 from casadi import SX
 
+from nlp_gait.backends.derivatives import plan as derivatives
 from nlp_gait.backends.derivatives.assembly import NlpPlan
 from nlp_gait.backends.derivatives.compiled import write_array
-from nlp_gait.backends.derivatives.plan import (
-    CALL,
-    FIRST,
-    PRODUCTS,
-    RUNS,
-    SECOND,
-    TAPE,
-    VALUES,
-    DerivativePlan,
-    format_number,
-)
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import NlpModel, build_nlp
 from nlp_gait.errors import InputError
@@ -82,10 +72,10 @@ def describe_planner(
         writer.add(function)
     first = len(model.row_names)
     constants = {
-        "tie_upper": ("double", map(format_number, model.tie_upper.tolist())),
+        "tie_upper": ("double", map(derivatives.format_number, model.tie_upper.tolist())),
         "tie_owner": ("int", model.tie_owner.tolist()),
-        "lift_sense": ("double", map(format_number, model.lift_sense.tolist())),
-        "row_scale": ("double", map(format_number, build_exact_model(problem).row_scales[:first].tolist())),
+        "lift_sense": ("double", map(derivatives.format_number, model.lift_sense.tolist())),
+        "row_scale": ("double", map(derivatives.format_number, build_exact_model(problem).row_scales[:first].tolist())),
     }
     optimum = {"x": near.x, "multipliers": near.guess.rows}
     return {
@@ -112,7 +102,7 @@ def describe_planner(
 
 
 def _write_public(name: str, values: Array) -> str:
-    return write_array("double", name, map(format_number, values.tolist())).removeprefix("static ")
+    return write_array("double", name, map(derivatives.format_number, values.tolist())).removeprefix("static ")
 
 
 def _rename(function: ca.Function, prefix: str) -> ca.Function:
@@ -136,9 +126,9 @@ def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
     by_lifted = found.jacobian.nnz() - found.jacobian.colind()[n]
     reduction = 2 * (by_lifted * 2 * (n + 1) + 2 * found.hessian.nnz() * n + lifted * n * (n + 1))
     parts = {
-        "values of all functions": _count(found.plan, VALUES),
-        "first derivatives, in addition": _count(found.plan, FIRST),
-        "second derivatives, in addition": _count(found.plan, SECOND),
+        "values of all functions": _count(found.plan, derivatives.VALUES),
+        "first derivatives, in addition": _count(found.plan, derivatives.FIRST),
+        "second derivatives, in addition": _count(found.plan, derivatives.SECOND),
         "elimination of the lifted variables": reduction,
         "eigenvectors of the curvature, four times": 4 * 30 * 6 * n**3,
         "a change of the program's active rows, with r variables kept": 0,
@@ -152,17 +142,17 @@ def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
     ]
 
 
-def _count(plan: DerivativePlan, phase: int) -> int:
+def _count(plan: derivatives.DerivativePlan, phase: int) -> int:
     """Count a phase's additions, multiplications and functions."""
     total = 0
     for kind, first, last in plan.steps[phase]:
-        if kind == TAPE:
+        if kind == derivatives.TAPE:
             total += last - first
-        elif kind == RUNS:
+        elif kind == derivatives.RUNS:
             total += sum(2 * length for *_, length in plan.runs[first:last])
-        elif kind == PRODUCTS:
+        elif kind == derivatives.PRODUCTS:
             total += sum(1 + 2 * length for *_, length in plan.products[first:last])
-        elif kind == CALL:
+        elif kind == derivatives.CALL:
             call = plan.calls[first]
             times = call.samples if call.directions is None else int(call.directions.sum())
             total += times * plan.functions[call.function].n_instructions()

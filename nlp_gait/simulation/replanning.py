@@ -24,21 +24,9 @@ from nlp_gait.backends.onboard.replanner import Replanner, replanner
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint
+from nlp_gait.gaits.biped import rest_of_phase as rest
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
-from nlp_gait.gaits.biped.rest_of_phase import (
-    BEYOND,
-    EDGES,
-    FOOT,
-    HIP_PLACES,
-    HIP_RATES,
-    MISS,
-    OUTSIDE,
-    RATE,
-    REACH,
-    RISE,
-    make_rest_of_phase,
-)
 from nlp_gait.robots import Joint
 from nlp_gait.simulation.feedback import to_rotation_vector
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
@@ -121,7 +109,7 @@ class RestPlanner:
     """Planner of the rest of one kind of phase of a robot; its replanner is built when it is first used."""
 
     def __init__(self, body: Body, name: PhaseName) -> None:
-        self.problem = make_rest_of_phase(body, name)
+        self.problem = rest.make_rest_of_phase(body, name)
         self.names = self.problem.names
         self._own = [parameter.name for parameter in self.problem.own_parameters]
         x, p, t = SX.sym("x", len(self.names)), SX.sym("p", len(self._own)), SX.sym("t")
@@ -233,7 +221,8 @@ class StepPlanner:
         miss -= np.clip(miss, -NOTICED * noise, NOTICED * noise)
         trial, planner = self._make(t, now.share_at(t), commanded), self._planners[name]
         trial = trial._replace(
-            values=trial.values | {**_pair(MISS, miss), RATE: growth, REACH: self._reach_m, **self._find_rise(t)}
+            values=trial.values
+            | {**_pair(rest.MISS, miss), rest.RATE: growth, rest.REACH: self._reach_m, **self._find_rise(t)}
         )
         solver = planner.prepare(trial)
         if name not in self._used:
@@ -246,12 +235,12 @@ class StepPlanner:
             trial.values, np.clip(x0, problem.lower, problem.upper), iterations=STEPS, time_limit_s=TIME_LIMIT_S
         )
         at = dict(zip(planner.names, found.x.tolist(), strict=True))
-        is_followed = found.feasible and at[OUTSIDE] <= MOST_OUTSIDE_M and at[BEYOND] <= MOST_BEYOND
+        is_followed = found.feasible and at[rest.OUTSIDE] <= MOST_OUTSIDE_M and at[rest.BEYOND] <= MOST_BEYOND
         self.plans.append((t, time.perf_counter() - started, found.converged, is_followed))
         self._guess, self._guess_s = (found.x, t) if is_followed else (trial.x, t)
         if is_followed:
-            hip, rate = (np.array([at[each] for each in names]) for names in (HIP_PLACES, HIP_RATES))
-            foot = np.array([at.get(each, value) for each, value in zip(FOOT, trial.end.foot, strict=True)])
+            hip, rate = (np.array([at[each] for each in names]) for names in (rest.HIP_PLACES, rest.HIP_RATES))
+            foot = np.array([at.get(each, value) for each, value in zip(rest.FOOT, trial.end.foot, strict=True)])
             end = trial.end._replace(hip=hip, hip_rate=rate, foot=foot)
             self._now = trial._replace(x=found.x, end=end, duration_s=at[TIMES[name]])
 
@@ -264,8 +253,8 @@ class StepPlanner:
         left = (1.0 - share) * phase.duration_s
         rate, foot = faster * end.hip_rate, faster[:2] * end.foot if name == "ssp" else state.foot
         place = faster * end.hip + [*foot, 0.0]
-        values = {f"{duration}.planned": left, **dict(_pair(HIP_PLACES, place, ".planned"))}
-        values |= {**_pair(HIP_RATES, rate, ".planned"), **_pair(("x", "y", "z"), state.hip, "_start_m", "hip_")}
+        values = {f"{duration}.planned": left, **dict(_pair(rest.HIP_PLACES, place, ".planned"))}
+        values |= {**_pair(rest.HIP_RATES, rate, ".planned"), **_pair(("x", "y", "z"), state.hip, "_start_m", "hip_")}
         values |= _pair(("x", "y", "z"), state.hip_rate, "_start_m_s", "hip_v")
         angles = self._body.angle_names(name)
         for numbers, kind in ((state.arms, "start"), (end.arms, "end"), (state.arms_rate, "start_rate")):
@@ -275,17 +264,22 @@ class StepPlanner:
         times = (min(FASTEST_S[name] * (1.0 - share), left), SLOWEST * left) if "time" in free else (left, left)
         values |= {f"{duration}.lower": times[0], f"{duration}.upper": times[1]}
         if name == "ssp":
-            values |= {**_pair(FOOT, foot, ".planned"), "swing_share_start": share, "swing_height_m": phase.height}
+            values |= {**_pair(rest.FOOT, foot, ".planned"), "swing_share_start": share, "swing_height_m": phase.height}
             values |= _pair(("x", "y"), state.foot, "_start_m", "foot_")
             values |= _pair(("x", "y"), state.foot_rate, "_start_m_s", "foot_v")
-            for each, what, value in zip(FOOT, FREE, foot.tolist(), strict=False):
+            for each, what, value in zip(rest.FOOT, FREE, foot.tolist(), strict=False):
                 if what not in free:
                     values |= {f"{each}.lower": value, f"{each}.upper": value}
         else:
-            values |= _pair(FOOT, foot)
+            values |= _pair(rest.FOOT, foot)
         values |= self._list_edges([np.array([0.0, left_y])] + [foot] * (name == "dsp"))
         ends = PlanState(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
-        named = {duration: left, **_pair(HIP_PLACES, ends.hip), **_pair(HIP_RATES, rate), **_pair(FOOT, foot)}
+        named = {
+            duration: left,
+            **_pair(rest.HIP_PLACES, ends.hip),
+            **_pair(rest.HIP_RATES, rate),
+            **_pair(rest.FOOT, foot),
+        }
         x = np.array([named.get(each, 0.0) for each in self._planners[name].names])
         return Pursuit(phase, t, share, left, state, ends, values, x)
 
@@ -297,14 +291,14 @@ class StepPlanner:
     def _find_rise(self, t: float) -> dict[str, float]:
         """Return how the floor rises under the leaning robot."""
         x, y, _ = self._find_lean(t).tolist()
-        return {RISE[0]: y, RISE[1]: -x * (1.0 - 2.0 * self._now.phase.stance)}
+        return {rest.RISE[0]: y, rest.RISE[1]: -x * (1.0 - 2.0 * self._now.phase.stance)}
 
     def _list_edges(self, ankles: list[Array]) -> dict[str, float]:
         """Return the edges of the hull of soles, whose ankles (2,) are given; edges that are left over are far away."""
         feet = (self._body.robot.feet[side] for side in SIDES)
         soles = [Foothold(x, y, 0.0).outline(foot) for (x, y), foot in zip(ankles, feet, strict=False)]
         sides = find_support_sides(soles) - [0.0, 0.0, SAFETY_M]
-        rows = [*sides.tolist(), *[(1.0, 0.0, 1.0)] * (EDGES - len(sides))]
+        rows = [*sides.tolist(), *[(1.0, 0.0, 1.0)] * (rest.EDGES - len(sides))]
         return {f"edge_{k}_{what}": value for k, row in enumerate(rows) for what, value in zip("xym", row, strict=True)}
 
     def _find_set_points(self, t: float) -> Array:

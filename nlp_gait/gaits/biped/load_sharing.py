@@ -26,15 +26,7 @@ from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_r
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import tree_from
-from nlp_gait.symbolic.balance import (
-    SOLE_FRICTION,
-    combine_zmps,
-    ground_load,
-    shift_down,
-    shift_up,
-    sole_limits,
-    zmp_of_wrench,
-)
+from nlp_gait.symbolic import balance
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.kinematics import UP, axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -182,12 +174,12 @@ def make_planned_loads(body: Body) -> Loader:
     def loads(now: Instant) -> Instant:
         q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
         feet, wrench = {side: ankle[:2] for side, ankle in now.ankles.items()}, now.wrench
-        pushes = {right.link: shift_up(wrench, right.ankle_height_m)}
+        pushes = {right.link: balance.shift_up(wrench, right.ankle_height_m)}
         torques, at_ankle = newton_euler(tree, q, qd, qdd, body.gravity_vector, upright=body.upright, pushes=pushes)
-        own = shift_down(at_ankle, left.ankle_height_m)
+        own = balance.shift_down(at_ankle, left.ankle_height_m)
         arm = ca.vertcat(feet["R"] - feet["L"], 0)
         both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
-        offset = zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, body.weight)
+        offset = balance.zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, body.weight)
         return now._replace(torques=torques, zmp=feet["L"] + offset, wrenches={"L": own, "R": wrench})
 
     return loads
@@ -211,12 +203,12 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
             height = foot.ankle_height_m
             if side == "R" and now.yaw.shape[0]:  # from the axes of its foot
                 wrench = Wrench(*(axis_rotation(UP, now.yaw) @ part for part in wrench))
-            offset = zmp_of_wrench(wrench, height, weight)
-            wrenches[side] = shift_down(wrench, height)
+            offset = balance.zmp_of_wrench(wrench, height, weight)
+            wrenches[side] = balance.shift_down(wrench, height)
             torques |= own
             zmps.append(now.ankles[side][:2] + offset)
-            ground_loads.append(ground_load(wrench, weight))
-        return now._replace(torques=torques, zmp=combine_zmps(zmps, ground_loads), wrenches=wrenches)
+            ground_loads.append(balance.ground_load(wrench, weight))
+        return now._replace(torques=torques, zmp=balance.combine_zmps(zmps, ground_loads), wrenches=wrenches)
 
     return loads
 
@@ -230,7 +222,7 @@ class FootLimits(Limit):
 
     reads_wrenches = True
     parameters = table(
-        ("friction_coefficient", "1", SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
+        ("friction_coefficient", "1", balance.SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
         ("load_rate_limit_1_s", "1/s", 12.5, "fastest change of a foot's load, in weights per second", 0.0, math.inf),
         (
             "switch_load_limit",
@@ -274,5 +266,5 @@ ROWS = (("friction", "N", CORNERS), ("pressure", "Nm", CORNERS), ("turning", "Nm
 
 def _bearing(foot: Foot) -> ca.Function:
     wrench, mu = SX.sym("wrench", 6), SX.sym("mu")
-    limits = sole_limits(wrench, (-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m), mu)
+    limits = balance.sole_limits(wrench, (-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m), mu)
     return ca.Function("bearing", [wrench, mu], list(limits))

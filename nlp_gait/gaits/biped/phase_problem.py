@@ -15,18 +15,9 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, GaitProblem, NumericPoint, Point, SolverHints, Start, Variable
 from nlp_gait.formulation.display import Display, SimulationModel, Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
+from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
-from nlp_gait.gaits.biped.limits import (
-    REACH_MARGIN,
-    BalanceMargins,
-    Closure,
-    DriveLimits,
-    JointLimits,
-    Limit,
-    Reach,
-    TorqueChange,
-)
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -51,18 +42,18 @@ def make_goal(body: Body, criterion: Criterion) -> Goal:
     return Goal(heat=heat) if motors.power is None else Goal(heat=heat, power=motors.power)
 
 
-def make_phase_limits(body: Body, balance: BalanceMargins, *, solved: bool = True) -> tuple[Limit, ...]:
+def make_phase_limits(body: Body, balance: limits.BalanceMargins, *, solved: bool = True) -> tuple[limits.Limit, ...]:
     """Return the limits of every phase (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2), and those of the robot's drives.
 
     ``solved`` says that the legs' angles are computed from their feet.
     """
     size = body.torque_scale
     return (
-        JointLimits(body.robot, body.planned),
-        Reach(),
-        *((Closure(),) if solved and not body.closed_form else ()),
-        TorqueChange(size),
-        *((DriveLimits(body.robot, size),) if body.drive_limits else ()),
+        limits.JointLimits(body.robot, body.planned),
+        limits.Reach(),
+        *((limits.Closure(),) if solved and not body.closed_form else ()),
+        limits.TorqueChange(size),
+        *((limits.DriveLimits(body.robot, size),) if body.drive_limits else ()),
         balance,
     )
 
@@ -137,7 +128,7 @@ def make_start_within_reach(
     Besides the margin on the reach, the motion reads the parameters ``known``; ``reach`` gives the cosines of the knees at a
     point. Start points to choose from are those of ``start``, or any, within both the bounds and those of ``variables``.
     """
-    read, names = (REACH_MARGIN, *known), [variable.name for variable in variables]
+    read, names = (limits.REACH_MARGIN, *known), [variable.name for variable in variables]
 
     @cache
     def farthest() -> ca.Function:
@@ -160,7 +151,7 @@ def make_start_within_reach(
             cosine = float(farthest()(x, [parameters[name] for name in read]))
             if cosine < least:
                 best, least = x, cosine
-            if least <= 1.0 - parameters[REACH_MARGIN]:
+            if least <= 1.0 - parameters[limits.REACH_MARGIN]:
                 break
         return best
 

@@ -24,17 +24,9 @@ from casadi import MX, SX
 
 from nlp_gait.formulation import Assembly, Display, GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
 from nlp_gait.formulation.assembly import Variable
+from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import (
-    REACH_MARGIN,
-    JointLimits,
-    Limit,
-    Reach,
-    RowsAndIndexes,
-    make_rows,
-    make_rows_at_samples,
-)
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Samples
@@ -95,14 +87,14 @@ def compute_shift(at: Point, time: str) -> MX:
     return (now * growth - left) / (growth - 1.0)
 
 
-class SoftReach(Limit):
+class SoftReach(limits.Limit):
     """Joints within their limits and knees within reach, or beyond by a variable: a measured state may be there already."""
 
     def __init__(self, body: Body) -> None:
-        self._hard = (JointLimits(body.robot, body.planned), Reach())
+        self._hard = (limits.JointLimits(body.robot, body.planned), limits.Reach())
         self.parameters = tuple(parameter for limit in self._hard for parameter in limit.parameters)
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> limits.RowsAndIndexes:
         rows = []
         for row in (row for limit in self._hard for row in limit.add(at, samples, ops)[0]):
             assert row.lower is not None and row.upper is not None  # both limits have them
@@ -113,7 +105,7 @@ class SoftReach(Limit):
         return rows, {}
 
 
-class ZmpPolygon(Limit):
+class ZmpPolygon(limits.Limit):
     """ZMP, and its shifted weighted mean, on the inner side of each edge: normal (x, y) times it is at most a distance.
 
     That mean is also no further ahead of an ankle, or behind one, than the ankles' torques allow. A variable is how far
@@ -138,7 +130,7 @@ class ZmpPolygon(Limit):
     def __init__(self, time: str, *, swings: bool) -> None:
         self._time, self._swings = time, swings
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> limits.RowsAndIndexes:
         # The sooner the ZMP is shifted, the more it counts for the DCM at the end.
         weights = ca.exp(-at[RATE] * samples.duration * ca.linspace(0.0, 1.0, samples.steps + 1))
         weights[[0, -1]] /= 2.0
@@ -149,8 +141,8 @@ class ZmpPolygon(Limit):
         ahead = shifted[0] - (MX(0.0) if self._swings else ca.fmax(at[FOOT[0]], 0.0))
         reach = ca.vertcat(ahead, -shifted[0]) - at[REACH] - at[OUTSIDE]
         return [
-            make_rows_at_samples("zmp", "m", ca.vertcat(*rows), names, None, MX(0.0)),
-            make_rows("ankles", "m", reach, None, MX(0.0), ("ahead", "behind")),
+            limits.make_rows_at_samples("zmp", "m", ca.vertcat(*rows), names, None, MX(0.0)),
+            limits.make_rows("ankles", "m", reach, None, MX(0.0), ("ahead", "behind")),
         ], {}
 
 
@@ -189,7 +181,7 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
             )
             for each in angles
         }
-        return body.plan(hip, arms, {"L": left, "R": read_foot(at, s)}, at[REACH_MARGIN], ops)
+        return body.plan(hip, arms, {"L": left, "R": read_foot(at, s)}, at[limits.REACH_MARGIN], ops)
 
     phase = Phase(
         body=body,

@@ -24,15 +24,7 @@ from nlp_gait.gaits.humanoid.swing_time import GRAVITY, NAO_SWING_S, STEP_M, com
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import Biped, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
-from nlp_gait.symbolic.general_leg import (
-    POSES,
-    TorsoMotion,
-    compute_reach,
-    leg_motion,
-    make_leg_root,
-    sample_flat_foot_poses,
-    turn_torso,
-)
+from nlp_gait.symbolic import general_leg
 from nlp_gait.symbolic.kinematics import UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
@@ -96,7 +88,9 @@ class Humanoid(Body):
     def compute_cosines(self, q: MX) -> MX:
         angles = SX.sym("q", len(self.joints))
         legs = zip(self.biped.legs.values(), ca.vertsplit(angles, LEG_JOINT_COUNT), strict=True)
-        reach = ca.Function("reach", [angles], [ca.vertcat(*(compute_reach(leg, own) for leg, own in legs))])
+        reach = ca.Function(
+            "reach", [angles], [ca.vertcat(*(general_leg.compute_reach(leg, own) for leg, own in legs))]
+        )
         return reach.map(q.shape[1])(q)
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
@@ -114,11 +108,11 @@ class Humanoid(Body):
         for letter, name in BOTH_FEET.items():
             leg = self.biped.legs[name]
             place = Motion(*(a - b for a, b in zip(hip, ankles[letter], strict=True)))
-            torso = TorsoMotion(rotation, spin, rate, middle, place)
+            torso = general_leg.TorsoMotion(rotation, spin, rate, middle, place)
             if TORSO_YAW in angles:
                 foot = angles[RIGHT_YAW] if letter == "R" else constant_motion(0.0)
-                torso = turn_torso(torso, angles[TORSO_YAW], foot)
-            found = leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
+                torso = general_leg.turn_torso(torso, angles[TORSO_YAW], foot)
+            found = general_leg.leg_motion(leg, self.newton_steps[name], torso, margin, ops, held=ops.exact)
             joints |= {joint: Motion(*(part[i] for part in found.joints)) for i, joint in enumerate(leg.joints)}
             reach.append(found.reach)
             miss.append(found.miss)
@@ -213,7 +207,7 @@ def count_newton_steps(leg: Leg) -> int:
     Raises:
         InputError: it needs too many.
     """
-    inputs = sample_flat_foot_poses(leg)
+    inputs = general_leg.sample_flat_foot_poses(leg)
     steps = _find_steps(leg, inputs)
     if steps is not None:
         return steps
@@ -228,7 +222,7 @@ def count_newton_steps(leg: Leg) -> int:
     raise InputError(
         f"the leg of joints {', '.join(leg.joints)} is not solved in {MOST_STEPS} Newton steps: its hip axes pass each other too "
         f"far, or its ankle's; after {MOST_STEPS - 1} steps {100 * float(np.mean(left <= NEARLY_CLOSED)):.0f} % of "
-        f"{POSES} poses are closed"
+        f"{general_leg.POSES} poses are closed"
     )
 
 
@@ -247,7 +241,7 @@ def _can_reach(leg: Leg, pose: Array) -> bool:
     from scipy.optimize import least_squares
 
     q = SX.sym("q", LEG_JOINT_COUNT)
-    residual = make_leg_root(leg, 0, Exact(), SX(0.0)).residual(q, SX(DM(pose)))
+    residual = general_leg.make_leg_root(leg, 0, Exact(), SX(0.0)).residual(q, SX(DM(pose)))
     misfit, jacobian = ca.Function("misfit", [q], [residual]), ca.Function("jacobian", [q], [ca.jacobian(residual, q)])
     low, high = leg.limits_rad.T
     starts = np.random.default_rng(0).uniform(low, high, (REACH_STARTS, LEG_JOINT_COUNT))
@@ -261,7 +255,7 @@ def _can_reach(leg: Leg, pose: Array) -> bool:
 def compute_residuals(leg: Leg, steps: int, inputs: Array) -> Array:
     """Compute the largest residual of each pose (N,) after a number of steps."""
     symbols = SX.sym("inputs", len(inputs))
-    root = make_leg_root(leg, steps, Exact(), SX(0.0))
+    root = general_leg.make_leg_root(leg, steps, Exact(), SX(0.0))
     left = root.residual(root.newton(symbols), symbols)
     function = ca.Function("residual", [symbols], [left])
     return np.abs(np.array(function.map(inputs.shape[1])(inputs))).max(axis=0)

@@ -17,17 +17,10 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, Signals
+from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import LIFT, read_duration
 from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import (
-    REACH_MARGIN,
-    Limit,
-    RowsAndIndexes,
-    make_angle_rows,
-    make_halfway_rows,
-    make_rows_at_samples,
-)
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FreeParts, locate_free_parts
 from nlp_gait.gaits.biped.samples import Instant, Samples
@@ -115,13 +108,13 @@ class FreePhase(Phase):
         """
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")
-        joints = self.free.joints(InstantPoint.of(x, margin, self.names, [REACH_MARGIN]), s, ops)
+        joints = self.free.joints(InstantPoint.of(x, margin, self.names, [limits.REACH_MARGIN]), s, ops)
         moved = ca.vertcat(*(joints[name][order] for order in range(3) for name in MOVING[1:]))
         motion = ca.Function("motion", [x, margin, s], [ca.cse(moved)])
         motion, table = (
             tabulate_last_input(motion, DM(np.linspace(0.0, 1.0, n)).T) if phases is None else (motion, phases)
         )
-        values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[REACH_MARGIN], 1, n), table)
+        values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[limits.REACH_MARGIN], 1, n), table)
         motions = tie_entries(values, ops)
         torque, zmp, along, heights, sides = (tie_entries(part, ops) for part in self.free.instant.map(n)(motions))
         q, qd, qdd = (name_rows(part) for part in ca.vertsplit(motions, len(CURVES)))
@@ -151,7 +144,7 @@ def name_rows(rows: MX) -> dict[str, MX]:
     return {name: found[YAW_PITCH if name in YAW_PITCHES else name] for name in MOVING}
 
 
-class FreeLimits(Limit):
+class FreeLimits(limits.Limit):
     """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot.
 
     Halfway the swing foot is at x = ``path_middle``; ``inner_edge`` is y of the supporting sole's inner edge [m].
@@ -160,14 +153,16 @@ class FreeLimits(Limit):
     def __init__(self, robot: Robot, path_middle: float, inner_edge: float) -> None:
         self._robot, self._path_middle, self._inner_edge = robot, path_middle, inner_edge
 
-    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> limits.RowsAndIndexes:
         traces, middle = samples.traces, samples.steps // 2  # the number of samples is odd
         heights, aside = traces["heights"], self._inner_edge - traces["sides"][:, 1:-1]
         return (
-            make_angle_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
-            make_rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
-            *make_halfway_rows(traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS),
-            make_rows_at_samples("feet_apart", "m", aside, CORNERS[1::2], MX(0.0), first=1),
+            limits.make_angle_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
+            limits.make_rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
+            *limits.make_halfway_rows(
+                traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS
+            ),
+            limits.make_rows_at_samples("feet_apart", "m", aside, CORNERS[1::2], MX(0.0), first=1),
         ), {}
 
 

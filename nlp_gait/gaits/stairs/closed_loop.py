@@ -25,19 +25,9 @@ from nlp_gait.gaits.stairs.planar_biped import (
 )
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, posture, stair_height
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.symbolic import quantised
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.quantised import (
-    Contact,
-    Controller,
-    Equations,
-    Ground,
-    QuantisedState,
-    advance,
-    controller_torque,
-    explicit_quantum,
-    implicit_quantum,
-    solve_definite,
-)
+from nlp_gait.symbolic.quantised import Contact, Equations, Ground, QuantisedState, solve_definite
 
 Scheme = Literal["implicit", "explicit"]
 InverseKinematics = Literal["closed-form", "network", "printed-network"]
@@ -193,7 +183,7 @@ class ClosedLoop:
     def step(self) -> ca.Function:
         """Function of (state (18,), given, tuned) to the state one quantum later."""
         state, inputs, parts = self._symbols()
-        following = advance(state, solve_definite(*self._equations(state, parts)), QUANTUM)
+        following = quantised.advance(state, solve_definite(*self._equations(state, parts)), QUANTUM)
         return ca.Function(
             "step", [ca.vertcat(*state), *inputs], [ca.cse(ca.vertcat(*following))], {"is_diff_in": [True, False, True]}
         )
@@ -220,8 +210,8 @@ class ClosedLoop:
         inertia = ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push  # of links that the base accelerates
         disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) - inertia + parts["torque"]
         if self.scheme == "implicit":
-            return implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
-        return explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
+            return quantised.implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
+        return quantised.explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
 
     @cached_property
     def outcome(self) -> ca.Function:
@@ -230,7 +220,7 @@ class ClosedLoop:
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         G = biped_dynamics(state.q, state.v, state.q, self.base_point).G
         acted = following if self.scheme == "implicit" else state
-        torque = controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
+        torque = quantised.controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
@@ -261,7 +251,7 @@ class ClosedLoop:
         each = N // self.gains
         aim = parts.pop("aim")
         share = parts.pop("gravity_share")
-        parts["control"] = Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), share, self.joints)
+        parts["control"] = quantised.Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), share, self.joints)
         parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
         return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 

@@ -13,19 +13,7 @@ from casadi import DM, MX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Columns, Display, GaitProblem, Objective, Signals, SolverHints, maker
 from nlp_gait.formulation.assembly import NumericPoint, Point, Variable, parameters
-from nlp_gait.gaits.stairs import stair
-from nlp_gait.gaits.stairs.closed_loop import (
-    ANGLES,
-    QUANTUM,
-    Base,
-    ClosedLoop,
-    Coordinates,
-    InverseKinematics,
-    N,
-    Rates,
-    Rollout,
-    Scheme,
-)
+from nlp_gait.gaits.stairs import closed_loop, stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
 from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import StepKind
@@ -84,12 +72,12 @@ PARAMETERS = (
 def stairs_track(
     *,
     gains: Gains = "scalar",
-    scheme: Scheme = "implicit",
-    inverse_kinematics: InverseKinematics = "closed-form",
-    coordinates: Coordinates = "joint",
+    scheme: closed_loop.Scheme = "implicit",
+    inverse_kinematics: closed_loop.InverseKinematics = "closed-form",
+    coordinates: closed_loop.Coordinates = "joint",
     step: StepKind = "next",
-    base: Base = "stance-foot",
-    rates: Rates = "exact",
+    base: closed_loop.Base = "stance-foot",
+    rates: closed_loop.Rates = "exact",
     zmp: ZmpRule = "limits",
     tracking_limit: bool = True,
     duration_s: float = 3.5,
@@ -119,11 +107,11 @@ def stairs_track(
     Source:
         Bhardwaj et al., sections VII to X.
     """
-    if not QUANTUM <= duration_s <= 60.0:
-        raise InputError(f"duration_s must be within [{QUANTUM}, 60], got {duration_s}")
-    suffixes = [""] if gains == "scalar" else [f"_{angle}" for angle in ANGLES[coordinates]]
-    quanta = round(duration_s / QUANTUM)
-    loop = ClosedLoop(
+    if not closed_loop.QUANTUM <= duration_s <= 60.0:
+        raise InputError(f"duration_s must be within [{closed_loop.QUANTUM}, 60], got {duration_s}")
+    suffixes = [""] if gains == "scalar" else [f"_{angle}" for angle in closed_loop.ANGLES[coordinates]]
+    quanta = round(duration_s / closed_loop.QUANTUM)
+    loop = closed_loop.ClosedLoop(
         quanta=quanta,
         scheme=scheme,
         gains=len(suffixes),
@@ -143,7 +131,7 @@ def stairs_track(
         *(v for v in stair.GOVERNING_VARIABLES if v.name == TORSO_PITCH),
     )
 
-    def rollout(point: Point, ops: Nonsmooth) -> Rollout:
+    def rollout(point: Point, ops: Nonsmooth) -> closed_loop.Rollout:
         return loop.rollout(point, ca.vertcat(*(stair.clip_to_range(point, variable) for variable in variables)), ops)
 
     def start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
@@ -154,17 +142,17 @@ def stairs_track(
         found = rollout(at, Exact())
         parts = (*found[:4], loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
-        joints, names = loop.joints.full().T, tuple(ANGLES[coordinates])
+        joints, names = loop.joints.full().T, tuple(closed_loop.ANGLES[coordinates])
         return Signals(
             joints=names,
             arrays={
-                "t": np.linspace(QUANTUM, loop.quanta * QUANTUM, loop.quanta),
-                "q": state[:, :N] @ joints,
-                "qd": state[:, N:] @ joints,
-                "q_desired": desired[:, :N] @ joints,
-                "qd_desired": desired[:, N:] @ joints,
-                "link_q": state[:, :N],
-                "link_qd": state[:, N:],
+                "t": np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta),
+                "q": state[:, : closed_loop.N] @ joints,
+                "qd": state[:, closed_loop.N :] @ joints,
+                "q_desired": desired[:, : closed_loop.N] @ joints,
+                "qd_desired": desired[:, closed_loop.N :] @ joints,
+                "link_q": state[:, : closed_loop.N],
+                "link_qd": state[:, closed_loop.N :],
                 "tau": torque,
                 "zmp": zmp[:, 0],
                 "stance_ankle": stance_ankle,
@@ -199,12 +187,17 @@ def stairs_track(
 
 
 def _assemble(
-    point: Point, rollout: Rollout, loop: ClosedLoop, rule: ZmpRule, tracking_limit: bool, ops: Nonsmooth
+    point: Point,
+    rollout: closed_loop.Rollout,
+    loop: closed_loop.ClosedLoop,
+    rule: ZmpRule,
+    tracking_limit: bool,
+    ops: Nonsmooth,
 ) -> Assembly:
     """Return the mean of (53) over all quanta with the worth of the ZMP margin or its penalty, and the limits of both."""
     quanta, zmp = loop.quanta, rollout.zmp.T
     errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
-    power = rollout.torque * (loop.joints @ rollout.state[N:, :])
+    power = rollout.torque * (loop.joints @ rollout.state[closed_loop.N :, :])
     rear, front = support_polygon(point, loop)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
@@ -213,12 +206,12 @@ def _assemble(
     if rule == "limits":  # (Algorithm 3)
         constraints.append(stair.rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
     if tracking_limit:
-        most, limited = point["tracking_tolerance_rad"], errors[:N, :]
+        most, limited = point["tracking_tolerance_rad"], errors[: closed_loop.N, :]
         constraints.append(
             stair.rows(
                 "tracking",
                 limited,
-                tuple(ANGLES[loop.coordinates]),
+                tuple(closed_loop.ANGLES[loop.coordinates]),
                 "rad",
                 0.1,
                 lower=-most,
@@ -233,8 +226,8 @@ def _assemble(
         indexes={
             "controller_cost": ca.sum1(exact.abs(ca.vertcat(ca.vec(errors), ca.vec(power)))) / quanta,
             "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
-            "energy_J": ca.sum1(exact.abs(ca.vec(power))) * QUANTUM,
-            "largest_error_rad": exact.largest(ca.vec(errors[:N, :])),
+            "energy_J": ca.sum1(exact.abs(ca.vec(power))) * closed_loop.QUANTUM,
+            "largest_error_rad": exact.largest(ca.vec(errors[: closed_loop.N, :])),
             "peak_torque_Nm": exact.largest(ca.vec(rollout.torque)),
             "zmp_margin_min_m": _margin(zmp, rear, front, exact),
             "quanta_before_divergence": ca.sum2(finite),
@@ -242,14 +235,14 @@ def _assemble(
     )
 
 
-def support_polygon(point: Point, loop: ClosedLoop) -> tuple[MX, MX]:
+def support_polygon(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]:
     """Return the rear and front end of the support polygon at the end of each quantum, (m, 1) ahead of the stance ankle [m].
 
     The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe. In
     the first step both feet begin side by side.
     """
     foot = toe_foot_biped().foot_m
-    times = DM(np.arange(1, loop.quanta + 1) * QUANTUM)
+    times = DM(np.arange(1, loop.quanta + 1) * closed_loop.QUANTUM)
     behind = 0 if loop.kind == "first" else foot - point["stair_length_m"] / 2
     return (times < point["t2_s"]) * behind, MX(DM([foot] * loop.quanta))
 

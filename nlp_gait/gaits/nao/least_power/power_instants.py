@@ -17,15 +17,7 @@ from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
 from nlp_gait.gaits.biped.support_phases import Point2, make_support_box, swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
-from nlp_gait.gaits.nao.least_power.world_frame import (
-    Frame,
-    chain_frames,
-    leg_frames,
-    leg_rates,
-    link_wrench,
-    move_wrench,
-    upright,
-)
+from nlp_gait.gaits.nao.least_power import world_frame
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.balance import ground_load
 from nlp_gait.symbolic.dynamics import Wrench
@@ -78,9 +70,9 @@ class PowerInstant:
     # Of the ankle from the hip across and down, by side [m]: their quotient is the tangent of the leg's roll
     sideways: dict[str, tuple[SX, SX]] = field(default_factory=dict)
 
-    def link_wrench(self, name: str, frame: Frame) -> SX:
+    def link_wrench(self, name: str, frame: world_frame.Frame) -> SX:
         """Return the wrench (6, 2) of a link about the origin of its frame."""
-        return link_wrench(self.robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
+        return world_frame.link_wrench(self.robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
 
     def add_arm(self, side: str, arms: Mapping[str, Motion], acceleration: SX) -> SX:
         """Add the torques of an arm; returns its wrench (6, 2) about the torso's origin.
@@ -88,14 +80,16 @@ class PowerInstant:
         At one phase the arm's pose consists of numbers, so that everything is linear in the torso's acceleration.
         """
         joints, a = [self.robot.joint(f"{side}{name}") for name in ARM_JOINTS], SX.sym("a", 3)
-        frames = chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
+        frames = world_frame.chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
         carried, at, rows = SX(6, 2), SX(3, 1), list[SX]()
         for joint in reversed(joints):
             frame = frames[joint.child]
-            carried = move_wrench(carried, at - frame.origin.position) + self.link_wrench(joint.child, frame)
+            carried = world_frame.move_wrench(carried, at - frame.origin.position) + self.link_wrench(
+                joint.child, frame
+            )
             at = frame.origin.position
             rows.append((frame.axes.position @ DM(joint.axis)).T @ carried[3:, :])
-        values = _evaluate_linear(ca.vertcat(*rows, move_wrench(carried, at)), a, acceleration)
+        values = _evaluate_linear(ca.vertcat(*rows, world_frame.move_wrench(carried, at)), a, acceleration)
         for i, joint in enumerate(reversed(joints)):
             self.torques[joint.name] = values[i, 0] + self.rate_squared * values[i, 1]
             if not arms[joint.name].velocity.is_zero():
@@ -120,30 +114,30 @@ class PowerInstant:
     ) -> SX:
         """Add the torques of a chain from a wrench about a point on; returns the wrench about the last link's point."""
         for joint, (wrench, point) in zip(joints, links, strict=True):
-            moment = move_wrench(carried, at - joint.place)[3:, :]
+            moment = world_frame.move_wrench(carried, at - joint.place)[3:, :]
             gravity, inertia = (ca.dot(joint.axis, part) for part in ca.horzsplit(moment))
             self.torques[joint.name] = direction * (gravity + self.rate_squared * inertia)
-            carried, at = move_wrench(carried, at - point) + wrench, point
+            carried, at = world_frame.move_wrench(carried, at - point) + wrench, point
         return carried
 
     def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> LegParts:
         geometry, yaw = measure_leg(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
         at_hip = add_motions(hip, resting_point(geometry.hip_m))
-        frames = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        frames = world_frame.leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
         apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
-        rates = leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        rates = world_frame.leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
         self.rates |= {f"{side}{name}": rate for name, rate in zip(LEG_JOINTS, rates.joints, strict=True)}
         self.reaches[side] = rates.distance_squared
         self.sideways[side] = apart.position[1], -apart.position[2]
         names = (yaw.child, *(self.robot.joint(f"{side}{name}").child for name in LEG_JOINTS))
         wrenches = [
             self.link_wrench(name, frame)
-            for name, frame in zip(names, (upright(hip), *frames, upright(ankle)), strict=True)
+            for name, frame in zip(names, (world_frame.upright(hip), *frames, world_frame.upright(ankle)), strict=True)
         ]
         tibia = self.robot.links[names[3]]
         x, y, z = tibia.com_m
         from_ankle = replace(tibia, com_m=(x, y, z + geometry.tibia_m))
-        wrenches[3] = link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
+        wrenches[3] = world_frame.link_wrench(from_ankle, frames.tibia.axes, ankle.acceleration, GRAVITY)
         yaw_place, knee = hip.position + DM(yaw.origin_m), frames.tibia.origin.position
         across, hip_place, ankle_place = frames.hip.axes.position[:, 1], at_hip.position, ankle.position
         axes: tuple[SX | DM, ...] = (DM(yaw.axis), FORWARD, across, across, across, FORWARD)
@@ -177,7 +171,7 @@ def double_support_instants(
         hip, arms = _hip(z, *hip_ends, phase), arm_joints(arm_swing, ONE, SX(phase))
         found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         shares = torso_shares(hip.position[1], rule, feet_y)
-        torso = found.link_wrench(robot.root, upright(hip))
+        torso = found.link_wrench(robot.root, world_frame.upright(hip))
         moments, loads = [], []
         for side, foot in (("L", robot.feet["left"]), ("R", robot.feet["right"])):
             upper = found.add_arm(side, arms, hip.acceleration) + shares[side] * torso
@@ -216,7 +210,7 @@ def single_support_instants(
         found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         begin, end = (SX(x) for x in swing_x)
         path = swing_foot(begin, end, swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
-        upper = found.link_wrench(robot.root, upright(hip))
+        upper = found.link_wrench(robot.root, world_frame.upright(hip))
         for side in "LR":
             upper = upper + found.add_arm(side, arms, hip.acceleration)
         upper = upper + found.add_swing_leg("R", hip, path)
