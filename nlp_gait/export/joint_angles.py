@@ -21,14 +21,10 @@ FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 
 
 def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
-    """Read angles over time of a robot's joints from a ``.motion`` file of Webots or from CSV.
+    """Read angles over time of a robot's joints from a ``.motion`` file of Webots or CSV; raises InputError, UnknownNameError.
 
     CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch_deg``; other columns
     of ``nlp-gait export --format csv`` are ignored.
-
-    Raises:
-        InputError: the file cannot be read, or has no times.
-        UnknownNameError: a column that is not a joint.
     """
     if path.suffix == ".motion":
         points = read_motion(path, robot.joints)

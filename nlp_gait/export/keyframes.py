@@ -15,12 +15,9 @@ from nlp_gait.simulation.plan import make_plan
 
 
 def write_keyframes(result: Result, period_ms: int) -> str:
-    """Return the simulated model with a key for each row of the gait.
+    """Return the simulated model with a key for each row of the gait; raises InputError for a robot that moves in a plane.
 
     ``qpos`` has the root's place [m] and attitude (w, x, y, z) and the joints' angles [rad], ``ctrl`` these angles as set-points.
-
-    Raises:
-        InputError: the robot of the problem moves in a plane, or cannot be simulated.
     """
     plan = make_plan(result)
     if plan.planar:

@@ -68,16 +68,13 @@ def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> l
 
 
 def write_nl(nlp: ca.Function, bounds: Mapping[str, Array], start: Array, title: str) -> str:
-    """Return the text of an ``.nl`` file.
+    """Return the text of an ``.nl`` file; raises InputError for an operation that the format does not have.
 
     Args:
         nlp: function of x (n,) to f and g (m,), of scalar operations.
         bounds: ``lbx``, ``ubx``, ``lbg``, ``ubg``.
         start: (n,) start point.
         title: first line's comment.
-
-    Raises:
-        InputError: an operation that the format does not have.
 
     Source:
         Gay (2005), Writing .nl files. All variables and rows count as nonlinear; values used twice are defined variables.

@@ -54,11 +54,7 @@ def check_planner(problem: GaitProblem) -> None:
 def describe_planner(
     problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str, near: Outcome
 ) -> Mapping[str, str]:
-    """Return the words of the templates.
-
-    Raises:
-        InputError: ``near`` is not an optimum with multipliers, or dense programs do not suit the problem.
-    """
+    """Return the words of the templates; raises InputError if ``near`` is not an optimum, or as ``check_planner``."""
     check_planner(problem)
     if near.guess is None or not near.converged:
         raise InputError(f"{problem.name}: a planner begins from an optimum by IPOPT; it {near.status}")

@@ -29,8 +29,7 @@ class SetPoints:
 def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:
     """Return planned joint angles exactly a period apart, see ``count_periods``.
 
-    Raises:
-        InputError: the problem has no time histories, or the period is not a whole number of milliseconds >= 1.
+    Raises InputError without time histories, or if the period is not a whole number of milliseconds >= 1.
     """
     from scipy.interpolate import CubicSpline  # takes as long to import as all the rest of a command
 

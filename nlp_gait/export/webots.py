@@ -27,12 +27,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def write_motion(path: Path, points: SetPoints) -> None:
-    """Write set-points as a `.motion` file, after reading the text back.
-
-    Raises:
-        InputError: the format cannot express the set-points.
-        OutputError: the file cannot be written.
-    """
+    """Write set-points as a `.motion` file, after reading the text back; raises InputError and OutputError."""
     text = format_motion(points)
     parse_motion(text, path.name)
     write_text(path, text)

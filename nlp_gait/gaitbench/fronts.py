@@ -132,12 +132,7 @@ class FrontInstance:
         )
 
     def to(self, adapter: str) -> Any:
-        """Return the instance as a problem of ``pymoo`` or ``pygmo``.
-
-        Raises:
-            UnknownNameError: no adapter has this name.
-            MissingExtraError: the package is not installed.
-        """
+        """Return the instance as a problem of ``pymoo`` or ``pygmo``; raises UnknownNameError and MissingExtraError."""
         check_name("adapter", adapter)
         return find_adapter(f"{adapter}-front")(self)
 

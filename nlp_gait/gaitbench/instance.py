@@ -181,9 +181,7 @@ class Instance:
         - ``optuna``: benchmark problem of OptunaHub, an objective of Optuna; the total violation is its constraint
         - ``nevergrad``: experiment function with a method ``violation``
 
-        Raises:
-            UnknownNameError: no adapter has this name.
-            MissingExtraError: the package is not installed.
+        Raises UnknownNameError, or MissingExtraError without the package.
         """
         return find_adapter(adapter)(self, **options)
 

@@ -62,12 +62,7 @@ def replace_variables(
 
 
 def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
-    """Return the same problem with some variables as parameters, which have these values.
-
-    Raises:
-        UnknownNameError: no such variable.
-        InputError: a value outside its bounds.
-    """
+    """Return the same problem with some variables as parameters, which have these values; raises as ``GaitProblem.fix``."""
     if not values:
         return problem
     problem.fix(**values)  # raises

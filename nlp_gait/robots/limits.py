@@ -19,14 +19,8 @@ REMEDY = f"simplify the file, or if you trust it, allow more memory by {MEMORY_V
 def read_in_child(owner: str, read: Callable[[], bytes]) -> bytes:
     """Return what ``read`` returns, in a forked process with limits of time and memory; Ctrl-C ends it at once.
 
-    Where a system has no forks (Windows), it is called in this process, without limits.
-
-    Args:
-        owner: the kind and name of the file, for messages.
-        read: reads it; may raise RobotDataError.
-
-    Raises:
-        RobotDataError: as ``read``, or it took too much time or memory, or its process died.
+    Where a system has no forks (Windows), it is called in this process, without limits. ``owner`` is the kind and name of the
+    file, for messages. Raises RobotDataError as ``read`` may, or if it took too much time or memory, or its process died.
     """
     if "fork" not in multiprocessing.get_all_start_methods():
         return read()

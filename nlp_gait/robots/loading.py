@@ -139,12 +139,7 @@ def hash_robot(name_or_path: object) -> str:
 
 
 def list_robot_files(name_or_path: str) -> set[str]:
-    """Return the files that describe a robot: its own, those that it extends or includes, and meshes.
-
-    Raises:
-        RobotDataError: a file cannot be read.
-        MissingExtraError: a package that reads it is not installed, or too old.
-    """
+    """Return the files that describe a robot: its own, those that it extends or includes, meshes; raises as ``load_robot``."""
     source, found = _find_description(split_name(name_or_path)[0]), set[str]()
     while source.endswith(".json") and source not in found:
         found.add(source)

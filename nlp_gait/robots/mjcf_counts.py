@@ -22,8 +22,7 @@ FOLDERS = ("meshdir", "texturedir", "assetdir")
 def check_counts(path: Path) -> list[Path]:
     """Return all files that an MJCF file names, those of included files too.
 
-    Raises:
-        RobotDataError: a count is too large, or one of the files is not a regular file.
+    Raises RobotDataError if a count is too large, or one of the files is not a regular file.
     """
     files, folders, total = [path], [path.parent], 0.0
     waiting: list[tuple[Any, float]] = [(_parse(path), 1.0)]

@@ -140,11 +140,7 @@ class TreeBody:
 def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[TreeBody, ...]:
     """Return the bodies from the fixed link outwards, parents before children, connected by some joints (None: by all).
 
-    The fixed link's reference point is its frame's origin.
-
-    Raises:
-        InputError: no such link.
-        UnknownNameError: no such joint.
+    The fixed link's reference point is its frame's origin. Raises InputError for an unknown link, UnknownNameError for a joint.
     """
     if fixed_link not in robot.links:
         raise InputError(f"robot {robot.name!r} has no link {fixed_link!r}")

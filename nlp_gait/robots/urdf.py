@@ -68,11 +68,7 @@ def find_moving_link(path: str, link: str) -> str:
 def read_foot_shapes(path: str, link: str) -> FootShapes:
     """Return the points of all shapes that move with a link, from its joint, along the root's axes at zero angles.
 
-    Visual shapes count only if none of these links has a collision shape.
-
-    Raises:
-        RobotDataError: as ``urdf_record``, or a mesh cannot be read.
-        ValueError: as ``urdf_record``.
+    Visual shapes count only if none of these links has a collision shape. Raises as ``urdf_record``, or for a damaged mesh.
     """
     tree = _read_xml(path)
     shapes = {kind: {part.get("name"): part.findall(kind) for part in tree.iter("link")} for kind in SHAPES}

@@ -144,9 +144,8 @@ class Plan:
 def make_plan(result: Result, steps: int | None = None) -> Plan:
     """Return the plan of a solved problem: of several consecutive steps, or by default of one phase or one cycle.
 
-    Raises:
-        InputError: the problem has no simulation model, the gait cannot be repeated or has samples that are not finite, or there
-            are too many steps.
+    Raises InputError for a problem without simulation model, a gait that cannot be repeated or has samples that are not finite,
+    or too many steps.
     """
     problem = result.problem
     model = problem.display.simulation_model

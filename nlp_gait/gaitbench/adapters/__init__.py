@@ -24,12 +24,7 @@ ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
 
 
 def find_adapter(name: str) -> Callable[..., Any]:
-    """Return the function that converts an instance for a package.
-
-    Raises:
-        UnknownNameError: no adapter has this name.
-        MissingExtraError: a package is not installed.
-    """
+    """Return the function that converts an instance for a package; raises UnknownNameError and MissingExtraError."""
     check_name("adapter", name)
     if name not in ADAPTERS:
         raise unknown("adapter", name, ADAPTERS)

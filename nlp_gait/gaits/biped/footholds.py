@@ -46,11 +46,7 @@ class Foothold(NamedTuple):
 
 
 def parse_footholds(text: str) -> tuple[Foothold, ...]:
-    """Return footholds from rows ``x,y,z,yaw`` [m, degrees], separated by semicolons.
-
-    Raises:
-        InputError: another form, another number of rows, or a height other than zero.
-    """
+    """Return footholds from rows ``x,y,z,yaw`` [m, degrees], separated by semicolons, all at height zero; raises InputError."""
     found = []
     for k, row in enumerate(text.split(";"), 1):
         try:
@@ -70,11 +66,7 @@ def parse_footholds(text: str) -> tuple[Foothold, ...]:
 
 
 def read_footholds(path: str | Path) -> str:
-    """Return the footholds of a CSV file with the header ``x_m,y_m,z_m,yaw_deg`` in the form of ``parse_footholds``.
-
-    Raises:
-        InputError: it cannot be read, or has another header.
-    """
+    """Return the footholds of a CSV file with the header ``x_m,y_m,z_m,yaw_deg`` for ``parse_footholds``; raises InputError."""
     header, *rows = read_text(Path(path), "footholds").strip().splitlines() or [""]
     if header.replace(" ", "") != COLUMNS:
         raise InputError(f"{path}: the first line must be {COLUMNS}, got {header!r}")

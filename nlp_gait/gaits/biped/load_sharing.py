@@ -89,19 +89,14 @@ class LoadSharing:
 
 
 def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadSharing:
-    """Return how the feet share the load: by a rule, see ``torso_shares``, or ``"free"``, see ``PlannedLoad``.
-
-    Raises:
-        InputError: a degree that is not allowed.
-    """
+    """Return how the feet share the load: by a rule, see ``torso_shares``, or ``"free"``, see ``PlannedLoad``."""
     return PlannedLoad(body, degree) if rule == "free" else LoadSharing(body, rule)
 
 
 class PlannedLoad(LoadSharing):
     """Wrench of the ground on the right sole, about the point under its ankle: polynomials in Bernstein form, and ramps.
 
-    Raises:
-        InputError: a degree of the polynomials that is not allowed.
+    Raises InputError for a degree of the polynomials that is not allowed.
     """
 
     def __init__(self, body: Body, degree: int) -> None:

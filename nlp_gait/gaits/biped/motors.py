@@ -48,11 +48,9 @@ SUPPLY = Parameter(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motors:
-    """Features of real motors that a problem takes into account.
+    """Features of real motors that a problem takes into account; raises UnknownNameError.
 
-    Raises:
-        UnknownNameError: no such feature.
-        InputError: features that exclude each other; a joint of the robot without data of its motor, or of its rotor.
+    Raises InputError for features that exclude each other, or a joint of the robot without data of its motor, or of its rotor.
     """
 
     features: tuple[str, ...]  # see above

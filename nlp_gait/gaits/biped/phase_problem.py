@@ -28,8 +28,7 @@ DRAWS = 50  # of a start point, at most
 def make_goal(body: Body, criterion: Criterion) -> Goal:
     """Return the goal of a criterion, with the robot's motors and heat constant.
 
-    Raises:
-        InputError: the motors change the power, but something else is minimised.
+    Raises InputError if the motors change the power, but something else is minimised.
     """
     motors, heat = body.motors, body.heat
     if criterion != "power" and motors.power is not None:

@@ -282,12 +282,9 @@ class RecordedCycles:
     options: Mapping[str, str | int | float | bool]  # of the problem that judges
 
     def judge(self, t: Array, q: Array, touch_down_s: float) -> Result:
-        """Return a cycle with its own times and step, as a result of the problem that judges it.
+        """Return a cycle with its own times and step, as a result of the problem that judges it; raises InputError as ``cut``.
 
         Angles (T, J) of the body's joints [rad] are at times (T,) from zero [s]; the right foot lands at ``touch_down_s``.
-
-        Raises:
-            InputError: a phase has too few samples.
         """
         motion = RecordedMotion(body=self.body, t=t, q=q)
         parts = {name: motion.cut(*span) for name, span in motion.phases(touch_down_s).items()}

@@ -59,8 +59,7 @@ class RecordedMotion:
     def cut(self, start_s: float, end_s: float) -> RecordedMotion:
         """Return the motion between two times, from the samples in between alone: accelerations may jump at its ends.
 
-        Raises:
-            InputError: too few samples.
+        Raises InputError for too few samples.
         """
         own = (self.t > start_s - SAME_TIME_S) & (self.t < end_s + SAME_TIME_S)
         count = np.count_nonzero(own)

@@ -52,11 +52,7 @@ class Humanoid(Body):
     newton_steps: Mapping[str, int]  # of Newton's method, by foot
 
     def check_step_length(self, step_m: float) -> float:
-        """Return a step length; 0 stands for NAO's in proportion [m].
-
-        Raises:
-            InputError: it is not a finite number >= 0.
-        """
+        """Return a step length; 0 stands for NAO's in proportion [m]. Raises InputError unless it is finite and >= 0."""
         number = isinstance(step_m, (int, float)) and not isinstance(step_m, bool)
         if not (number and 0.0 <= step_m < math.inf):
             raise InputError(f"step_length_m must be a finite number > 0, or 0 for one in proportion, got {step_m!r}")
@@ -139,13 +135,9 @@ class Humanoid(Body):
 
 
 def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") -> Humanoid:
-    """Return a humanoid, by name or file, as its gaits take it.
+    """Return a humanoid, by name or file, as its gaits take it; raises InputError if its legs cannot be solved.
 
     Torques and speeds may be within the limits of the robot's file; for the motors see ``gaits.biped.motors``.
-
-    Raises:
-        InputError: its legs cannot be solved.
-        GaitError: as ``load_robot``.
     """
     biped = make_biped_model(load_robot(robot))
     left, (middle_x, _, middle_z) = biped.legs["left"], biped.hip_middle_m
@@ -202,10 +194,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
 def count_newton_steps(leg: Leg) -> int:
     """Return the steps that a leg needs after the guess: none if that is exact, else one more than closes nearly all poses.
 
-    If some poses stay open, those that no angles within the joints' limits close do not count.
-
-    Raises:
-        InputError: it needs too many.
+    If some poses stay open, those that no angles within the joints' limits close do not count. Raises InputError for too many.
     """
     inputs = general_leg.sample_flat_foot_poses(leg)
     steps = _find_steps(leg, inputs)

@@ -145,11 +145,7 @@ def humanoid_walk(
 
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
-    """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged.
-
-    Raises:
-        GaitError: as ``make_humanoid``.
-    """
+    """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged."""
     options: dict[str, str | int | float | bool] = {
         "robot": robot,
         "intervals": intervals,

@@ -62,11 +62,7 @@ def check_turns(body: Humanoid, footholds: Sequence[Foothold]) -> None:
 
 
 def list_turn(body: Humanoid, turn_deg: float, steps: int | None, distance_m: float | None) -> str:
-    """Return the footholds of a turn to the left along an arc; see ``plan_walk``.
-
-    Raises:
-        InputError: an angle that is not allowed, or a turn that is too sharp.
-    """
+    """Return the footholds of a turn to the left along an arc; see ``plan_walk``. Raises InputError if it is too sharp."""
     if isinstance(turn_deg, bool) or not 0.0 < abs(turn_deg) <= LARGEST_TURN_DEG:
         raise InputError(f"turn_deg must be within +-{LARGEST_TURN_DEG:g}, got {turn_deg!r}")
     count = math.ceil(abs(turn_deg) / USUAL_TURN_DEG) + 1 if steps is None else check_count("steps", steps, at_least=2)

@@ -84,10 +84,8 @@ ARM_COORDINATE = Coordinate(
 def load_nao(robot: str) -> Robot:
     """Return the robot of a NAO problem: joints that no gait moves are locked at zero.
 
-    NAO's head and neck become one with the torso; another robot may have fingers, or no neck.
-
-    Raises:
-        InputError: the robot lacks joints that the gait moves, or the closed form does not solve its legs.
+    NAO's head and neck become one with the torso; another robot may have fingers, or no neck. Raises InputError without the
+    joints that the gait moves, or if the closed form does not solve its legs.
     """
     loaded = load_robot(robot)
     try:
@@ -253,14 +251,11 @@ class NaoBody(Body):
 
 
 def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", arms: Arms = "carried") -> NaoBody:
-    """Return NAO, or a robot of its build by name or file, as its gaits take it.
+    """Return NAO, or a robot of its build by name or file, as its gaits take it; raises InputError for other robots.
 
     Arms are carried by the legs, or ``"separate"``: legs and torso are a chain without them, as the paper describes it;
     ``"held"`` are carried and do not swing. Without rotational inertia every link is a point mass; for the motors see
     ``gaits.biped.motors``.
-
-    Raises:
-        InputError: the robot or its motors do not suit the NAO problems.
     """
     simulated = load_nao(robot)
     left, right = (measure_leg(simulated, side) for side in "LR")

@@ -52,12 +52,7 @@ class LegGeometry(NamedTuple):
 
 
 def measure_leg(robot: Robot, side: str) -> LegGeometry:
-    """Measure the leg on side ``"L"`` or ``"R"``.
-
-    Raises:
-        InputError: the closed form does not solve this leg; the message names the joint.
-        UnknownNameError: a joint is missing.
-    """
+    """Measure the leg on side ``"L"`` or ``"R"``; raises InputError if the closed form does not solve it, or UnknownNameError."""
     yaw = robot.joint(f"{side}HipYawPitch")
     roll, pitch, knee, ankle, ankle_roll = (robot.joint(f"{side}{name}") for name in LEG_JOINTS)
     _check_chain(robot, (yaw, roll, pitch, knee, ankle, ankle_roll))

@@ -69,11 +69,7 @@ class LeaningNao(NaoBody):
 
 
 def make_leaning_nao(body: NaoBody) -> LeaningNao:
-    """Return the body with a free torso.
-
-    Raises:
-        InputError: the hips' yaw-pitch axes do not close the chain.
-    """
+    """Return the body with a free torso; raises InputError if the hips' yaw-pitch axes do not close the chain."""
     check_yaw_pitches(body.robot)
     fields = {field.name: getattr(body, field.name) for field in dataclasses.fields(body)}
     return LeaningNao(**fields | {"upright": frozenset()})
@@ -100,11 +96,7 @@ def lean_of(angles: Angles) -> Motion:
 
 
 def check_yaw_pitches(robot: Robot) -> None:
-    """Refuse hips whose yaw-pitch turns both legs as the torso's yaw does: both would not follow from the lean.
-
-    Raises:
-        InputError: the axes are equally steep.
-    """
+    """Raise InputError if the hips' yaw-pitch turns both legs as the torso's yaw does: both would not follow from the lean."""
     left, right = (robot.joint(name).axis[2] for name in YAW_PITCHES)
     if abs(left - right) <= AXIS_TOLERANCE:
         raise InputError(

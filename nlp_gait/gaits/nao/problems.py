@@ -277,8 +277,7 @@ def of_all_joints(angles: JointAngles) -> Array:
 def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
     """Return the motion of a robot on its left foot; mirrored if the right one stands. Joints of the arms may be missing.
 
-    Raises:
-        InputError: a joint of the legs is missing, or times or angles are missing or out of order.
+    Raises InputError if a joint of the legs is missing, or times or angles are missing or out of order.
     """
     missing = [name for name in JOINTS if name not in angles.joints]
     needed = [name for name in missing if name not in RESTING_ARM_ANGLES]
@@ -298,11 +297,7 @@ def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
 
 
 def make_nao_cycles(robot: str = "nao-v5", intervals: int = 10) -> RecordedCycles:
-    """Return NAO, or a robot of its build, and the limits of ``nao-cycle``, by which its recorded cycles are judged.
-
-    Raises:
-        InputError: the robot has other legs.
-    """
+    """Return NAO, or a robot of its build, and the limits of ``nao-cycle``, by which its recorded cycles are judged."""
     options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
     return RecordedCycles(body=make_nao(robot), intervals=intervals, options=options)
 
@@ -318,10 +313,7 @@ def make_recorded_gait(
     """Make a gait from angles over time; their last instant is its end.
 
     Without ``gait``, the problem with whose limits it is judged, and without ``touch_down_s``, where single support ends in a
-    cycle, both are detected.
-
-    Raises:
-        InputError: angles that are not a gait, or another gait than named.
+    cycle, both are detected. Raises InputError for angles that are not a gait, or another gait than named.
     """
     if gait is not None and gait not in GAITS:
         raise InputError(f"a motion is judged by the limits of {', '.join(GAITS)}, got {gait!r}")

@@ -51,9 +51,5 @@ class PointMassBiped:
 
 @cache
 def load_point_mass_biped(path: str = "") -> PointMassBiped:
-    """Read a robot from a JSON file with the fields of ``PointMassBiped``; by default the paper's.
-
-    Raises:
-        RobotDataError: the file cannot be read, has a missing or an unknown field, or a value is not allowed.
-    """
+    """Read a robot from a JSON file with the fields of ``PointMassBiped``, by default the paper's; raises RobotDataError."""
     return read_dataclass(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)

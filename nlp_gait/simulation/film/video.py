@@ -21,12 +21,7 @@ Frame = np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]
 
 
 def check_video_path(path: Path) -> Path:
-    """Return the path if its suffix names a video format that can be written.
-
-    Raises:
-        InputError: another suffix.
-        MissingExtraError: MP4 without its encoder.
-    """
+    """Return the path if its suffix names a video format; raises InputError, or MissingExtraError for MP4 without its encoder."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"the name of a video must end in {' or '.join(SUFFIXES)}, got {path.name!r}")
     if path.suffix.lower() == ".mp4":
@@ -50,13 +45,7 @@ def check_frames(duration_s: float, frames_per_s: float) -> None:
 
 
 def write_video(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None:
-    """Write frames (height, width, 3) of equal size.
-
-    Raises:
-        InputError: the suffix of another format.
-        MissingExtraError: MP4 without its encoder.
-        OutputError: the file cannot be written.
-    """
+    """Write frames (height, width, 3) of equal size; raises OutputError, and as ``check_video_path``."""
     check_video_path(path)
     with replace_file(path) as temporary:
         (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frames, frames_per_s)
