@@ -75,17 +75,13 @@ class WalkingCycle:
         balance, shared = ([p for p in both if p.name.endswith(BALANCE) == own] for own in (True, False))
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
         limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
-        return (*self._speed_parameters(), *balance, *limit, *shared)
-
-    def _speed_parameters(self) -> tuple[Parameter, ...]:
-        if not self.at_given_speed:
-            return ()
         step = self.variables[-1]
-        return parameters(
+        speed = parameters(
             (SPEED, "m/s", self.body.scale_time(SPEED_M_S), "speed of walking", LEAST_SPEED, math.inf),
             (f"{STEP}.lower", "m", step.lower, "lower bound of the step length", -math.inf, math.inf),
             (f"{STEP}.upper", "m", step.upper, "upper bound of the step length", -math.inf, math.inf),
         )
+        return (*(speed if self.at_given_speed else ()), *balance, *limit, *shared)
 
     def add_step(self, at: Point) -> Point:
         """Return the point with the step length as a variable, also if it follows from the speed."""
@@ -107,7 +103,12 @@ class WalkingCycle:
         period, step = times["ssp"] + times["dsp"], ca.fmax(at[STEP], LEAST_STEP)
         energy = sum(found[name].indexes[f"{name}_power_W"] * times[name] for name in times)
         mean = sum(found[name].objective * times[name] for name in times) / period
-        jumps = self._jumps(samples["ssp"].torque, samples["dsp"].torque)
+        # Changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start.
+        (images, signs), single, double = self.body.mirror, samples["ssp"].torque, samples["dsp"].torque
+        jumps = {
+            "lift_off": DM(signs) * single[images, 0] - double[:, -1],
+            "touch_down": double[:, 0] - single[:, -1],
+        }
         return Assembly(
             objective=mean if self.at_given_speed else energy / step,
             constraints=(*(row for part in found.values() for row in part.constraints), *self._join(jumps, at)),
@@ -138,12 +139,6 @@ class WalkingCycle:
         """Both phases as functions of time."""
         parts = ((name, name, phase.duration, 1) for name, phase in self.phases.items())
         return list_rows_over_time(parts, self.phases, lambda name, at: self.add_step(at))
-
-    def _jumps(self, single: MX, double: MX) -> dict[str, MX]:
-        """Compute changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start."""
-        images, signs = self.body.mirror
-        touch_down, lift_off = double[:, 0] - single[:, -1], DM(signs) * single[images, 0] - double[:, -1]
-        return {"lift_off": lift_off, "touch_down": touch_down}
 
     def signals(self, at: Point) -> Signals:
         """Return time histories of the cycle at a point of numbers."""

@@ -10,10 +10,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
 
 import numpy as np
-from casadi import MX, SX, fmax
+from casadi import MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point, Signals
@@ -26,10 +25,10 @@ from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Planner
+from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.support_phases import compute_sole_means
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
-from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, make_phase_variables, make_pose_variables
+from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, Part, make_phase_variables, make_pose_variables
 from nlp_gait.gaits.several_steps import join_steps
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
@@ -43,17 +42,6 @@ LEAST_SHARE = 1 / 4
 LEAST_SLANT = 1e-2  # component of a side's normal along an axis, below which there is no distance to the side along it
 
 
-class FootstepPart(NamedTuple):
-    """A phase over the left foot."""
-
-    kind: str  # ``ssp``, ``dsp``, or ``stand`` with both feet side by side
-    step: int  # from 1, whose standing foot is the left one here
-    begin: str  # state
-    end: str
-    right: tuple[Foothold, Foothold]  # of the right foot at begin and end
-    duration: str  # variable
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FootstepWalk(WholeWalk):
     """A walk along footholds, sampled over all its phases."""
@@ -61,21 +49,21 @@ class FootstepWalk(WholeWalk):
     feet: tuple[Foothold, ...]  # right and left foot at the start, then where each step lands
 
     @cached_property
-    def parts(self) -> dict[str, Any]:
+    def parts(self) -> dict[str, Part]:
         """All phases in the order of time, between the poses in which the robot stands; of these only the limits count."""
         swings = list_swings(self.feet[2:], self.body.feet_y)
         first = (swings[0][0],) * 2
         found = {
-            STAND: FootstepPart(STAND, 1, STAND, STAND, first, SHIFT),
-            "shift": FootstepPart(STAND, 1, STAND, "step1_lift_off", first, SHIFT),
+            STAND: Part(STAND, STAND, STAND, first, SHIFT, 1),
+            "shift": Part(STAND, STAND, "step1_lift_off", first, SHIFT, 1),
         }
         for k, (lifted, landed) in enumerate(swings, 1):
             begin, middle = f"step{k}_lift_off", f"step{k}_touch_down"
             end = f"step{k + 1}_lift_off" if k < self.steps else STAND
             single, double = (f"step{k}_{time}" for time in TIMES.values())
             kind = STAND if np.allclose(landed, first[0], atol=BESIDE) else "dsp"
-            found[f"step{k}_ssp"] = FootstepPart("ssp", k, begin, middle, (lifted, landed), single)
-            found[f"step{k}_dsp"] = last = FootstepPart(kind, k, middle, end, (landed, landed), double)
+            found[f"step{k}_ssp"] = Part("ssp", begin, middle, (lifted, landed), single, k)
+            found[f"step{k}_dsp"] = last = Part(kind, middle, end, (landed, landed), double, k)
         return {**found, STAND_AT_END: last._replace(begin=STAND)}
 
     @property
@@ -113,21 +101,16 @@ class FootstepWalk(WholeWalk):
         part = self.parts[name]
         if part.kind != "dsp":
             return self.phases[part.kind]
-        return replace_margins(self.phases["dsp"], make_stance_margins(self.body, part.right[1]))
+        return replace_margins(self.phases["dsp"], make_stance_margins(self.body, part.feet[1]))
 
-    def read_part(self, name: str, at: NumericPoint) -> NumericPoint:
-        """Return the point of one phase: its own variables, of which ``RIGHT`` are the last, from those of the walk."""
-        part = self.parts[name]
-        lift = at[f"step{part.step}_{LIFT}"] if part.kind == "ssp" else 0.0
-        values = [value for state in (part.begin, part.end) for value in self._read_footstep_state(state, part, at)]
-        values += [lift, fmax(at[part.duration], LEAST_DURATION), *part.right[0], *part.right[1]]
-        return self.make_part_point(at, values)
+    def _place_right_foot(self, part: Part, at: NumericPoint) -> list[MX | float]:
+        return [*part.feet[0], *part.feet[1]]  # ``RIGHT``
 
-    def _read_footstep_state(self, state: str, part: FootstepPart, at: NumericPoint) -> list[MX | float]:
+    def _read_state(self, state: str, part: Part, at: NumericPoint) -> list[MX | float]:
         """Values of a state in the order of ``make_state_variables``, seen from the standing foot of a part."""
-        coordinates, right, y = self.body.coordinates, part.right[1], self.body.feet_y[0]
+        coordinates, right, y = self.body.coordinates, part.feet[1], self.body.feet_y[0]
         if state == STAND:  # between both feet, in the mean of their directions
-            _, _, height, *still = super()._read_state(STAND, at)
+            _, _, height, *still = super()._read_state(STAND, part, at)
             ahead, half = at[f"hip_x_{STAND}_m"], right.yaw / 2
             return [right.x / 2 + math.cos(half) * ahead, (right.y + y) / 2 + math.sin(half) * ahead, height, *still]
         names = [variable.name for variable in make_state_variables(self.body, state, "lift_off")]

@@ -36,7 +36,7 @@ def collect_parameters(phases: Mapping[str, Phase]) -> list[Parameter]:
 def assemble_part(name: str, kind: str, phase: Phase, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
     """Assemble one phase of a kind, with its name before those of its rows and indexes."""
     limits = {limit: at.positions[f"{kind}_{limit}"] for limit in BALANCE}  # a phase reads them under their plain names
-    part = phase.assemble(replace(at, positions={**at.positions, **limits}), samples, ops)
+    part = phase.assemble(replace(at, positions={**at.positions, **limits}), ops, samples)
     return Assembly(
         objective=part.objective,
         constraints=tuple(replace(row, name=f"{name}_{row.name}") for row in part.constraints),

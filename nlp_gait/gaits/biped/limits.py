@@ -240,15 +240,12 @@ class FootClearance(Limit):
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
         above = make_rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
-        halfway = self._halfway(at)
-        return (above, *make_halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])), {}
-
-    def _halfway(self, at: Point) -> MX:
-        """Evaluate the foot at half the phase, which is a sample only on some grids."""
+        # Half the phase is a sample only on some grids.
         names = [name for name, (kind, _) in at.positions.items() if kind == "x"]
         x = ca.SX.sym("x", len(names))
-        function = ca.Function("halfway", [x], [self._path(InstantPoint.of(x, ca.SX(0, 1), names, ()), ca.SX(0.5))])
-        return function(at.x)
+        path = self._path(InstantPoint.of(x, ca.SX(0, 1), names, ()), ca.SX(0.5))
+        halfway = ca.Function("halfway", [x], [path])(at.x)
+        return (above, *make_halfway_rows(halfway[0], self._middle, halfway[2], at[self._least_height])), {}
 
 
 def make_halfway_rows(

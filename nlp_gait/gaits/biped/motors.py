@@ -46,6 +46,11 @@ SUPPLY = Parameter(
 )
 
 
+def parse_features(text: str) -> tuple[str, ...]:
+    """Return the features that an option's text lists, separated by commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motors:
     """Features of real motors that a problem takes into account; raises UnknownNameError.
@@ -69,19 +74,6 @@ class Motors:
             raise InputError("motors: braking either draws nothing (free-braking) or gives power back (regeneration)")
         if self.features:
             self._ratings, self.model  # noqa: B018  refuse a robot without data now
-
-    @classmethod
-    def parse(
-        cls,
-        text: str,
-        robot: Robot,
-        joints: tuple[str, ...],
-        shared: tuple[str, ...] = (),
-        coupling: Limit | None = None,
-    ) -> Motors:
-        """Read the features from an option's text, separated by commas."""
-        features = tuple(part.strip() for part in text.split(",") if part.strip())
-        return cls(features=features, robot=robot, joints=joints, shared=shared, coupling=coupling)
 
     @cached_property
     def model(self) -> Robot:

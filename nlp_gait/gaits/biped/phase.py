@@ -61,8 +61,9 @@ class Phase:
         own = (self.goal.heat, *self.state, *(parameter for limit in self.limits for parameter in limit.parameters))
         return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
-    def assemble(self, at: Point, samples: Samples, ops: Nonsmooth) -> Assembly:
-        """Return the rows of all limits, the goal, and the indexes of both."""
+    def assemble(self, at: Point, ops: Nonsmooth, samples: Samples | None = None) -> Assembly:
+        """Return the rows of all limits, the goal, and the indexes of both; by default at all samples."""
+        samples = self.sample(at, ops) if samples is None else samples
         added = [limit.add(at, samples, ops) for limit in self.limits]
         value, before, after = self.goal.evaluate(at, samples, ops)
         indexes = {name: index for _, own in added for name, index in own.items()}
@@ -117,9 +118,9 @@ class Phase:
             power=power,
             zmp=zmp,
             miss=miss,
-            motion=tuple(moved),
             wrenches=dict(zip(BOTH_FEET, pushes, strict=False)),
             traces=dict(zip(traces, seen, strict=True)),
+            **dict(zip(("q", "qd", "qdd"), moved, strict=False)),
         )
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
@@ -131,7 +132,7 @@ class Phase:
             return ()
 
         def assemble(at: Point, phases: MX, ops: Nonsmooth) -> Assembly:
-            return self.assemble(at, self.sample(at, ops, phases), ops)
+            return self.assemble(at, ops, self.sample(at, ops, phases))
 
         def times(values: Mapping[str, float]) -> tuple[float, float]:
             start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)

@@ -12,14 +12,14 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Assembly, GaitProblem, NumericPoint, Point, SolverHints, Start, Variable
+from nlp_gait.formulation import Array, GaitProblem, NumericPoint, Point, SolverHints, Start, Variable
 from nlp_gait.formulation.display import Display, SimulationModel, Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.nonsmooth import Exact
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
 DRAWS = 50  # of a start point, at most
@@ -64,10 +64,6 @@ def make_phase_problem(
 
     Without ``start`` any point within the bounds is a start point; only gradient methods solve a problem that is not searchable.
     """
-
-    def assemble(at: Point, ops: Nonsmooth) -> Assembly:
-        return phase.assemble(at, phase.sample(at, ops), ops)
-
     body = phase.body
     if not body.closed_form:
         usual = [body.narrow(variable) for variable in phase.variables]
@@ -78,7 +74,7 @@ def make_phase_problem(
         variables=phase.variables,
         own_parameters=phase.parameters,
         objective=phase.goal.objective,
-        assemble=assemble,
+        assemble=phase.assemble,
         grid=phase.grid,
         rows_over_time=phase.rows_over_time() if body.closed_form else (),
         display=Display(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from casadi import DM, MX, SX
+from casadi import DM, MX
 
-from nlp_gait.formulation import Array, Constraint, GaitProblem, Grid, InstantPoint, Parameter, Point, Result, Signals
+from nlp_gait.formulation import Array, Constraint, GaitProblem, Grid, Parameter, Point, Result, Signals
 from nlp_gait.formulation.assembly import NumericPoint, RowsOverTime, Variable
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
@@ -23,7 +23,7 @@ from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, RecordedMotion, make_instant_function
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Instant, Loader, Planner, Samples
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
 from nlp_gait.gaits.biped.support_phases import (
     limit_to_box,
     limit_to_sole,
@@ -35,16 +35,12 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 MOVES = 1e-9  # [rad]; a joint that turns by less is held
 
 
-def _refuse_plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
-    raise NotImplementedError("a recorded phase has no plan")
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedPhase(Phase):
     """A phase whose angles over time are given, so that it has no plan."""
 
     recorded: RecordedMotion  # the motion, of the same joints
-    plan: Planner = _refuse_plan
+    plan: Planner = field(init=False, default=None)  # type: ignore[assignment]
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -76,7 +72,9 @@ class RecordedPhase(Phase):
             torque=torque,
             power=qd[rows_of, :] * torque[rows_of, :],
             zmp=zmp,
-            motion=(q[rows_of, :], qd[rows_of, :], qdd[rows_of, :]),
+            q=q[rows_of, :],
+            qd=qd[rows_of, :],
+            qdd=qdd[rows_of, :],
             traces={
                 "hip": hip,
                 "hip_rate": hip_rate,
@@ -152,16 +150,11 @@ class HipLimits(Limit):
             values |= {f"v{axis}": rate[k, end] for k, axis in enumerate("xyz")}
             for key, variable in limits.items():
                 low, high = at[f"{variable.name}.lower"], at[f"{variable.name}.upper"]
-                found.append(
-                    Constraint(
-                        name=f"hip_{key}_{label}",
-                        unit=variable.unit,
-                        scale=variable.upper - variable.lower,  # as a bound of the variable itself
-                        value=values[key],
-                        lower=low,
-                        upper=high,
-                    )
+                scale = variable.upper - variable.lower  # as a bound of the variable itself
+                row = Constraint(
+                    name=f"hip_{key}_{label}", unit=variable.unit, scale=scale, value=values[key], lower=low, upper=high
                 )
+                found.append(row)
         return found, {}
 
 
@@ -300,11 +293,11 @@ class RecordedCycles:
         body, margins = self.body, make_cycle_margins(self.body)
         known = {variable.name: variable for variable in make_cycle_variables(body)}
         variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
+        places = [{axis: known[f"hip_{axis}_{switch}_m"] for axis in "xz"} for switch in SWITCHES]
+        rates = [{f"v{axis}": known[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"} for switch in SWITCHES]
+        hip = HipLimits([place | rate for place, rate in zip(places, rates, strict=True)], SWITCHES)
         own: dict[PhaseName, tuple[Limit, ...]] = {
-            "ssp": (
-                HipLimits([_hip_ranges(known, switch) for switch in SWITCHES], SWITCHES),
-                SwingLimits(motions["ssp"], known[LIFT]),
-            ),
+            "ssp": (hip, SwingLimits(motions["ssp"], known[LIFT])),
             "dsp": (StandingLimits(),),
         }
         phases: dict[str, Phase] = {
@@ -327,9 +320,3 @@ class RecordedCycles:
     @cached_property
     def _loads(self) -> dict[PhaseName, Loader]:
         return make_recorded_loads(self.body, "lever")
-
-
-def _hip_ranges(known: Mapping[str, Variable], switch: str) -> dict[str, Variable]:
-    """Variables whose ranges limit the hip at a switch."""
-    places = {axis: known[f"hip_{axis}_{switch}_m"] for axis in "xz"}
-    return places | {f"v{axis}": known[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"}

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import Assembly, Display, GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
+from nlp_gait.formulation import Display, GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
 from nlp_gait.formulation.assembly import Variable
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
@@ -195,9 +195,6 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         state=_list_state(body, name),
     )
 
-    def assemble(at: Point, ops: Nonsmooth) -> Assembly:
-        return phase.assemble(at, phase.sample(at, ops), ops)
-
     planned = tuple(
         Parameter(name=f"{each}.planned", unit=unit, default=0.0, description="planned value")
         for each, unit in (
@@ -213,7 +210,7 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         variables=phase.variables,
         own_parameters=(*planned, *phase.parameters),
         objective=phase.goal.objective,
-        assemble=assemble,
+        assemble=phase.assemble,
         grid=phase.grid,
         display=Display(at_time=phase.at_time, durations=(phase.duration,)),
     )

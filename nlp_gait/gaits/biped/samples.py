@@ -57,27 +57,14 @@ class Samples:
     torque: MX  # (J, N + 1) [Nm]
     power: MX  # (m, N + 1) mechanical power of the joints that move [W], signed
     zmp: MX  # (2, N + 1) in the world [m]
-    # Angles of the joints that move and both derivatives, (m, N + 1) each; empty unless a limit or the goal reads them
-    motion: tuple[MX, ...]
     traces: Mapping[str, MX]  # quantities that limits requested, by name
     # (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty unless a limit reads them
     wrenches: Mapping[str, MX] = field(default_factory=dict)
     miss: MX = MX(0, 1)  # (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
-
-    @property
-    def q(self) -> MX:
-        """Angles [rad]."""
-        return self.motion[0]
-
-    @property
-    def qd(self) -> MX:
-        """Rates [rad/s]."""
-        return self.motion[1]
-
-    @property
-    def qdd(self) -> MX:
-        """Accelerations [rad/s^2]."""
-        return self.motion[2]
+    # Angles of the joints that move and both derivatives, (m, N + 1) each; empty unless a limit or the goal reads them
+    q: MX = MX(0, 1)
+    qd: MX = MX(0, 1)
+    qdd: MX = MX(0, 1)
 
     @property
     def steps(self) -> int:

@@ -166,20 +166,18 @@ class WholeWalk:
 
     def read_part(self, name: str, at: NumericPoint) -> NumericPoint:
         """Return the point of one phase: its own variables, see ``make_phase_variables``, from those of the walk."""
-        part, step = PARTS[name], at[STEP]
-        lift = at[part.lift] if part.kind == "ssp" else 0.0
-        values = [*self._read_state(part.begin, at), *self._read_state(part.end, at), lift]
-        values += [ca.fmax(at[part.duration], LEAST_DURATION), part.feet[0] * step, part.feet[1] * step]
-        return self.make_part_point(at, values)
+        part = self.parts[name]
+        values = [value for state in (part.begin, part.end) for value in self._read_state(state, part, at)]
+        values += [at[part.lift] if part.kind == "ssp" else 0.0, ca.fmax(at[part.duration], LEAST_DURATION)]
+        x = ca.vertcat(*values, *self._place_right_foot(part, at))
+        parameters = {name: place for name, place in at.positions.items() if place[0] == "p"}
+        return replace(at, x=x, positions=parameters | {n: ("x", i) for i, n in enumerate(self.phases["ssp"].names)})
 
-    def make_part_point(self, at: NumericPoint, values: Sequence[MX | float]) -> NumericPoint:
-        """Return the point of a phase from the values of its variables."""
-        own = replace(at, x=ca.vertcat(*values), positions={n: p for n, p in at.positions.items() if p[0] == "p"})
-        return replace(
-            own, positions={**own.positions, **{n: ("x", i) for i, n in enumerate(self.phases["ssp"].names)}}
-        )
+    def _place_right_foot(self, part: Part, at: NumericPoint) -> list[MX | float]:
+        step = at[STEP]
+        return [share * step for share in part.feet]
 
-    def _read_state(self, state: str, at: NumericPoint) -> list[MX]:
+    def _read_state(self, state: str, part: Part, at: NumericPoint) -> list[MX | float]:
         """Values of a state in the order of ``make_state_variables``."""
         coordinates = self.body.coordinates
         if state == STAND:

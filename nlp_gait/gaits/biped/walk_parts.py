@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,8 +33,9 @@ class Part(NamedTuple):
     kind: str  # ``ssp``, ``dsp`` with a foot ahead, or ``stand`` with both feet side by side
     begin: str  # state at its begin
     end: str
-    feet: tuple[int, int]  # places of the right foot at begin and end, in step lengths
+    feet: tuple[Any, Any]  # places of the right foot at begin and end, in step lengths; or its footholds
     duration: str  # variable
+    step: int = 0  # of a walk along footholds: from 1, whose standing foot is the left one here
 
     @property
     def lift(self) -> str:

@@ -17,7 +17,7 @@ from nlp_gait.formulation.assembly import variables
 from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
-from nlp_gait.gaits.biped.motors import Motors
+from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.support_phases import make_nearest_edge_margins
 from nlp_gait.gaits.humanoid.swing_time import GRAVITY, NAO_SWING_S, STEP_M, compare_swing
@@ -150,7 +150,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         title=biped.full.name,
         full=biped.full,
         simulated=biped.model,
-        motors=Motors.parse(motors, biped.model, biped.joints),
+        motors=Motors(features=parse_features(motors), robot=biped.model, joints=biped.joints),
         joints=biped.joints,
         planned=biped.joints,
         images=tuple(biped.images[joint] for joint in biped.joints),

@@ -15,7 +15,7 @@ from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, mak
 from nlp_gait.gaits.biped import skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
-from nlp_gait.gaits.biped.motors import Motors
+from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao.joints import (
     ARM_JOINTS,
@@ -140,7 +140,8 @@ def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
 
 def parse_nao_motors(text: str, robot: Robot) -> Motors:
     """Return the features of NAO's motors that an option's text lists."""
-    return Motors.parse(text, robot, JOINTS, YAW_PITCHES, AnkleCoupling())
+    features, coupling = parse_features(text), AnkleCoupling()
+    return Motors(features=features, robot=robot, joints=JOINTS, shared=YAW_PITCHES, coupling=coupling)
 
 
 class AnkleCoupling(Limit):

@@ -128,7 +128,9 @@ class FreePhase(Phase):
             torque=torque,
             power=ca.vertcat(*(qd[name] * torque[JOINTS.index(name), :] for name in MOVING)),
             zmp=zmp,
-            motion=tuple(ca.vertcat(*part.values()) for part in (q, qd, qdd)),
+            q=ca.vertcat(*q.values()),
+            qd=ca.vertcat(*qd.values()),
+            qdd=ca.vertcat(*qdd.values()),
             traces={
                 "others": ca.vertcat(*(q[name] for name in OTHERS)),
                 "along": along,

@@ -40,7 +40,9 @@ SAMPLES = Samples(
     torque=MX(DM(TORQUE)),
     power=MX(DM(POWER)),
     zmp=MX(2, COUNT),
-    motion=(MX(DM(Q)), MX(DM(QD)), MX(DM(QD))),
+    q=MX(DM(Q)),
+    qd=MX(DM(QD)),
+    qdd=MX(DM(QD)),
     traces={},
 )
 
@@ -150,7 +152,7 @@ def test_features() -> None:
     heavy = parse_nao_motors("rotor", ROBOT)
     assert heavy.limits == () and heavy.power is None and heavy.model.armatures_kgm2.keys() == set(JOINTS)
     with pytest.raises(UnknownNameError, match="feature in motors 'ankle'"):
-        Motors.parse("ankle", ROBOT, JOINTS)
+        Motors(features=("ankle",), robot=ROBOT, joints=JOINTS)
     with pytest.raises(UnknownNameError, match="did you mean 'ankle'"):
         parse_nao_motors("ankles", ROBOT)
     with pytest.raises(InputError, match="either draws nothing"):
@@ -159,14 +161,16 @@ def test_features() -> None:
 
 def test_joints_that_share_a_motor() -> None:
     torque: Any = MX(DM(TORQUE))
-    assert Motors.parse("heat", ROBOT, JOINTS).sum_by_motor(torque) is torque
-    shared = np.array(ca.evalf(Motors.parse("heat", ROBOT, JOINTS, YAW_PITCHES).sum_by_motor(torque)))
+    assert Motors(features=("heat",), robot=ROBOT, joints=JOINTS).sum_by_motor(torque) is torque
+    shared = np.array(
+        ca.evalf(Motors(features=("heat",), robot=ROBOT, joints=JOINTS, shared=YAW_PITCHES).sum_by_motor(torque))
+    )
     np.testing.assert_allclose(np.delete(shared, JOINTS.index("RHipYawPitch"), axis=0), at_motors(), rtol=1e-15)
     assert not shared[JOINTS.index("RHipYawPitch")].any()
     inertia = {
         name: motors.model.armatures_kgm2["LHipYawPitch"]
         for name, motors in (
-            ("one each", Motors.parse("rotor", ROBOT, JOINTS)),
+            ("one each", Motors(features=("rotor",), robot=ROBOT, joints=JOINTS)),
             ("one for two", parse_nao_motors("rotor", ROBOT)),
         )
     }
