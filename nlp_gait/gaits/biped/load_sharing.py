@@ -67,17 +67,13 @@ def torso_shares(
 
 
 class LoadSharing:
-    """Load that a rule of the paper divides, see ``torso_shares``: each leg stands on its own foot and carries part of the torso.
-
-    Variables and limits are added to those of the motion; ``loads`` gives the torques of each half from its own foot, and the
-    combined ZMP of both feet.
-    """
+    """Load that follows from the motion; a subclass has variables and limits of its own, which are added to the motion's."""
 
     variables: tuple[Variable, ...] = ()
     limits: tuple[Limit, ...] = ()
 
-    def __init__(self, body: Body, rule: Division) -> None:
-        self.loads = make_divided_loads(body, rule)
+    def __init__(self, loads: Loader) -> None:
+        self.loads = loads
 
     def add_to(self, plan: Planner) -> Planner:
         """Return a plan with the load's own part."""
@@ -90,7 +86,7 @@ class LoadSharing:
 
 def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadSharing:
     """Return how the feet share the load: by a rule, see ``torso_shares``, or ``"free"``, see ``PlannedLoad``."""
-    return PlannedLoad(body, degree) if rule == "free" else LoadSharing(body, rule)
+    return PlannedLoad(body, degree) if rule == "free" else LoadSharing(make_divided_loads(body, rule))
 
 
 class PlannedLoad(LoadSharing):
@@ -104,13 +100,10 @@ class PlannedLoad(LoadSharing):
             raise InputError(f"load_degree must be within [1, {LARGEST_DEGREE}], got {degree}")
         self._degree, self._weight = degree, body.weight
         self._count = degree + 1 + RAMPS  # coefficients of each component
-        self.variables = self._coefficients(body.robot.feet["right"])
         self.loads = make_planned_loads(body)
         self.limits = (FootLimits(body, self.load_slope),)
-
-    def _coefficients(self, foot: Foot) -> tuple[Variable, ...]:
-        """Component by component, with wide bounds: coefficients may lie beyond what the curve reaches."""
-        weight = self._weight
+        # Component by component, with wide bounds: coefficients may lie beyond what the curve reaches.
+        weight, foot = self._weight, body.robot.feet["right"]
         along, across = max(foot.front_m, foot.back_m), max(foot.left_m, foot.right_m)
         most = dict(zip(COMPONENTS, (0.5, 0.5, 2.0, across, along, across), strict=True))
         rows: list[tuple[str, str, float, float, str]] = []
@@ -120,7 +113,7 @@ class PlannedLoad(LoadSharing):
             lower = -weight if component == "force_z" else -upper
             for k in range(self._count):
                 rows.append((f"right_{component}_{unit}[{k}]", unit, lower, upper, f"coefficient {k} {text}"))
-        return variables(*rows)
+        self.variables = variables(*rows)
 
     def add_to(self, plan: Planner) -> Planner:
         names = [variable.name for variable in self.variables]

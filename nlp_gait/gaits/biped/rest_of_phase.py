@@ -27,7 +27,7 @@ from nlp_gait.formulation.assembly import Variable
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.biped.support_phases import make_single_support_loads
@@ -188,7 +188,7 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         variables=_list_variables(body, name),
         duration=TIMES[name],
         plan=plan,
-        loads=make_single_support_loads(body) if swings else LoadSharing(body, "lever").loads,
+        loads=make_single_support_loads(body) if swings else make_divided_loads(body, "lever"),
         grid=Grid(intervals=INTERVALS, samples_per_interval=1, refined_by="samples_per_interval"),
         limits=(SoftReach(body), ZmpPolygon(TIMES[name], swings=swings)),
         goal=PlannedEnd(objective=Objective(name="deviation", unit="1"), time=TIMES[name], swings=swings),

@@ -5,17 +5,17 @@ Phases of sections 3 and 4 of Gupta, Pratihar, Deb (2023), with the margins of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import casadi as ca
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State, read_duration
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, Splines, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Margins
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Limit, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
@@ -164,7 +164,6 @@ def make_single_support_phase(
 ) -> Phase:
     """Return the phase from rest behind the standing foot to rest in front of it, with feet ``step_m`` apart."""
     stance = place_stance(body, step_m)
-    hip, measured = body.split_hip(splines, stance.hip_x, stance.hip_y)
     left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
 
     def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
@@ -173,36 +172,21 @@ def make_single_support_phase(
         paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
         return add_motions(paper, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
 
-    def state(at: InstantPoint, s: SX) -> State:
-        time = read_duration(at, "ssp")
-        more = splines.motions(at, time, s)
-        hip = hip_on_spline(at, more, stance.hip_x, stance.hip_y, time, s, splines.is_measured)
-        return hip, body.angles("ssp", at, more, time, s), {"L": left, "R": swing(at, more, right_height, s)}
-
-    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
-        return body.plan(*state(at, s), at[REACH_MARGIN], ops)
-
     def sole(at: InstantPoint, s: SX) -> SX:
         return swing(at, splines.motions(at, read_duration(at, "ssp"), s), 0.0, s).position
 
-    others = (body.lift_variable, body.make_time_variable("ssp"), *splines.variables)
-    return Phase(
-        body=body,
-        variables=(*hip, *body.angle_variables, *others),
-        duration=TIMES["ssp"],
-        plan=plan,
-        loads=make_single_support_loads(body),
-        grid=grid,
-        derivatives=derivatives,
-        limits=(
-            *make_phase_limits(body, limit_to_sole(body, stance.support_xy)),
-            *((FootClearance(sole, step_m, LIFT),) if splines.count else ()),
-            *body.make_curve_limits("ssp", splines.count, state),
-            *body.motors.limits,
-        ),
-        goal=goal,
-        state=measured,
-        kinks=splines.kinks,
+    return _make_support_phase(
+        body,
+        "ssp",
+        splines,
+        (stance.hip_x, stance.hip_y),
+        lambda at, more, s: {"L": left, "R": swing(at, more, right_height, s)},
+        limit_to_sole(body, stance.support_xy),
+        (FootClearance(sole, step_m, LIFT),) if splines.count else (),
+        LoadSharing(make_single_support_loads(body)),
+        grid,
+        goal,
+        derivatives,
     )
 
 
@@ -217,34 +201,50 @@ def make_double_support_phase(
 ) -> Phase:
     """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
     soles = place_soles(body, step_m)
-    ends = hip_ends(body, soles)
-    hip, measured = body.split_hip(splines, *ends)
     ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
+    balance, ends = limit_to_box(make_support_box(body.robot, soles)), hip_ends(body, soles)
+    return _make_support_phase(
+        body, "dsp", splines, ends, lambda at, more, s: ankles, balance, (), sharing, grid, goal, derivatives
+    )
+
+
+def _make_support_phase(
+    body: Body,
+    name: PhaseName,
+    splines: Splines,
+    hip_places: tuple[Point2, Point2],
+    ankles: Callable[[InstantPoint, Mapping[str, Motion], SX], Mapping[str, Motion]],
+    balance: BalanceMargins,
+    clearance: tuple[Limit, ...],
+    sharing: LoadSharing,
+    grid: Grid,
+    goal: Goal,
+    derivatives: Derivatives,
+) -> Phase:
+    """Return a phase from places of the hip, along and across, and the motion of the ankles with what the curves add."""
+    hip, measured = body.split_hip(splines, *hip_places)
+    lift = (body.lift_variable,) if name == "ssp" else ()
 
     def state(at: InstantPoint, s: SX) -> State:
-        time = read_duration(at, "dsp")
+        time = read_duration(at, name)
         more = splines.motions(at, time, s)
-        hip = hip_on_spline(at, more, *ends, time, s, splines.is_measured)
-        return hip, body.angles("dsp", at, more, time, s), ankles
+        hip = hip_on_spline(at, more, *hip_places, time, s, splines.is_measured)
+        return hip, body.angles(name, at, more, time, s), ankles(at, more, s)
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
 
-    others = (body.make_time_variable("dsp"), *splines.variables, *sharing.variables)
+    own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
+    curve_limits = body.make_curve_limits(name, splines.count, state)
     return Phase(
         body=body,
-        variables=(*hip, *body.angle_variables, *others),
-        duration=TIMES["dsp"],
+        variables=(*hip, *body.angle_variables, *own),
+        duration=TIMES[name],
         plan=sharing.add_to(plan),
         loads=sharing.loads,
         grid=grid,
         derivatives=derivatives,
-        limits=(
-            *make_phase_limits(body, limit_to_box(make_support_box(body.robot, soles))),
-            *body.make_curve_limits("dsp", splines.count, state),
-            *body.motors.limits,
-            *sharing.limits,
-        ),
+        limits=(*make_phase_limits(body, balance), *clearance, *curve_limits, *body.motors.limits, *sharing.limits),
         goal=goal,
         state=measured,
         kinks=splines.kinks,

@@ -68,10 +68,8 @@ def nao_ssp(
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
     power_form = None
     if (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS and samples_per_interval < 2:
-        stance = place_stance(body, step_length_m)
-        power_form = power_form_maker(
-            body.robot, partial(single_support_instants, body.robot, *stance, ARM_SWING["ssp"])
-        )
+        places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
+        power_form = power_form_maker(body.robot, partial(single_support_instants, *places))
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
     problem = plan_single_support(body, step_length_m, grid, trajectory, goal, derivatives)
     return replace(problem, power_form=power_form)

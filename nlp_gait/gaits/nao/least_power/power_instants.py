@@ -14,7 +14,7 @@ import casadi as ca
 from casadi import DM, SX
 
 from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
-from nlp_gait.gaits.biped.support_phases import Point2, make_support_box, swing_foot
+from nlp_gait.gaits.biped.support_phases import Point2, Stance, make_support_box, swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power import world_frame
@@ -187,29 +187,19 @@ def double_support_instants(
     return PowerPhase(instant, sides, {axis: _nearer_margin(*pair) for axis, pair in zip("xy", sides, strict=True)})
 
 
-def single_support_instants(
-    robot: Robot,
-    support_xy: Point2,
-    swing_x: Point2,
-    swing_y: float,
-    hip_x: Point2,
-    hip_y: Point2,
-    arm_swing: Mapping[str, Point2],
-    cosine: float,
-) -> PowerPhase:
+def single_support_instants(robot: Robot, stance: Stance, arm_swing: Mapping[str, Point2], cosine: float) -> PowerPhase:
     """Return single support: the left leg carries everything.
 
-    The left ankle stands at ``support_xy``; the right one and the torso's origin move from place to place [m], arm joints from
-    angle to angle [rad]. For the largest cosine of the knee's angle see ``leg_frames``.
+    Arm joints move from angle to angle [rad]. For the largest cosine of the knee's angle see ``leg_frames``.
     """
     foot, weight = robot.feet["left"], robot.mass_kg * GRAVITY
-    support = SX(DM([*support_xy, foot.ankle_height_m]))
+    support = SX(DM([*stance.support_xy, foot.ankle_height_m]))
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip, arms = _hip(z, hip_x, hip_y, phase), arm_joints(arm_swing, ONE, SX(phase))
+        hip, arms = _hip(z, stance.hip_x, stance.hip_y, phase), arm_joints(arm_swing, ONE, SX(phase))
         found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
-        begin, end = (SX(x) for x in swing_x)
-        path = swing_foot(begin, end, swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
+        begin, end = (SX(x) for x in stance.swing_x)
+        path = swing_foot(begin, end, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
         upper = found.link_wrench(robot.root, world_frame.upright(hip))
         for side in "LR":
             upper = upper + found.add_arm(side, arms, hip.acceleration)
@@ -218,7 +208,7 @@ def single_support_instants(
         found.zmp = support[:2] + _tilt(ground, foot.ankle_height_m) / ground_load(ground, weight)
         return found
 
-    x, y = support_xy
+    x, y = stance.support_xy
     sides = ((x - foot.back_m, x + foot.front_m), (y - foot.right_m, y + foot.left_m))
     return PowerPhase(instant, sides, {"x": _ankle_side_margin(x, *sides[0]), "y": _nearer_margin(*sides[1])})
 
