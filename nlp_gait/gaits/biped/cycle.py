@@ -105,10 +105,7 @@ class WalkingCycle:
         mean = sum(found[name].objective * times[name] for name in times) / period
         # Changes of torques (J, 1) at the switches [Nm]; lift-off leads to the mirror image of the cycle's start.
         (images, signs), single, double = self.body.mirror, samples["ssp"].torque, samples["dsp"].torque
-        jumps = {
-            "lift_off": DM(signs) * single[images, 0] - double[:, -1],
-            "touch_down": double[:, 0] - single[:, -1],
-        }
+        jumps = {"lift_off": DM(signs) * single[images, 0] - double[:, -1], "touch_down": double[:, 0] - single[:, -1]}
         return Assembly(
             objective=mean if self.at_given_speed else energy / step,
             constraints=(*(row for part in found.values() for row in part.constraints), *self._join(jumps, at)),

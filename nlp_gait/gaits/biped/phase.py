@@ -341,13 +341,7 @@ class Phase:
         hip, world = SX.sym("hip", 3), SX.sym("world", sum(sizes))
         _, left, right, wrench, yaw = ca.vertsplit(world, np.cumsum([0, *sizes]).tolist())
         moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
-        now = Instant(
-            joints={**plan.joints, **moved},
-            hip=hip,
-            ankles={"L": left, "R": right},
-            wrench=wrench,
-            yaw=yaw,
-        )
+        now = Instant(joints={**plan.joints, **moved}, hip=hip, ankles={"L": left, "R": right}, wrench=wrench, yaw=yaw)
         return [*parts, hip, world], self.loads(now)
 
     def _map(self, function: ca.Function, ats: Sequence[Point], *columns: MX, phases: MX | None = None) -> list[Any]:

@@ -24,12 +24,7 @@ from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, RecordedMotion, make_instant_function
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
-from nlp_gait.gaits.biped.support_phases import (
-    limit_to_box,
-    limit_to_sole,
-    make_single_support_loads,
-    make_support_box,
-)
+from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 MOVES = 1e-9  # [rad]; a joint that turns by less is held

@@ -22,13 +22,7 @@ from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter,
 from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
-from nlp_gait.gaits.biped.cycle_motion import (
-    STEP,
-    PhaseMotion,
-    make_planner,
-    make_state_variables,
-    read_state,
-)
+from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, make_state_variables, read_state
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import (
@@ -278,9 +272,7 @@ def plan_whole_walk(
 
 
 def make_walk_problem(
-    walk: WholeWalk,
-    started: Sequence[Variable],
-    ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
+    walk: WholeWalk, started: Sequence[Variable], ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None
 ) -> GaitProblem:
     """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
     body = walk.body
