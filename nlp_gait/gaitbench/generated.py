@@ -206,9 +206,5 @@ def draw_box(problem: GaitProblem, id: str) -> AffineMap:
     place = extent / width + share * (1 - 2 * extent / width)
     mirror = np.array([draw.sign(f"mirror {name}") for name in names])
     matrix = problem.scale[:, None] * rotation * (width * mirror)
-    return AffineMap(
-        matrix=matrix,
-        offset=problem.lower + problem.scale * centre - matrix @ place,
-        lower=np.zeros(n),
-        upper=np.ones(n),
-    )
+    offset = problem.lower + problem.scale * centre - matrix @ place
+    return AffineMap(matrix=matrix, offset=offset, lower=np.zeros(n), upper=np.ones(n))

@@ -69,14 +69,8 @@ def mjcf_record(path: str) -> dict[str, Any]:
             "velocity_limit_rad_s": UNLIMITED_RAD_S,
             "torque_limit_Nm": _torque_limit(model, joint),
         }
-    return {
-        "schema": 1,
-        "name": Path(path).stem,
-        "description": f"from {Path(path).name}",
-        "root": names[root],
-        "links": links,
-        "joints": joints,
-    }
+    about = {"schema": 1, "name": Path(path).stem, "description": f"from {Path(path).name}"}
+    return {**about, "root": names[root], "links": links, "joints": joints}
 
 
 def _report_ignored(path: str, model: Any) -> None:

@@ -182,12 +182,8 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
         joint = remaining.pop(name)
         child = _read_mass(links.pop(joint.child)).move(np.array(joint.origin_m))
         total = combine_masses([_read_mass(links[joint.parent]), child])
-        links[joint.parent] = replace(
-            links[joint.parent],
-            mass_kg=total.mass_kg,
-            com_m=_vector(total.com_m),
-            inertia_com_kgm2=inertia_moments(total.tensor_kgm2),
-        )
+        com, tensor = _vector(total.com_m), inertia_moments(total.tensor_kgm2)
+        links[joint.parent] = replace(links[joint.parent], mass_kg=total.mass_kg, com_m=com, inertia_com_kgm2=tensor)
         for other in [j for j in remaining.values() if j.parent == joint.child]:
             remaining[other.name] = replace(other, parent=joint.parent, origin_m=plus(joint.origin_m, other.origin_m))
     return replace(robot, links=links, joints=remaining)

@@ -60,13 +60,12 @@ class Splines:
     def variables(self) -> tuple[Variable, ...]:
         """Coefficients, curve by curve."""
         bounds = BOUNDS | {"m": BOUNDS["m"] * self.length_scale}
-        return variables(
-            *(
-                (f"{curve}_{unit}[{k}]", unit, -bounds[unit], bounds[unit], f"coefficient {k} of the spline on {curve}")
-                for curve, unit in self.units.items()
-                for k in range(self.count)
-            )
+        rows = (
+            (f"{curve}_{unit}[{k}]", unit, -bounds[unit], bounds[unit], f"coefficient {k} of the spline on {curve}")
+            for curve, unit in self.units.items()
+            for k in range(self.count)
         )
+        return variables(*rows)
 
     def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
         """Return what each curve adds to its cubic."""

@@ -80,14 +80,11 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     for c in body.coordinates:
         table.append((c.name, "rad", *c.bounds, c.words))
         table.append((c.rate, "rad/s", -c.largest_rate, c.largest_rate, c.rate_words))
-    return list(
-        variables(
-            *(
-                (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {at}")
-                for what, unit, lower, upper, words in table
-            )
-        )
+    rows = (
+        (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {at}")
+        for what, unit, lower, upper, words in table
     )
+    return list(variables(*rows))
 
 
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:

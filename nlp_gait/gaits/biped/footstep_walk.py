@@ -78,14 +78,13 @@ class FootstepWalk(WholeWalk):
     @property
     def speed_limits(self) -> tuple[Parameter, ...]:
         """Parameters of each inner step's speed."""
-        ends = ("least", 0.0), ("greatest", NO_LIMIT)
-        return parameters(
-            *(
-                (name_speed(end, k), "m/s", limit, f"{end} speed of step {k}", 0.0, NO_LIMIT)
-                for end, limit in ends
-                for k in range(2, self.steps)
-            )
+        steps = [
+            (end, limit, k) for end, limit in (("least", 0.0), ("greatest", NO_LIMIT)) for k in range(2, self.steps)
+        ]
+        rows = (
+            (name_speed(end, k), "m/s", limit, f"{end} speed of step {k}", 0.0, NO_LIMIT) for end, limit, k in steps
         )
+        return parameters(*rows)
 
     def limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
         """Return the rows of the inner steps: what both feet advance on average in a swing and the double support after it."""
@@ -120,14 +119,8 @@ class FootstepWalk(WholeWalk):
         hip_x, hip_y, z, vx, vy, vz, *angles = values  # the mirror image, seen from the foot that has landed
         images = [c.image for c in coordinates for _ in range(2)]
         (place_x, place_y), velocity = right.turn(hip_x, y - hip_y), right.turn(vx, -vy)
-        return [
-            right.x + place_x,
-            right.y + place_y,
-            z,
-            *velocity,
-            vz,
-            *(i * a for i, a in zip(images, angles, strict=True)),
-        ]
+        mirrored = (i * a for i, a in zip(images, angles, strict=True))
+        return [right.x + place_x, right.y + place_y, z, *velocity, vz, *mirrored]
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories of the whole walk at a point of numbers."""

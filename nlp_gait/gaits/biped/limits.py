@@ -58,16 +58,8 @@ def make_rows(
     size: float = 1.0,
 ) -> Constraint:
     """Make rows with the scale of their unit; ``size`` is that of the robot's quantity relative to NAO's."""
-    return Constraint(
-        name=name,
-        labels=tuple(labels),
-        unit=unit,
-        scale=size * SCALES[unit],
-        value=value,
-        lower=lower,
-        upper=upper,
-        over=over,
-    )
+    own, scale = tuple(labels), size * SCALES[unit]
+    return Constraint(name=name, labels=own, unit=unit, scale=scale, value=value, lower=lower, upper=upper, over=over)
 
 
 def make_rows_at_samples(

@@ -23,7 +23,7 @@ import casadi as ca
 from casadi import MX, SX
 
 from nlp_gait.formulation import Display, GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
-from nlp_gait.formulation.assembly import Variable
+from nlp_gait.formulation.assembly import Variable, variables
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.goals import Goal
@@ -44,16 +44,8 @@ HIP_PLACES = tuple(f"hip_{axis}_end_m" for axis in "xyz")
 HIP_RATES = tuple(f"hip_v{axis}_end_m_s" for axis in "xyz")
 # Distances from the planned end that cost 1: of the hip's place and velocity, of both along z, of the time, the foothold, and the
 # DCM from what the foothold makes up for; and the shift of the ZMP.
-UNITS = {
-    "place": 0.01,
-    "velocity": 0.06,
-    "height": 0.01,
-    "rise": 0.02,
-    "time": 0.1,
-    "foot": 0.3,
-    "miss": 0.03,
-    "shift": 0.2,
-}
+UNITS = {"place": 0.01, "velocity": 0.06, "height": 0.01, "rise": 0.02, "time": 0.1}
+UNITS |= {"foot": 0.3, "miss": 0.03, "shift": 0.2}
 # A ZMP outside its polygon costs OUTSIDE_COST for each of these units.
 OUTSIDE_UNIT, OUTSIDE_COST, BEYOND_COST = 0.001, 10.0, 3000.0
 
@@ -219,28 +211,22 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
 def _list_variables(body: Body, name: PhaseName) -> tuple[Variable, ...]:
     low, high = body.hip_height_m
     left_y, most = body.feet_y[0], body.leg_length_m
-    rows = [
+    foot = (
+        ("foot_x_end_m", "m", -0.6 * most, 0.7 * most, "where the foot lands ahead"),
+        ("foot_y_end_m", "m", left_y - 0.8 * most, left_y - 0.4 * most, "where the foot lands across"),
+    )
+    rows: list[tuple[str, str, float, float, str]] = [
         ("hip_x_end_m", "m", -most, most, "the hip's x at the end"),
         ("hip_y_end_m", "m", -most, most, "the hip's y at the end"),
         ("hip_z_end_m", "m", low, high, "the hip's height at the end"),
         *((rate, "m/s", -1.0, 1.0, "the hip's velocity at the end") for rate in HIP_RATES),
-        *(
-            [
-                ("foot_x_end_m", "m", -0.6 * most, 0.7 * most, "where the foot lands ahead"),
-                ("foot_y_end_m", "m", left_y - 0.8 * most, left_y - 0.4 * most, "where the foot lands across"),
-            ]
-            if name == "ssp"
-            else []
-        ),
+        *(foot if name == "ssp" else ()),
         (TIMES[name], "s", 0.005, 4.0, "left of the phase"),
         *((left, "m", -0.3, 0.3, "by which the DCM misses the commanded one at the end") for left in MISS_END),
         (OUTSIDE, "m", 0.0, 0.3, "of the ZMP beyond its polygon"),
         (BEYOND, "1", 0.0, 1.0, "of joints beyond their limits [rad] and cosines of knees beyond theirs"),
     ]
-    return tuple(
-        Variable(name=each, unit=unit, lower=least, upper=greatest, description=text)
-        for each, unit, least, greatest, text in rows
-    )
+    return variables(*rows)
 
 
 def _list_state(body: Body, name: PhaseName) -> tuple[Parameter, ...]:

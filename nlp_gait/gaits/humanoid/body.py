@@ -61,13 +61,12 @@ class Humanoid(Body):
     @property
     def angle_variables(self) -> tuple[Variable, ...]:
         """Lean of the torso at both ends of a phase, where it is at rest."""
-        return variables(
-            *(
-                (f"{name}_{end}_rad", "rad", -largest, largest, f"{name.replace('_', ' ')} at the {end}")
-                for name, largest in LARGEST_LEAN.items()
-                for end in ("start", "end")
-            )
+        rows = (
+            (f"{name}_{end}_rad", "rad", -largest, largest, f"{name.replace('_', ' ')} at the {end}")
+            for name, largest in LARGEST_LEAN.items()
+            for end in ("start", "end")
         )
+        return variables(*rows)
 
     def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
         return LEAN

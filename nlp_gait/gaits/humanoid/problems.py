@@ -133,12 +133,8 @@ def humanoid_walk(
         return plan_footstep_walk(body, places, steps, grid, goal, sharing)
     flight = None
     if stair_rise_m or stair_run_m:
-        flight = Flight(
-            rise_m=stair_rise_m,
-            run_m=stair_run_m,
-            foot=body.robot.feet["left"],
-            clearance_m=body.scale_length(CLEARANCE_M),
-        )
+        foot, clearance_m = body.robot.feet["left"], body.scale_length(CLEARANCE_M)
+        flight = Flight(rise_m=stair_rise_m, run_m=stair_run_m, foot=foot, clearance_m=clearance_m)
         if slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")
     return plan_whole_walk(body, steps, grid, goal, sharing, flight)
@@ -146,9 +142,8 @@ def humanoid_walk(
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
     """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged."""
-    options: dict[str, str | int | float | bool] = {
-        "robot": robot,
-        "intervals": intervals,
-        "drive_limits": drive_limits,
-    }
-    return RecordedCycles(body=make_humanoid(robot, drive_limits=drive_limits), intervals=intervals, options=options)
+    return RecordedCycles(
+        body=make_humanoid(robot, drive_limits=drive_limits),
+        intervals=intervals,
+        options={"robot": robot, "intervals": intervals, "drive_limits": drive_limits},
+    )

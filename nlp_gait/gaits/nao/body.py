@@ -41,19 +41,11 @@ GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 # Section 4: the torso's origin is 0.25 to 0.31 m high. With NAO's ankles, hips and legs of 0.2029 m the distance of hip and ankle
 # is then 0.5905 to 0.8862 leg lengths, which is taken for other robots, to the millimetre.
 LEAST_HEIGHT_SHARE, GREATEST_HEIGHT_SHARE = 0.5905, 0.8862
-ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {  # [rad]
-    "ssp": {  # Table 3, rows 6 to 9
-        "LShoulderPitch": (2.0, 1.0),
-        "LElbowRoll": (-0.42, -0.64),
-        "RShoulderPitch": (1.0, 2.0),
-        "RElbowRoll": (0.64, 0.42),
-    },
-    "dsp": {  # Table 5, rows 4 to 7
-        "LShoulderPitch": (1.0, 1.5),
-        "LElbowRoll": (-0.64, -0.50),
-        "RShoulderPitch": (2.0, 1.5),
-        "RElbowRoll": (0.42, 0.50),
-    },
+# Angles of the arms at both ends of each phase [rad]: Table 3, rows 6 to 9, and Table 5, rows 4 to 7.
+SWINGING = ("LShoulderPitch", "LElbowRoll", "RShoulderPitch", "RElbowRoll")
+ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {
+    "ssp": dict(zip(SWINGING, ((2.0, 1.0), (-0.42, -0.64), (1.0, 2.0), (0.64, 0.42)), strict=True)),
+    "dsp": dict(zip(SWINGING, ((1.0, 1.5), (-0.64, -0.50), (2.0, 1.5), (0.42, 0.50)), strict=True)),
 }
 # Table 3 swings the shoulders about 1.5 rad and the elbows about 0.53 rad, their rolls by 0.22 rad for each rad of the shoulders.
 MIDDLE_SHOULDER, MIDDLE_ELBOW, ELBOW_PER_SHOULDER = 1.5, 0.53, 0.22
@@ -113,22 +105,16 @@ def upright_plan(
     reach = []
     for side, ankle in ankles.items():
         geometry = measure_leg(robot, side)
-        hip_to_ankle = Motion(
-            ankle.position - hip.position - DM(geometry.hip_m),
-            ankle.velocity - hip.velocity,
-            ankle.acceleration - hip.acceleration,
-        )
+        (at, *rates), (hip_at, *hip_rates) = ankle, hip
+        moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
+        hip_to_ankle = Motion(at - hip_at - DM(geometry.hip_m), *moving)
         leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
         rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(LEG_JOINTS)))
         joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
         joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
         reach.append(leg.reach)
-    return Instant(
-        joints={**joints, **arms},
-        hip=hip.position,
-        ankles={side: ankle.position for side, ankle in ankles.items()},
-        reach=vertcat(*reach),
-    )
+    places = {side: ankle.position for side, ankle in ankles.items()}
+    return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=vertcat(*reach))
 
 
 def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:

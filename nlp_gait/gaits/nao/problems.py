@@ -296,8 +296,7 @@ def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
 
 def make_nao_cycles(robot: str = "nao-v5", intervals: int = 10) -> RecordedCycles:
     """Return NAO, or a robot of its build, and the limits of ``nao-cycle``, by which its recorded cycles are judged."""
-    options: dict[str, str | int | float | bool] = {"robot": robot, "intervals": intervals}
-    return RecordedCycles(body=make_nao(robot), intervals=intervals, options=options)
+    return RecordedCycles(body=make_nao(robot), intervals=intervals, options={"robot": robot, "intervals": intervals})
 
 
 def make_recorded_gait(

@@ -21,15 +21,8 @@ SETBACK = 0.06  # distance of an edge behind the ankle that stands on the step [
 CASES = {1: (0.5588, 0.64), 2: (0.508, 0.70), 3: (0.5588, 0.72)}
 
 # Absolute link angles [rad]: leg and foot clockwise from the forward axis, torso counter-clockwise.
-ANGLE_LIMITS = {
-    "HK": (0.2, 2.4),
-    "KA": (0.3, 3.2),
-    "HK'": (0.3, 2.4),
-    "K'A'": (0.8, 2.8),
-    "UH": (0.8, 1.75),
-    "AS": (-0.6, 1.2),
-    "ST": (-0.6, 1.2),
-}
+ANGLE_LIMITS = {"HK": (0.2, 2.4), "KA": (0.3, 3.2), "HK'": (0.3, 2.4), "K'A'": (0.8, 2.8)}
+ANGLE_LIMITS |= {"UH": (0.8, 1.75), "AS": (-0.6, 1.2), "ST": (-0.6, 1.2)}
 KNEE_LIMITS = (0.1, 2.5)  # [rad]
 KNEES = {"knee": ("HK", "KA"), "knee'": ("HK'", "K'A'")}
 
@@ -95,15 +88,10 @@ def rows(
 
     Bounds are for all rows or for each; ``scale`` is that of a violation, see ``Constraint``.
     """
+    labels, column = make_labels(of, columns or range(value.shape[1])), ca.vec(value)
+    least, most = (None if bound is None else MX(bound) for bound in (lower, upper))
     return Constraint(
-        name=name,
-        labels=make_labels(of, columns or range(value.shape[1])),
-        unit=unit,
-        scale=scale,
-        value=ca.vec(value),
-        lower=None if lower is None else MX(lower),
-        upper=None if upper is None else MX(upper),
-        over="instant",
+        name=name, labels=labels, unit=unit, scale=scale, value=column, lower=least, upper=most, over="instant"
     )
 
 

@@ -43,15 +43,10 @@ SCATTER = 0.05
 LARGEST_GAIN = 1e4
 LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
+PLANNED = [variable for variable in stair.GOVERNING_VARIABLES if variable.name != TORSO_PITCH]
 PARAMETERS = (
     *stair.STAIR_PARAMETERS,
-    *parameters(
-        *(
-            (v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum)
-            for v in stair.GOVERNING_VARIABLES
-            if v.name != TORSO_PITCH
-        )
-    ),
+    *parameters(*((v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum) for v in PLANNED)),
     *stair.GIVEN_PARAMETERS,
     *parameters(
         stair.REACH_MARGIN,
@@ -206,19 +201,10 @@ def _assemble(
     if rule == "limits":  # (Algorithm 3)
         constraints.append(stair.rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
     if tracking_limit:
-        most, limited = point["tracking_tolerance_rad"], errors[: closed_loop.N, :]
-        constraints.append(
-            stair.rows(
-                "tracking",
-                limited,
-                tuple(closed_loop.ANGLES[loop.coordinates]),
-                "rad",
-                0.1,
-                lower=-most,
-                upper=most,
-                columns=instants,
-            )
-        )
+        most, names = point["tracking_tolerance_rad"], tuple(closed_loop.ANGLES[loop.coordinates])
+        limited = errors[: closed_loop.N, :]
+        row = stair.rows("tracking", limited, names, "rad", 0.1, lower=-most, upper=most, columns=instants)
+        constraints.append(row)
     finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
     return Assembly(
         objective=tracking + effort + point["zmp_weight"] * balance,

@@ -76,15 +76,30 @@ def walk12(
     robot = load_point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        return _assemble(point, ops, _make_zmp_function(robot, ops, zmp), robot, intervals, horizon, quadrature)
+        T, s, zmp_at = point["step_time_s"], point["step_length_m"], _make_zmp_function(robot, ops, zmp)
+        phases, weights = make_rule(quadrature, intervals)
+        places = _sample_zmp(zmp_at, point, phases)
+        Q = T * ca.sum1(places**2) @ weights  # (eq. 9)
+        if horizon == "1s":
+            steps = ca.floor(1 / T)
+            begun = 1 / T - steps  # share of the last step within the second
+            Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
+        if quadrature != "simpson":
+            places = _sample_zmp(zmp_at, point, DM(np.linspace(0.0, 1.0, intervals + 1)).T)
+        q = SX.sym("q")
+        f1 = ops.call(ca.Function("f1", [q], [1 / q]), Q)  # (eq. 10)
+        f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
+        indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T)}
+        panels = intervals // 2  # of Simpson's rule, at whose ends the knees bend
+        names = [f"{k / panels:g} T" for k in range(panels + 1)]
+        reach = _limit_reach(point, robot, DM(np.linspace(0.0, 1.0, panels + 1)).T, names)
+        return Assembly(objective=f, constraints=(reach,), indexes={**indexes, **_measure_stability(places, robot)})
 
     def at_phases(point: Point, phases: MX, ops: Nonsmooth) -> Assembly:
         zmp_at = _sample_zmp(_make_zmp_function(robot, ops, zmp), point, phases)
         Q = point["step_time_s"] * ca.sum1(ca.sum2(zmp_at**2)) / phases.shape[1]
-        indexes = {"Q_m2s": Q} if horizon == "step" else {}
-        return Assembly(
-            objective=MX(0), constraints=(_limit_reach(point, robot, phases, [""] * phases.shape[1]),), indexes=indexes
-        )
+        reach = _limit_reach(point, robot, phases, [""] * phases.shape[1])
+        return Assembly(objective=MX(0), constraints=(reach,), indexes={"Q_m2s": Q} if horizon == "step" else {})
 
     return GaitProblem(
         name="walk12",
@@ -125,40 +140,6 @@ def make_rule(quadrature: Quadrature, intervals: int) -> tuple[DM, DM]:
     weights[1::2] = 4.0
     weights[[0, -1]] = 1.0
     return DM(np.linspace(0.0, 1.0, count + 1)).T, DM(weights / (3 * count))
-
-
-def _assemble(
-    point: Point,
-    ops: Nonsmooth,
-    zmp_at: ca.Function,
-    robot: PointMassBiped,
-    intervals: int,
-    horizon: Horizon,
-    quadrature: Quadrature,
-) -> Assembly:
-    T, s = point["step_time_s"], point["step_length_m"]
-    phases, weights = make_rule(quadrature, intervals)
-    zmp = _sample_zmp(zmp_at, point, phases)
-    Q = T * ca.sum1(zmp**2) @ weights  # (eq. 9)
-    if horizon == "1s":
-        steps = ca.floor(1 / T)
-        begun = 1 / T - steps  # share of the last step within the second
-        Q = steps * Q + begun * T * ca.sum1(_sample_zmp(zmp_at, point, begun * phases) ** 2) @ weights
-    if quadrature != "simpson":
-        zmp = _sample_zmp(zmp_at, point, DM(np.linspace(0.0, 1.0, intervals + 1)).T)
-    q = SX.sym("q")
-    f1 = ops.call(ca.Function("f1", [q], [1 / q]), Q)  # (eq. 10)
-    f = point["lambda"] * f1 / point["f1max"] + (1 - point["lambda"]) * s / point["f2max_m"]  # (eq. 11)
-    indexes = {"f": f, "f1_per_m2s": f1, "Q_m2s": Q, "hip_speed_m_s": s / (2 * T), **_measure_stability(zmp, robot)}
-    return Assembly(
-        objective=f, constraints=(_limit_reach(point, robot, *_make_panels(intervals // 2)),), indexes=indexes
-    )
-
-
-def _make_panels(intervals: int) -> tuple[DM, list[str]]:
-    """Return phases (1, n) of the ends of Simpson's panels, with their names."""
-    n = intervals + 1
-    return DM(np.linspace(0.0, 1.0, n)).T, [f"{k / intervals:g} T" for k in range(n)]
 
 
 def _limit_reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:

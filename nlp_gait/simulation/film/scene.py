@@ -89,11 +89,8 @@ class Scene:
         self._surface.make_current()
         for view in self._views:
             above = view.name == "above"
-            option, camera, kinds = (
-                self._soles if above else self._whole,
-                self._camera(view, k),
-                engine.mjtCatBit.mjCAT_ALL,
-            )
+            option, camera = self._soles if above else self._whole, self._camera(view, k)
+            kinds = engine.mjtCatBit.mjCAT_ALL
             engine.mjv_updateScene(self._recording.model, self._data, option, None, camera, kinds, self._scene)
             self._scene.flags[engine.mjtRndFlag.mjRND_SHADOW] = not above
             (self._add_dots if above else self._add_force)(k)
