@@ -51,9 +51,8 @@ class Claim:
     text: str  # what is claimed
     printed: str = ""  # value in print
     criterion: str = ""  # what decides, where the claim leaves it open
-    tolerance: str = (
-        ""  # of sizes, for example "5 %" of the printed value, or "2 mm" in the unit of the compared values
-    )
+    # Of sizes, for example "5 %" of the printed value, or "2 mm" in the unit of the compared values.
+    tolerance: str = ""
     least: str = (
         ""  # smallest change that counts where the paper prints no size, for example "1 %" in the unit of the change
     )
@@ -84,20 +83,16 @@ class ClaimsFile:
     differences: tuple[Difference, ...] = ()
 
 
-Rule = Callable[[Claim], tuple[ClaimVerdict, str]]
-"""Verdict and its detail from what a claim states."""
-
-
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Verdict on a claim or the rule that gives it, and the values of the fields in its texts."""
+    """The rule that gives the verdict on a claim and its detail, and the values of the fields in the claim's texts."""
 
-    verdict: ClaimVerdict | Rule
+    rule: Callable[[Claim], tuple[ClaimVerdict, str]]
     values: Mapping[str, Any]
 
     def apply(self, claim: Claim) -> Claim:
         """Return the claim with this verdict; the text of the detail of a claim that does not hold is dropped."""
-        verdict, note = (self.verdict, "") if isinstance(self.verdict, ClaimVerdict) else self.verdict(claim)
+        verdict, note = self.rule(claim)
         texts = {name: text.format_map(self.values) for name, text in asdict(claim).items()}
         detail = "" if verdict is ClaimVerdict.FAILS else texts["detail"]
         return replace(claim, **{**texts, "verdict": verdict, "detail": f"{detail} {note}".strip()})
@@ -108,40 +103,36 @@ def decide(verdict: bool | ClaimVerdict | Sequence[bool], /, **values: Any) -> C
 
     Of several readings of the paper, under each of which it holds or not, all have to agree: else it cannot be tested.
     """
-    if isinstance(verdict, ClaimVerdict):
-        return Check(verdict, values)
-    counts = Counter(np.atleast_1d(verdict).tolist())
+    counts, detail = Counter(np.atleast_1d(verdict).tolist()), ""
     if len(counts) == 2:
-        return Check(
-            lambda _: (ClaimVerdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"), values
-        )
-    return Check(ClaimVerdict.HOLDS if counts[True] else ClaimVerdict.FAILS, values)
+        verdict, detail = ClaimVerdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"
+    elif not isinstance(verdict, ClaimVerdict):
+        verdict = ClaimVerdict.HOLDS if counts[True] else ClaimVerdict.FAILS
+    return Check(lambda _: (verdict, detail), values)
 
 
-def compare_levels(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
-    """Return a check of values without a direction: the claim holds if all of ours are within its tolerance."""
+def compare_levels(printed: ArrayLike, ours: ArrayLike, signed: bool = False, /, **values: Any) -> Check:
+    """Return a check of values: the claim holds if all of ours are within its tolerance.
+
+    Signed values are changes, whose signs have to be the printed ones, too; if only these are, their direction holds.
+    """
 
     def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
-        within = _find_within(claim, printed, ours)
-        return (ClaimVerdict.HOLDS if within.all() else ClaimVerdict.FAILS), _describe_sizes(within, printed, ours)
+        same = np.atleast_1d(np.sign(ours) == np.sign(printed)) | (not signed)
+        within = _find_within(claim, printed, ours) & same
+        kept = ClaimVerdict.SIZE_DIFFERS if signed and same.all() else ClaimVerdict.FAILS
+        verdict = ClaimVerdict.HOLDS if within.all() else kept
+        if within.size > 1:
+            return verdict, f"({within.sum()} of {within.size} within the tolerance)"
+        sizes = f"(printed {float(np.squeeze(printed)):z.4g}, here {float(np.squeeze(ours)):z.4g})"
+        return verdict, "" if within.all() else sizes
 
     return Check(rule, values)
 
 
 def compare_changes(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
-    """Return a check of changes, whose signs are directions.
-
-    The claim holds if all of ours are within its tolerance. Otherwise its direction holds if all have the printed sign.
-    """
-
-    def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
-        within = _find_within(claim, printed, ours) & (np.sign(ours) == np.sign(printed))
-        if within.all():
-            return ClaimVerdict.HOLDS, _describe_sizes(within, printed, ours)
-        same = (np.sign(ours) == np.sign(printed)).all()
-        return (ClaimVerdict.SIZE_DIFFERS if same else ClaimVerdict.FAILS), _describe_sizes(within, printed, ours)
-
-    return Check(rule, values)
+    """Return a check of signed values."""
+    return compare_levels(printed, ours, True, **values)
 
 
 def compare_readings(printed: ArrayLike, ours: ArrayLike, /, **values: Any) -> Check:
@@ -173,8 +164,7 @@ def require_change(ours: ArrayLike, /, **values: Any) -> Check:
 
     def rule(claim: Claim) -> tuple[ClaimVerdict, str]:
         least, _ = _parse_size(claim.least)
-        verdict = decide([bool((row >= least).all()) for row in np.atleast_2d(ours)]).verdict
-        return (verdict, "") if isinstance(verdict, ClaimVerdict) else verdict(claim)
+        return decide([bool((row >= least).all()) for row in np.atleast_2d(ours)]).rule(claim)
 
     return Check(rule, values)
 
@@ -202,12 +192,6 @@ def _find_within(claim: Claim, printed: ArrayLike, ours: ArrayLike) -> np.ndarra
     size, unit = _parse_size(claim.tolerance)
     scale = np.abs(printed) / 100 if unit == "%" else 1.0
     return np.atleast_1d(np.abs(np.subtract(ours, printed)) <= size * scale * (1 + ROUNDING))
-
-
-def _describe_sizes(within: np.ndarray[Any, np.dtype[np.bool_]], printed: ArrayLike, ours: ArrayLike) -> str:
-    if within.size > 1:
-        return f"({within.sum()} of {within.size} within the tolerance)"
-    return "" if within.all() else f"(printed {float(np.squeeze(printed)):z.4g}, here {float(np.squeeze(ours)):z.4g})"
 
 
 def read_printed(cls: Callable[..., T], file: str) -> T:
@@ -286,8 +270,7 @@ def describe_criterion(claim: Claim) -> str:
 
 def fill_differences(differences: Iterable[Difference], values: Mapping[str, Any]) -> list[Difference]:
     """Return differences with values of the report in their texts."""
-    filled = ({name: text.format_map(values) for name, text in asdict(row).items()} for row in differences)
-    return [Difference(**texts) for texts in filled]
+    return [Difference(**{k: text.format_map(values) for k, text in asdict(row).items()}) for row in differences]
 
 
 def make_differences_table(differences: Iterable[Difference]) -> Table:

@@ -117,13 +117,13 @@ def make_search_tasks(
 
 def choose_best(records: Iterable[RunRecord]) -> RunRecord:
     """Return the best run: claimed ones come first, then feasible ones, both by objective, then the others by violation."""
-    return min(records, key=_rank)
 
+    def rank(record: RunRecord) -> tuple[bool, bool, float]:
+        verdict, sign = record.verdict, 1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0
+        by = sign * verdict.objective if verdict.feasible else verdict.violation
+        return not record.claimed, not verdict.feasible, by
 
-def _rank(record: RunRecord) -> tuple[bool, bool, float]:
-    verdict = record.verdict
-    sign = 1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0
-    return not record.claimed, not verdict.feasible, sign * verdict.objective if verdict.feasible else verdict.violation
+    return min(records, key=rank)
 
 
 def list_infeasible(runs: Iterable[RunRecord], *, dense: bool = False) -> list[str]:
@@ -144,5 +144,5 @@ def get_point(record: RunRecord) -> list[float]:
 
 def compute_range(values: Iterable[float]) -> tuple[float, float]:
     """Return the least and the greatest value."""
-    known = [float(value) for value in values]
+    known = list(map(float, values))
     return min(known), max(known)

@@ -24,7 +24,6 @@ from compare.papers.claims import (
     Claim,
     ClaimsFile,
     ClaimVerdict,
-    Difference,
     decide,
     fill_differences,
     make_claims_table,
@@ -48,12 +47,16 @@ if TYPE_CHECKING:
 
 E = TypeVar("E", bound=Effort)
 F = TypeVar("F")
-SESSIONS, SUMMARY = "sessions.json", "summary.json"
-QUICK = (
-    "Quick run: the fewest runs, points and evaluations that fill every table. Statistics, medians and the verdicts that rest on "
-    "them are not those of the full reproduction."
-)
-REDUCED = "Reduced run: its settings differ from those of the full reproduction, see the end. Verdicts are those of this effort."
+NOTES = {
+    "full": [],
+    "quick": [
+        "Quick run: the fewest runs, points and evaluations that fill every table. Statistics, medians and the verdicts that "
+        "rest on them are not those of the full reproduction."
+    ],
+    "reduced": [
+        "Reduced run: its settings differ from those of the full reproduction, see the end. Verdicts are those of this effort."
+    ],
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +108,12 @@ class Reproduction(Generic[E, F]):
             InputError: its list of sessions is damaged.
         """
         folder, jobs = make_writable_folder(out), jobs or available_cores()
-        sessions = [*read_sessions(folder), Session.begin(command, scheduler or str(jobs))]
-        write_json(folder / SESSIONS, [asdict(session) for session in sessions])
+        path, sessions = folder / "sessions.json", []
+        if os.path.lexists(path):
+            with convert_errors(f"{str(path)!r} is damaged", InputError, "delete it; the results stay valid"):
+                sessions += decode_value(tuple[Session, ...], read_json(path, "sessions"), "sessions")
+        sessions.append(Session.begin(command, scheduler or str(jobs)))
+        write_json(path, [asdict(session) for session in sessions])
         runner = Runner(folder=folder, progress=progress, jobs=jobs, scheduler=scheduler, on_outdated=on_outdated)
         findings = self.run(runner, effort)
         progress("figures, tables and report")
@@ -152,54 +159,26 @@ class Reproduction(Generic[E, F]):
         document = replace(
             document,
             title=document.title if label == "full" else f"{document.title} ({label})",
-            verdict=[*{"full": [], "quick": [QUICK], "reduced": [REDUCED]}[label], *count_verdicts(claims)],
+            verdict=[*NOTES[label], count_verdicts(claims)],
             parts=(*document.parts, provenance, make_citation_section(r.definition["problem"] for r in runner.records)),
         )
         write_document(folder, document)
         write_parts(folder, self.csv_tables(findings))
-        write_json(folder / SUMMARY, _summarise(label, self._find_settings(effort), sessions[-1], claims, differences))
-
-    def _find_settings(self, effort: E) -> dict[str, Any]:
-        """Return what differs from the full effort."""
         full = asdict(self.full)
-        return {name: value for name, value in asdict(effort).items() if value != full[name]}
+        summary = {
+            "effort": label,
+            "settings": {name: value for name, value in asdict(effort).items() if value != full[name]},
+            "session": asdict(sessions[-1]),
+            "claims": {name: asdict(claim) for name, claim in claims.items()},
+            "differences": [asdict(row) for row in differences],
+        }
+        write_json(folder / "summary.json", summary)
 
 
-def read_sessions(folder: Path) -> list[Session]:
-    """Return the earlier sessions of a folder; raises InputError if their file is damaged."""
-    path = folder / SESSIONS
-    if not os.path.lexists(path):
-        return []
-    with convert_errors(f"{str(path)!r} is damaged", InputError, "delete it; the results stay valid"):
-        return list(decode_value(tuple[Session, ...], read_json(path, "sessions"), "sessions"))
-
-
-def count_verdicts(claims: Mapping[str, Claim]) -> list[str]:
-    """Return a sentence with the numbers of rows, claims, tested claims and rows by verdict; nothing without claims."""
+def count_verdicts(claims: Mapping[str, Claim]) -> str:
+    """Return a sentence with the numbers of rows, claims, tested claims and rows by verdict."""
     counts = Counter(claim.verdict for claim in claims.values())
     words = ", ".join(f'{count} "{verdict}"' for verdict, count in counts.items())
-    every, tested = (
-        {claim.reading_of or name for name, claim in claims.items() if claim.verdict != left_out}
-        for left_out in ("", ClaimVerdict.UNTESTABLE)
-    )
-    return (
-        [f"{len(claims)} rows on {len(every)} claims, of which {len(tested)} are tested here: {words}."]
-        if claims
-        else []
-    )
-
-
-def _summarise(
-    label: str,
-    settings: Mapping[str, Any],
-    session: Session,
-    claims: Mapping[str, Claim],
-    differences: Sequence[Difference],
-) -> dict[str, Any]:
-    return {
-        "effort": label,
-        "settings": settings,
-        "session": asdict(session),
-        "claims": {name: asdict(claim) for name, claim in claims.items()},
-        "differences": [asdict(row) for row in differences],
-    }
+    every = {name: claim.reading_of or name for name, claim in claims.items()}
+    tested = {every[name] for name, claim in claims.items() if claim.verdict != ClaimVerdict.UNTESTABLE}
+    return f"{len(claims)} rows on {len({*every.values()})} claims, of which {len(tested)} are tested here: {words}."

@@ -38,7 +38,7 @@ def paper_page(name: str) -> str:
     claims = {key: Claim(**claim) for key, claim in record["claims"].items()}
     differences = [Difference(**row) for row in record["differences"]]
     return page(
-        literal(" ".join([*count_verdicts(claims), _describe(record, name)])),
+        literal(f"{count_verdicts(claims)} {_describe(record, name)}"),
         "### Claims",
         _format(make_claims_table(claims.values())),
         "### What is not as printed",

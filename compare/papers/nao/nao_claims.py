@@ -8,22 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
 from compare.analysis.record_statistics import a12, rank_sum_normal
-from compare.papers.claims import (
-    SIGNIFICANT,
-    Check,
-    ClaimVerdict,
-    compare_changes,
-    compare_levels,
-    decide,
-    require_change,
-    require_significance,
-)
+from compare.papers import claims
+from compare.papers.claims import Check, ClaimVerdict, compare_changes, compare_levels, decide, require_change
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
 from compare.papers.nao.nao_runs import ALGORITHMS
@@ -51,13 +42,12 @@ def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
     for name in ("penalty", "more"):
         values[name] = phase.test(f"{swarm}-{name}", f"ga-{name}").p_two_sided
     check = compare_changes(printed_lead, values["lead"], **values, wins=100 * values["effect"])
-    return require_significance(check, RANK_SUM, test.p_two_sided)
+    return claims.require_significance(check, RANK_SUM, test.p_two_sided)
 
 
 def _check_left_tail(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
-    """Check by the left-tailed test whether a swarm's median is less than GA's; it does not hold if the other tail is shown."""
     p = phase.test(f"{swarm}{kind}", f"ga{kind}").p_less
-    shown = {p < SIGNIFICANT: ClaimVerdict.HOLDS, p > 1 - SIGNIFICANT: ClaimVerdict.FAILS}
+    shown = {p < claims.SIGNIFICANT: ClaimVerdict.HOLDS, p > 1 - claims.SIGNIFICANT: ClaimVerdict.FAILS}
     return decide(shown.get(True, ClaimVerdict.NOT_SHOWN), swarm=NAMES[swarm], p_less=p)
 
 
@@ -68,7 +58,6 @@ def _check_each_run(phase: PhaseFindings, swarm: str) -> Check:
 
 
 def _check_near_least(phase: PhaseFindings) -> Check:
-    """Check whether GA's average is nearer to its least power than PSO's, with both weights [%]."""
     ends = {name: phase.final_powers(name) for name in phase.searches}
     above = {name: 100 * (float(np.mean(powers)) / min(powers) - 1) for name, powers in ends.items()}
     words = ", ".join(f"{NAMES[name]} {share:.2f} %" for name, share in above.items())
@@ -76,10 +65,7 @@ def _check_near_least(phase: PhaseFindings) -> Check:
 
 
 def _check_alike(phase: PhaseFindings, swarm: str, first: int = 0, last: int = 9) -> Check:
-    """Check whether a swarm's and GA's median solutions differ by no more than the printed ones: of the ranges [%].
-
-    ``first`` and ``last`` bound the variables compared, by position.
-    """
+    """Compare the variables of the median solutions from position ``first`` to before ``last``."""
     printed = [np.array(phase.paper.optima[name].x) for name in ALGORITHMS]
     ours = [np.array(list(phase.median(name).x.values())) for name in (swarm, "ga")]
     width = phase.problem.upper - phase.problem.lower
@@ -102,7 +88,7 @@ def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
     p = rank_sum_normal(*(np.abs(power - np.median(power)).tolist() for power in powers)).p_two_sided
     change = 100 * (pso / ga - 1)
     check = require_change(-change, swarm=NAMES[swarm], pso=pso, ga=ga, change=change, p=p)
-    return require_significance(check, "rank-sum test of distances from the median", p)
+    return claims.require_significance(check, "rank-sum test of distances from the median", p)
 
 
 def _check_same_optimum(phase: PhaseFindings, swarm: str) -> Check:
@@ -116,7 +102,7 @@ def _check_same_optimum(phase: PhaseFindings, swarm: str) -> Check:
 
 
 def _check_at_bounds(phase: PhaseFindings, algorithm: str, ends: Mapping[str, int]) -> Check:
-    """Check how far variables of a search's median run are from the lower (0) or upper (1) bounds, of the bounds' range [%]."""
+    """Check variables against their lower (0) or upper (1) bounds."""
     problem, x = phase.problem, phase.median(algorithm).x
     far = {}
     for name, end in ends.items():
@@ -128,7 +114,6 @@ def _check_at_bounds(phase: PhaseFindings, algorithm: str, ends: Mapping[str, in
 
 
 def _check_falling(phase: PhaseFindings, over: Literal["hip", "time"]) -> Check:
-    """Check whether the feasible optima over the hip's height or the time fall, and give the price of its bound."""
     sweep = [point for point in phase.sweeps[phase.paper.duration if over == "time" else 0] if point.feasible]
     prices = (bound.price for bound in phase.optimum.active_constraints if bound.name == "bounds[hip_height_m]")
     power = np.array([point.power_W for point in sweep])
@@ -140,26 +125,16 @@ def _check_falling(phase: PhaseFindings, over: Literal["hip", "time"]) -> Check:
 
 
 def _check_torque_change(phase: PhaseFindings, swarm: str) -> Check:
-    """Check PSO's median against GA's over the final solutions of all runs."""
-    pso, ga = ([run.verdict.indexes["torque_change_Nm"] for run in phase.searches[name]] for name in (swarm, "ga"))
-    optima, middle = (
-        phase.paper.optima,
-        [phase.median(name).verdict.indexes["torque_change_Nm"] for name in (swarm, "ga")],
-    )
-    printed = 100 * (optima["pso"].indexes["torque_change_Nm"] / optima["ga"].indexes["torque_change_Nm"] - 1)
-    values = {
-        "swarm": NAMES[swarm],
-        "pso": np.median(pso),
-        "ga": np.median(ga),
-        "middle": middle,
-        "printed_lead": printed,
-    }
-    ours, p = 100 * float(np.median(pso) / np.median(ga) - 1), rank_sum_normal(pso, ga).p_two_sided
-    return require_significance(compare_changes(printed, ours, **values, lead=ours, p=p), RANK_SUM, p)
+    ends = [[run.verdict.indexes["torque_change_Nm"] for run in phase.searches[name]] for name in (swarm, "ga")]
+    middle = [phase.median(name).verdict.indexes["torque_change_Nm"] for name in (swarm, "ga")]
+    printed = [phase.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS]
+    (pso, ga), p = (float(np.median(values)) for values in ends), rank_sum_normal(*ends).p_two_sided
+    leads = {"printed_lead": 100 * (printed[0] / printed[1] - 1), "lead": 100 * (pso / ga - 1)}
+    check = compare_changes(*leads.values(), **leads, swarm=NAMES[swarm], pso=pso, ga=ga, middle=middle, p=p)
+    return claims.require_significance(check, RANK_SUM, p)
 
 
 def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -> Check:
-    """Check how much more than its least power the median run of a search needs at a swing height [%]."""
     ssp, at = findings.ssp, PAPER.swing_heights_m.index(height_m)
     printed = SWING_POWER_W["ga" if algorithm == "ga" else "pso"]
     middle = ssp.list_swing_powers(algorithm)[at] / ssp.median(algorithm).verdict.objective
@@ -172,7 +147,7 @@ def _check_swing_price(findings: NaoFindings, algorithm: str, height_m: float) -
 def _compare_histories(
     compare: Callable[..., Check], printed: float, middle: float, every: float, /, **values: Any
 ) -> Check:
-    """Compare a change [%] with that in the median run's history, or runs' histories; NaN where it holds no solution."""
+    """Compare a change [%] with that in the median run's history, NaN where it holds no solution; tell that in all runs'."""
     values |= {"printed": printed, "middle": _describe_change(middle), "every": _describe_change(every)}
     return decide(ClaimVerdict.UNTESTABLE, **values) if math.isnan(middle) else compare(printed, middle, **values)
 
@@ -182,7 +157,6 @@ def _describe_change(change: float) -> str:
 
 
 def _check_swing_beyond(findings: NaoFindings) -> Check:
-    """Check how much more IPOPT's optimum costs at the greatest swing height of Table 7 than at 0.024 m [%]."""
     low, high = findings.swing_power(0.024), findings.swing_power(0.028)
     return require_change(100 * (high / low - 1), low=low, high=high, rise=100 * (high / low - 1))
 
@@ -197,7 +171,7 @@ def _compute_swing_leads(phase: PhaseFindings, swarm: str) -> tuple[Array, Array
 
 
 def _check_swing_heights(phase: PhaseFindings, swarm: str) -> Check:
-    """Check that GA needs more at each height, in the median runs [%]; where one has no solution both outcomes are tried."""
+    """Where a median run has no solution at a height, both outcomes are tried."""
     leads = _compute_swing_leads(phase, swarm)
     texts = [
         ", ".join(f"{_describe_change(v)} at {at:.3f} m" for v, at in zip(row, PAPER.swing_heights_m, strict=True))
@@ -208,10 +182,9 @@ def _check_swing_heights(phase: PhaseFindings, swarm: str) -> Check:
 
 
 def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
-    """Check GA's power at 0.024 m above PSO's, as read off the histories of the median runs."""
-    printed, at = (
-        100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1),
+    at, printed = (
         PAPER.swing_heights_m.index(0.024),
+        100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1),
     )
     pso, ga = (f"{phase.list_swing_powers(name)[at]:.4f} W" for name in (swarm, "ga"))
     middle, every = (float(leads[at]) for leads in _compute_swing_leads(phase, swarm))
@@ -233,13 +206,11 @@ def _check_swing_range(phase: PhaseFindings, algorithm: str, printed_mm: float) 
 
 
 def _check_swing_range_lead(phase: PhaseFindings, swarm: str, printed_mm: float) -> Check:
-    """Check how much wider a swarm's range is than GA's [mm]."""
     pso, ga = (_compute_swing_range(phase, name) for name in (swarm, "ga"))
     return compare_changes(printed_mm, pso - ga, swarm=NAMES[swarm], printed=printed_mm, pso=pso, ga=ga, lead=pso - ga)
 
 
 def _check_velocity(phase: PhaseFindings, name: str) -> Check:
-    """Check the share of the searches' velocities that are within the printed range, in the mean of the searches."""
     printed = PAPER.velocity_ranges[name]
     symbols, chosen = {i: f"x{i + 1}" for i in printed.variables}, list(printed.variables)
     outside = [
@@ -254,25 +225,23 @@ def _check_velocity(phase: PhaseFindings, name: str) -> Check:
         cheap = f"{low:z.4f} to {high:z.4f}" if math.isfinite(low) else "no point of the sweep"
         near.append(f"{symbol} = {[*phase.optimum.x.values()][i]:z.4f} ({cheap})")
     ends = np.concatenate([x[:, chosen] for x in phase.gather_solutions(whole=False).values()])
-    texts = {"symbols": " and ".join(symbols.values()), "near": ", ".join(near)}
-    texts["outside"] = f" (but {', '.join(outside)} in print)" if outside else ""
     values = {
         "low": printed.low,
         "high": printed.high,
-        "nearly": 100 * NEARLY_OPTIMAL,
         "ends": (ends.min(), ends.max()),
+        "nearly": 100 * NEARLY_OPTIMAL,
     }
+    values |= {"symbols": " and ".join(symbols.values()), "near": ", ".join(near)}
+    values["outside"] = f" (but {', '.join(outside)} in print)" if outside else ""
     return _check_shares(
         phase,
         lambda x: (printed.low <= x[:, chosen]) & (x[:, chosen] <= printed.high),
         lambda shares: float(np.mean(shares)) >= MOST,
-        **texts,
         **values,
     )
 
 
 def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:
-    """Check whether most solutions of each search have these signs of variables."""
     columns, sign = [phase.problem.names.index(name) for name in signs], np.array(list(signs.values()))
     best = ", ".join(f"{phase.optimum.x[name]:z.4f}" for name in signs)
     return _check_shares(
@@ -293,12 +262,13 @@ def _check_shares(
 
 
 def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
-    """Check how far a swarm's lateral velocities are from equal: the larger over the smaller one, median of the runs."""
-    ends = phase.gather_solutions(whole=False)
-    pso, ga = (
-        float(np.median(np.exp(np.abs(np.log(np.abs(ends[name][:, 5] / ends[name][:, 6])))))) for name in (swarm, "ga")
-    )
-    printed = {name: max(map(abs, o.x[5:7])) / min(map(abs, o.x[5:7])) for name, o in phase.paper.optima.items()}
+
+    def compute_ratio(x: Array) -> float:
+        lateral = np.abs(x[:, 5:7])
+        return float(np.median(lateral.max(axis=1) / lateral.min(axis=1)))
+
+    pso, ga = (compute_ratio(phase.gather_solutions(whole=False)[name]) for name in (swarm, "ga"))
+    printed = {name: compute_ratio(np.array([optimum.x])) for name, optimum in phase.paper.optima.items()}
     values = {"printed": printed, "pso": pso, "ga": ga, "most": 1.25 * printed["pso"]}
     return compare_levels(printed["pso"], pso, swarm=NAMES[swarm], **values)
 
@@ -316,7 +286,6 @@ def _check_wider(findings: NaoFindings, position: int, ranges: Sequence[str] = (
 
 
 def _check_gaps(phase: PhaseFindings) -> Check:
-    """Check whether a duration without a feasible point lies between two with one."""
     durations = phase.sweeps[phase.paper.duration]
     feasible = [point.at for point in durations if point.feasible]
     missing = [point.at for point in durations if not point.feasible]
@@ -329,7 +298,6 @@ def _check_gaps(phase: PhaseFindings) -> Check:
 
 
 def _check_average_speed(phase: PhaseFindings) -> Check:
-    """Check the spread of power over durations against that over all else at the printed duration."""
     feasible = [point.power_W for point in phase.sweeps[phase.paper.duration] if point.feasible]
     paces = max(feasible) / min(feasible)
     others = [100 * (here["power_W"] / phase.best - 1) for here in phase.printed_here.values()]
@@ -337,7 +305,6 @@ def _check_average_speed(phase: PhaseFindings) -> Check:
 
 
 def _check_exponential(findings: NaoFindings) -> Check:
-    """Check whether the logarithm of power is nearer to a line over time than over the logarithm of time."""
     time, power = np.array([(point.at, point.power_W) for point in findings.durations if point.feasible]).T
     exponential, law = (float(np.corrcoef(x, np.log(power))[0, 1] ** 2) for x in (time, np.log(time)))
     rates = -np.diff(np.log(power)) / np.diff(time)
@@ -345,7 +312,6 @@ def _check_exponential(findings: NaoFindings) -> Check:
 
 
 def _check_dearer(phase: PhaseFindings, positions: Sequence[int], beyond: float) -> Check:
-    """Check how much more the cheapest optimum costs at which a velocity is at least this far beyond zero [%], per variable."""
     dearer = []
     for position in positions:
         powers = [point.power_W for point in phase.sweeps[position] if point.feasible and abs(point.at) > beyond]
@@ -355,7 +321,6 @@ def _check_dearer(phase: PhaseFindings, positions: Sequence[int], beyond: float)
 
 
 def _check_near_zero(phase: PhaseFindings) -> Check:
-    """Check how much rarer solutions are between zero and the printed range of x6 than within it, by its width [%]."""
     x6 = np.concatenate([points.x[:, 5] for points in phase.points.values()])
     printed = PAPER.velocity_ranges["lateral-velocity-dsp"]
     near, within = np.mean((x6 > printed.high) & (x6 <= 0)), np.mean((printed.low <= x6) & (x6 <= printed.high))
@@ -364,39 +329,26 @@ def _check_near_zero(phase: PhaseFindings) -> Check:
 
 
 def _check_positive(phase: PhaseFindings) -> Check:
-    """Check how much more the cheapest solutions with a positive lateral velocity cost than the best [%]."""
-    x, power = (
-        np.concatenate([getattr(points, name) for points in phase.points.values()]) for name in ("x", "power_W")
-    )
-    positive = power[x[:, 5] > 0]
+    every = phase.points.values()
+    positive = np.concatenate([points.power_W[points.x[:, 5] > 0] for points in every])
     change = 100 * (positive.min() / phase.best - 1) if len(positive) else -math.inf
     words = f"the cheapest costs {change:.0f} % more" if len(positive) else "none"
-    return require_change(change, words=words, share=100 * len(positive) / len(power))
+    return require_change(change, words=words, share=100 * len(positive) / sum(len(points.x) for points in every))
 
 
 def _check_speeds(findings: NaoFindings, by: Literal["fastest", "ratio", "difference"]) -> Check:
-    """Check how much higher a speed, or larger a range of speeds, is feasible in double than in single support [%].
-
-    There is no verdict if it is, but a bound ends the durations of single support, not the robot.
-    """
-    fast, slow = _list_speeds(findings)
-    speeds = {"fastest": fast, "ratio": fast / slow, "difference": fast - slow}[by]
-    change, ssp = 100 * (speeds[1] / max(speeds[0], 1e-9) - 1), findings.ssp
-    shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
-    is_at_bound = shortest <= 1.001 * ssp.problem.lower[ssp.paper.duration]
-    check = require_change(change, speeds=speeds, ranges=fast / slow, change=change)
-    return replace(check, verdict=ClaimVerdict.UNTESTABLE) if change > 0 and is_at_bound else check
-
-
-def _list_speeds(findings: NaoFindings) -> tuple[Array, Array]:
-    """Return the hip's greatest and least mean speed over the feasible durations of single and double support [m/s]."""
     ends = []
     for phase in findings.phases:
         times = [point.at for point in phase.sweeps[phase.paper.duration] if point.feasible]
         hip = phase.sample_printed().arrays["hip"]
         ends.append([float(hip[-1, 0] - hip[0, 0]) / time for time in (min(times), max(times))])
     fast, slow = np.array(ends).T
-    return fast, slow
+    speeds = {"fastest": fast, "ratio": fast / slow, "difference": fast - slow}[by]
+    change, ssp = 100 * (speeds[1] / max(speeds[0], 1e-9) - 1), findings.ssp
+    shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
+    is_at_bound = shortest <= 1.001 * ssp.problem.lower[ssp.paper.duration]
+    check = require_change(change, speeds=speeds, ranges=fast / slow, change=change)
+    return decide(ClaimVerdict.UNTESTABLE, **check.values) if change > 0 and is_at_bound else check
 
 
 def _check_same_median(phase: PhaseFindings, swarm: str) -> Check:

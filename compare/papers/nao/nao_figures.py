@@ -67,7 +67,6 @@ def _draw_convergence(phase: PhaseFindings) -> Figure:
 
 
 def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
-    """Figs. 10 to 14, 16 to 19: power against each variable over all feasible solutions, with IPOPT's optimum as a line."""
     figure = new_figure(7.5, 0.5 + 2.1 * len(positions))
     grid = figure.subplots(len(positions), len(SEARCHES), sharey=True, sharex="row", squeeze=False)
     for k, (row, position) in enumerate(zip(grid, positions, strict=True)):

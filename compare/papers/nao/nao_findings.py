@@ -14,7 +14,7 @@ from compare.analysis.record_statistics import RankSum, rank_sum_normal
 from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, PrintedPhase
 from compare.papers.nao.nao_runs import FixedOptimum, evaluate_indexes
 from compare.papers.paper_runs import choose_best
-from compare.study.record import RunRecord
+from compare.study.record import RunRecord, Verdict
 from compare.study.references import find_reference
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.identity import identify_problem
@@ -72,8 +72,13 @@ class PhaseFindings:
 
     def final_powers(self, algorithm: str) -> list[float]:
         """Return the power at the end of each run [W]; infinite without a feasible solution."""
-        runs = {**self.searches, **self.variants}[algorithm]
-        return [run.verdict.objective if run.verdict.feasible else math.inf for run in runs]
+        ends = [run.verdict for run in {**self.searches, **self.variants}[algorithm]]
+        return [end.objective if end.feasible else math.inf for end in ends]
+
+    @property
+    def feasible_ends(self) -> list[Verdict]:
+        """The feasible ones of the ends of all runs of the searches."""
+        return [run.verdict for runs in self.searches.values() for run in runs if run.verdict.feasible]
 
     def median_run(self, algorithm: str) -> int:
         """Return the number of the run of median power, which the paper's tables show."""
@@ -121,16 +126,18 @@ class PhaseFindings:
         """Lowest hip of the sweep for which IPOPT finds a gait [m]."""
         return min(point.at for point in self.sweeps[0] if point.feasible)
 
+    @cached_property
+    def printed_pso(self) -> dict[str, float]:
+        """The paper's PSO solution by name of the variable."""
+        return self.problem.by_name(self.problem.check_x(self.paper.optima["pso"].x))
+
     def evaluate_printed(self, **changes: float) -> Mapping[str, float]:
         """Return the performance figures of the paper's PSO solution with other values of some variables, by name."""
-        return evaluate_indexes(self.problem, self._change_printed(changes))
+        return evaluate_indexes(self.problem, list((self.printed_pso | changes).values()))
 
     def sample_printed(self, **changes: float) -> Signals:
         """Return the signals of the paper's PSO solution with other values of some variables, by name."""
-        return self.problem.signals(self._change_printed(changes))
-
-    def _change_printed(self, changes: dict[str, float]) -> list[float]:
-        return list((self.problem.by_name(self.problem.check_x(self.paper.optima["pso"].x)) | changes).values())
+        return self.problem.signals(list((self.printed_pso | changes).values()))
 
     def test(self, algorithm: str, other: str = "ga") -> RankSum:
         """Return the rank-sum test of a search's powers against another's."""
@@ -167,11 +174,9 @@ class PhaseFindings:
         below = [1 - (p.power_W / np.interp(p.x[:, position], at, power)).min() for p in self.points.values()]
         return max(0.0, *below)
 
-    def _line(self, position: int) -> tuple[Array, Array]:
-        """IPOPT's feasible optima over a variable: its values, ascending, and power [W]."""
-        line = [(p.at, p.power_W) for p in self.sweeps[position] if p.feasible]
-        at, power = np.array(line).T
-        return at, power
+    def _line(self, position: int) -> Array:
+        """IPOPT's feasible optima over a variable (2, m): its values, ascending, and power [W]."""
+        return np.array([(p.at, p.power_W) for p in self.sweeps[position] if p.feasible]).T
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,12 +197,10 @@ class NaoFindings:
     @cached_property
     def torque_changes_Nm(self) -> dict[str, tuple[float, float]]:
         """Torque change of the printed solutions of double support, by candidate for its cause and search."""
-        others = {PAPER.choices[name].title: found for name, found in self.dsp.printed_by_choice.items()}
-        by_option = {
-            title: (found["pso"]["torque_change_Nm"], found["ga"]["torque_change_Nm"])
-            for title, found in others.items()
-        }
-        return {**PAPER.torque_changes_Nm, **by_option}
+        changes = dict(PAPER.torque_changes_Nm)
+        for name, found in self.dsp.printed_by_choice.items():
+            changes[PAPER.choices[name].title] = found["pso"]["torque_change_Nm"], found["ga"]["torque_change_Nm"]
+        return changes
 
     def swing_power(self, height_m: float) -> float:
         """Return the least power at one of the paper's swing heights [W]."""
@@ -207,13 +210,9 @@ class NaoFindings:
 def choose_sweep_values(
     points: Mapping[str, FeasiblePoints], position: int, optimum: float, counts: tuple[int, int]
 ) -> list[float]:
-    """Return values of a variable for a sweep, ascending.
+    """Return values of the variable at a position for a sweep, ascending, with that at IPOPT's optimum.
 
-    Args:
-        points: feasible solutions by search.
-        position: of the variable in x.
-        optimum: value at IPOPT's optimum, which is added.
-        counts: number of values over the range of all solutions, and over that of the cheap ones.
+    Counts are the numbers of values over the range of all solutions, and over that of the cheap ones.
     """
     values = np.concatenate([p.x[:, position] for p in points.values()])
     power = np.concatenate([p.power_W for p in points.values()])

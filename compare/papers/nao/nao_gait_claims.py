@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -10,15 +10,8 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.record_statistics import rank_sum_normal
-from compare.papers.claims import (
-    Check,
-    Series,
-    compare_changes,
-    compare_levels,
-    decide,
-    require_change,
-    require_significance,
-)
+from compare.papers import claims
+from compare.papers.claims import Check, Series, compare_changes, compare_levels, decide, require_change
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_paper import SWING_HEIGHT
 from compare.papers.nao.nao_runs import ALGORITHMS, WEBOTS_DRIVE
@@ -47,10 +40,8 @@ def compute_joint_shares(problem: GaitProblem, x: Sequence[float], *, heat: bool
 def _compute_joint_powers(problem: GaitProblem, x: Sequence[float], *, heat: bool = True) -> dict[str, float]:
     """Return the energy that each joint draws, or its mechanical part [J]."""
     signals = problem.signals(problem.check_x(x))
-    drawn = (
-        np.abs(signals.arrays["tau"] * signals.arrays["qd"])
-        + heat * problem.value("heat_loss_W_per_Nm2") * signals.arrays["tau"] ** 2
-    )
+    tau, loss = signals.arrays["tau"], heat * problem.value("heat_loss_W_per_Nm2")
+    drawn = np.abs(tau * signals.arrays["qd"]) + loss * tau**2
     energies = np.asarray(np.trapezoid(drawn, signals.arrays["t"], axis=0))
     return dict(zip(signals.joints, map(float, energies), strict=True))
 
@@ -71,7 +62,6 @@ def describe_effect(phase: PhaseFindings, choice: str) -> str:
 
 
 def _check_levels(phase: PhaseFindings, indexes: Sequence[str]) -> Check:
-    """Check printed performance figures of both printed solutions."""
     pairs = [(o.figures[i], phase.printed_here[name][i]) for name, o in phase.paper.optima.items() for i in indexes]
     printed, here = np.array(pairs).T
     share, gap = 100 * np.abs(here / printed - 1), np.abs(here - printed)
@@ -82,22 +72,18 @@ def _check_levels(phase: PhaseFindings, indexes: Sequence[str]) -> Check:
 def _check_lead(
     phase: PhaseFindings, indexes: Sequence[str], sign: float = 1.0, share: bool = False, level: bool = False
 ) -> Check:
-    """Check by how much PSO's printed solution is above GA's, or below it for a negative sign [mm, to a tenth], or a share [%].
+    """Check PSO's printed solution above GA's, or below it for a negative sign [mm, to a tenth], or a share [%].
 
     As a level, the sign does not count.
     """
-    optima, here = phase.paper.optima, phase.printed_here
-    pairs = [
-        [(found["pso"][i], found["ga"][i]) for i in indexes]
-        for found in ({n: o.figures for n, o in optima.items()}, here)
-    ]
-    printed, ours = ([100 * (a / b - 1) if share else 1000 * sign * (a - b) for a, b in rows] for rows in pairs)
-    if not share:
-        printed_mm, ours = np.round(printed, 1).tolist(), np.round(ours, 1).tolist()
+    optima, rows = phase.paper.optima, []
+    for found in ({name: optimum.figures for name, optimum in optima.items()}, phase.printed_here):
+        pairs = [(found["pso"][i], found["ga"][i]) for i in indexes]
+        rows.append([100 * (a / b - 1) if share else 1000 * sign * (a - b) for a, b in pairs])
+    printed, ours = rows if share else np.round(rows, 1).tolist()
     values: dict[str, Any] = {"velocities": [(optima[name].x[3], optima[name].x[5]) for name in ALGORITHMS]}
-    values |= {"printed": printed, "ours": ours, "apart": abs(ours[0] - printed[0])}
-    compare = compare_levels if level else compare_changes
-    return compare(printed if share else printed_mm, ours, **values)
+    values |= {"printed": rows[0], "ours": ours, "apart": abs(ours[0] - rows[0][0])}
+    return compare_levels(printed, ours, not level, **values)
 
 
 def _check_more_stable(findings: NaoFindings) -> Check:
@@ -108,7 +94,6 @@ def _check_more_stable(findings: NaoFindings) -> Check:
 
 
 def _check_lower_hip(findings: NaoFindings, axis: str) -> Check:
-    """Check how much larger a printed gait's least margin is with the lowest hip at which IPOPT finds a gait [mm]."""
     lowest, changes = [], []
     for phase in findings.phases:
         lowest.append(phase.lowest_hip_m)
@@ -119,7 +104,6 @@ def _check_lower_hip(findings: NaoFindings, axis: str) -> Check:
 
 
 def _check_arms(findings: NaoFindings) -> Check:
-    """Check how much larger the margins of printed gaits are with the arms' swing than with arms at rest [mm]."""
     pairs = [(phase.printed_here["pso"], phase.printed_by_choice["held"]["pso"]) for phase in findings.phases]
     gains = [[1000 * (here[index] - held[index]) for index in MARGINS] for here, held in pairs]
     cost = [100 * (here["power_W"] / held["power_W"] - 1) for here, held in pairs]
@@ -127,28 +111,19 @@ def _check_arms(findings: NaoFindings) -> Check:
 
 
 def _check_pace(phase: PhaseFindings, slow: bool, share: bool = True) -> Check:
-    """Check how much smaller the least margin is at the slowest or the fastest pace than at the best [%], or [mm] if no share."""
-    paces = _vary_pace(phase, phase.problem.names[phase.paper.duration])
-    margins = {at: 1000 * min(found["dbm_x_min_m"], found["dbm_y_min_m"]) for at, found in paces.items()}
+    """Check the loss of margin at the slowest or the fastest pace along the same path [%], or [mm] if no share."""
+    problem, time, x = phase.problem, phase.problem.names[phase.paper.duration], phase.printed_pso
+    rates, margins = [name for name in x if name.startswith("hip_v")], {}
+    for at in np.geomspace(problem.value(f"{time}.lower"), problem.value(f"{time}.upper"), PACES).tolist():
+        found = phase.evaluate_printed(**{time: at}, **{v: x[v] * x[time] / at for v in rates})
+        margins[at] = 1000 * min(found["dbm_x_min_m"], found["dbm_y_min_m"])
     best, end = max(margins, key=margins.__getitem__), max(margins) if slow else min(margins)
-    lost = margins[best] - margins[end]
+    lost, shown = margins[best] - margins[end], {"at_best": margins[best], "at_end": margins[end]}
     fall = 100 * lost / margins[best]
-    return require_change(
-        fall if share else lost, end=end, lost=lost, at_end=margins[end], best=best, at_best=margins[best], fall=fall
-    )
-
-
-def _vary_pace(phase: PhaseFindings, time: str) -> dict[float, Mapping[str, float]]:
-    """Performance figures of the printed PSO gait along the same path in other times, by time [s]."""
-    x = phase.problem.by_name(phase.problem.check_x(phase.paper.optima["pso"].x))
-    rates = [name for name in x if name.startswith("hip_v")]
-    low, high = (phase.problem.value(f"{time}.{end}") for end in ("lower", "upper"))
-    times = np.geomspace(low, high, PACES).tolist()
-    return {at: phase.evaluate_printed(**{time: at}, **{v: x[v] * x[time] / at for v in rates}) for at in times}
+    return require_change(fall if share else lost, **shown, best=best, end=end, lost=lost, fall=fall)
 
 
 def _check_straight(findings: NaoFindings, low: bool = False) -> Check:
-    """Check how much larger the least margins are without vertical motion of the hip [mm], or with the lowest hip, too."""
     ours, lowest = [], [phase.lowest_hip_m for phase in findings.phases]
     for phase, height in zip(findings.phases, lowest, strict=True):
         straight = phase.evaluate_printed(**STRAIGHT, **({"hip_height_m": height} if low else {}))
@@ -157,7 +132,6 @@ def _check_straight(findings: NaoFindings, low: bool = False) -> Check:
 
 
 def _check_near_zero_reason(phase: PhaseFindings) -> Check:
-    """Check that balance margins fail, and nothing else, in the printed solutions if they start without lateral velocity."""
     exact, texts, holds = build_exact_model(phase.problem), [], []
     for velocity, (name, optimum) in product(NEAR_ZERO_M_S, phase.paper.optima.items()):
         x = [*optimum.x[:5], velocity, *optimum.x[6:]]
@@ -170,16 +144,12 @@ def _check_near_zero_reason(phase: PhaseFindings) -> Check:
 
 
 def _check_oscillation(findings: NaoFindings) -> Check:
-    """Check how much less power the hip's vertical motion needs than a straight line [%]."""
-    ours = [
-        100 * (1 - phase.printed_here["pso"]["power_W"] / phase.evaluate_printed(**STRAIGHT)["power_W"])
-        for phase in findings.phases
-    ]
+    pairs = [(phase.printed_here["pso"], phase.evaluate_printed(**STRAIGHT)) for phase in findings.phases]
+    ours = [100 * (1 - curved["power_W"] / line["power_W"]) for curved, line in pairs]
     return require_change(ours, ours=ours)
 
 
 def _check_oscillation_torque(findings: NaoFindings) -> Check:
-    """Check how much less torque the hip's vertical motion needs than a straight line [%]: root mean square over all joints."""
     torques = [[phase.sample_printed(**at).arrays["tau"] for at in ({}, STRAIGHT)] for phase in findings.phases]
     ours = [100 * (1 - float(np.linalg.norm(curved) / np.linalg.norm(line))) for curved, line in torques]
     greatest = [100 * (1 - float(np.abs(curved).max() / np.abs(line).max())) for curved, line in torques]
@@ -187,7 +157,6 @@ def _check_oscillation_torque(findings: NaoFindings) -> Check:
 
 
 def _check_relief(findings: NaoFindings) -> Check:
-    """Check how much less torque knees and ankles need with the hip at its upper bound than with the lowest hip [%, rms]."""
     ours = []
     for phase in findings.phases:
         ends = []
@@ -200,7 +169,6 @@ def _check_relief(findings: NaoFindings) -> Check:
 
 
 def _check_lateral_margin(phase: PhaseFindings) -> Check:
-    """Check how much the margins in y of PSO's printed solution lose when both lateral velocities are halved [mm]."""
     x, here = phase.paper.optima["pso"].x, phase.printed_here["pso"]
     halved = phase.evaluate_printed(hip_vy_start_m_s=x[5] / 2, hip_vy_end_m_s=x[6] / 2)
     ours = [1000 * (here[index] - halved[index]) for index in ("dbm_y_min_m", "dbm_y_mean_m")]
@@ -208,14 +176,12 @@ def _check_lateral_margin(phase: PhaseFindings) -> Check:
 
 
 def _check_torque_limit(phase: PhaseFindings) -> Check:
-    """Check whether the limit of 1.2 Nm binds at an end of a run or at IPOPT's optimum."""
     ends = [run.verdict.indexes["torque_change_Nm"] for runs in phase.searches.values() for run in runs]
     greatest, limit = max([*ends, phase.optimum.verdict.indexes["torque_change_Nm"]]), phase.problem.value(TORQUE_LIMIT)
-    return decide(greatest > 0.99 * limit, greatest=greatest, limit=limit, phase=phase.paper.title)
+    return decide(greatest > 0.99 * limit, greatest=greatest, limit=limit)
 
 
 def _check_contradiction(findings: NaoFindings) -> Check:
-    """Check the price of the mean margins at IPOPT's optimum [mW per mm]."""
     prices = [
         max((abs(row.price) for row in phase.optimum.active_constraints if row.name.startswith("dbm")), default=0.0)
         for phase in findings.phases
@@ -224,7 +190,6 @@ def _check_contradiction(findings: NaoFindings) -> Check:
 
 
 def _check_joints(findings: NaoFindings, kind: str) -> Check:
-    """Check whether a kind of joint has the largest share in the power of the printed solutions of single support."""
     ssp, texts = findings.ssp, []
     for phase in findings.phases:
         shares = compute_joint_shares(phase.problem, phase.paper.optima["pso"].x)
@@ -238,7 +203,6 @@ def _check_joints(findings: NaoFindings, kind: str) -> Check:
 
 
 def _check_swing_hip(findings: NaoFindings) -> Check:
-    """Check whether most of the hips' power in single support is that of the swing leg's hip: roll and pitch."""
     ssp, shares = findings.ssp, []
     for x in (*(ssp.paper.optima[name].x for name in ALGORITHMS), [*ssp.optimum.x.values()]):
         for heat in (True, False):
@@ -249,7 +213,6 @@ def _check_swing_hip(findings: NaoFindings) -> Check:
 
 
 def _check_swing_joints(findings: NaoFindings) -> Check:
-    """Check whether a higher swing foot moves the swing leg's knee and ankle pitch more than its hip pitch [degrees]."""
     ssp, angles = findings.ssp, []
     for end in (ssp.problem.lower, ssp.problem.upper):
         signals = ssp.sample_printed(swing_height_m=end[SWING_HEIGHT])
@@ -260,7 +223,6 @@ def _check_swing_joints(findings: NaoFindings) -> Check:
 
 
 def _check_hip_variation(phase: PhaseFindings, swarm: str = "") -> Check:
-    """Check how much less a swarm's solutions move the hip vertically than GA's, medians of the runs or as printed [%]."""
     if swarm:
         found = [[list(run.x.values()) for run in phase.searches[name]] for name in (swarm, "ga")]
     else:
@@ -269,16 +231,15 @@ def _check_hip_variation(phase: PhaseFindings, swarm: str = "") -> Check:
     (pso, ga), p = map(np.median, rises), rank_sum_normal(*rises).p_two_sided
     values = {"pso": pso, "ga": ga, "change": 100 * float(pso / ga - 1)}
     check = require_change(-values["change"], **values, swarm=NAMES.get(swarm))
-    return require_significance(replace(check, values={**check.values, "p": p}), "rank-sum test", p) if swarm else check
+    with_p = replace(check, values={**check.values, "p": p})
+    return claims.require_significance(with_p, "rank-sum test", p) if swarm else check
 
 
 def _check_few_mm(phase: PhaseFindings) -> Check:
-    """Check the hip's vertical range in the printed solutions and at the ends of all runs [mm]."""
     printed = [_compute_hip_rise(phase, optimum.x) for optimum in phase.paper.optima.values()]
     ends = [_compute_hip_rise(phase, [*run.x.values()]) for runs in phase.searches.values() for run in runs]
-    return compare_levels(
-        np.zeros(len(printed) + len(ends)), [*printed, *ends], printed=Series(printed), most=max(ends)
-    )
+    every = [*printed, *ends]
+    return compare_levels(np.zeros(len(every)), every, printed=Series(printed), most=max(ends))
 
 
 def _compute_hip_rise(phase: PhaseFindings, x: Sequence[float]) -> float:
@@ -296,8 +257,6 @@ def _check_simulations(findings: NaoFindings, key: str) -> Check:
     found = {f"{p.paper.title}, {n.upper()}": s for p in findings.phases for n, s in p.simulations.items()}
     tilts = ", ".join(f"{name} {np.degrees(s['tilt_rad']):.1f}" for name, s in found.items())
     room = min(-np.degrees(s["simulated_beyond_rad"]) for s in found.values())
-    falls = [name for name, s in found.items() if s["fell_at_s"] is not None]
-    holds = not falls if key == "fell_at_s" else room >= 0.0
-    return decide(
-        holds, tilts=tilts, room=room, falls=", ".join(falls) or "no gait", period=1000 * WEBOTS_DRIVE.period_s
-    )
+    falls = ", ".join(name for name, s in found.items() if s["fell_at_s"] is not None)
+    holds, period_ms = not falls if key == "fell_at_s" else room >= 0.0, 1000 * WEBOTS_DRIVE.period_s
+    return decide(holds, tilts=tilts, room=room, falls=falls or "no gait", period=period_ms)

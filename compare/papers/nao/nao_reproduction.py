@@ -22,7 +22,6 @@ from compare.papers.nao.nao_runs import ALGORITHMS, FixedOptimum, NaoEffort
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
 from compare.report.document import Rows, Value
-from compare.study.record import RunRecord
 from compare.study.record_files import locate_record
 from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, Task
@@ -57,15 +56,12 @@ def _run_phases(runner: Runner, effort: NaoEffort) -> dict[str, Any]:
             locate_record(runner.folder, task).unlink(missing_ok=True)  # only a run gives its points
     runs = runner.run_tasks(tasks, partial(nao.run_and_store_points, runner.folder))
     simulated = runner.compute(nao.make_simulations(effort), code=(nao, simulate))
-    phases = {
-        phase.problem.removeprefix("nao-"): _sweep_phase(
-            runner, effort, phase, runs, _load_all_points(store, phase, searches), simulated
-        )
-        for phase in effort.phases
-    }
+    found: dict[str, Any] = {}
+    for phase in effort.phases:
+        points = _load_all_points(store, phase, searches)
+        found[phase.problem[4:]] = _sweep_phase(runner, effort, phase, runs, points, simulated)
     special = _solve_sweeps(runner, nao.make_special_sweeps(effort))
-    fields = {nao.SWING_SWEEP: "swing", nao.DURATION_SWEEP: "durations"}
-    return {**phases, **{fields[name]: points for name, points in special.items()}}
+    return found | dict(zip(("swing", "durations"), special, strict=False))
 
 
 def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, FeasiblePoints]:
@@ -101,7 +97,7 @@ def _sweep_phase(
         problem=spec.load(),
         searches={name: runs[paper.problem, name] for name in nao.SEARCHES},
         starts=starts,
-        sweeps=dict(enumerate(_solve_sweeps(runner, sweeps).values())),
+        sweeps=dict(enumerate(_solve_sweeps(runner, sweeps))),
         points=points,
         variants={name: runs[paper.problem, name] for name in (*nao.VARIANTS, *nao.MORE)},
         choices=nao.list_choices(paper.problem, effort, solved=False),
@@ -110,20 +106,17 @@ def _sweep_phase(
     )
 
 
-def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> dict[str, list[FixedOptimum]]:
-    results = runner.compute(sweeps, code=(nao, ipopt))
-    return {name: [FixedOptimum(**row) for row in rows] for name, rows in results.items()}
+def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> list[list[FixedOptimum]]:
+    return [[FixedOptimum(**row) for row in rows] for rows in runner.compute(sweeps, code=(nao, ipopt)).values()]
 
 
 def compute_values(findings: NaoFindings) -> dict[str, Any]:
     """Return the values of the places in the report's text and in the table of differences."""
     ssp, dsp = findings.phases
-    runs = ssp.searches["pso"]
-    printed = [
-        (optimum.power_W, phase.printed_here[name]["power_W"], optimum.legs_twice_W)
-        for phase in findings.phases
-        for name, optimum in phase.paper.optima.items()
-    ]
+    runs, robot = ssp.searches["pso"], str(ssp.problem.options["robot"])
+    solutions = [(phase, *pair) for phase in findings.phases for pair in phase.paper.optima.items()]
+    printed = [(o.power_W, phase.printed_here[name]["power_W"], o.legs_twice_W) for phase, name, o in solutions]
+    margins = [(dsp.paper.optima[n].indexes[i], dsp.printed_here[n][i]) for n in ALGORITHMS for i in MARGINS]
     changes = np.array(list(findings.torque_changes_Nm.values()))
     target = np.array([dsp.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS])
     misses = 100 * np.abs(changes / target - 1).max(axis=1)
@@ -131,7 +124,7 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "runs": len(runs),
         "generations": runs[0].iterations,
         "starts": len(ssp.starts),
-        "robot": ssp.problem.options["robot"],
+        "robot": robot,
         "ssp": _compute_phase_values(ssp),
         "dsp": _compute_phase_values(dsp),
         "costs": compute_range(100 * (here["power_W"] / dsp.best - 1) for here in dsp.printed_here.values()),
@@ -142,46 +135,35 @@ def compute_values(findings: NaoFindings) -> dict[str, Any]:
         "nearest_Nm": changes[misses.argmin()],
         "nearest_miss": misses.min(),
         "candidates": len(changes) - 1,  # the first is ours
-        "bodies": len(load_robot(str(ssp.problem.options["robot"])).links),
-        "masses_kg": [load_robot(robot).mass_kg for robot in ("nao-v5", "nao-v6")],
-        "simulator": {
-            "drive": nao.WEBOTS_DRIVE,
-            "friction": FRICTION,
-            "step_ms": 1000 * TIME_STEP,
-            "settle_s": SETTLE_TIME,
-        },
+        "bodies": len(load_robot(robot).links),
+        "masses_kg": [load_robot(name).mass_kg for name in ("nao-v5", "nao-v6")],
+        "simulator": {"friction": FRICTION, "step_ms": 1000 * TIME_STEP, "settle_s": SETTLE_TIME}
+        | {"drive": nao.WEBOTS_DRIVE},
         "pairs": len(ssp.final_powers("ga-more")),
         "printed_feasible": sum(
             build_exact_model(p.problem).at(p.problem.check_x(o.x), p.problem.p).violation <= FEASIBILITY_TOLERANCE
-            for p in findings.phases
-            for o in p.paper.optima.values()
+            for p, _, o in solutions
         ),
-        "margin_gap_mm": 1000
-        * max(
-            abs(optimum.indexes[index] - dsp.printed_here[name][index])
-            for name, optimum in dsp.paper.optima.items()
-            for index in MARGINS
-        ),
+        "margin_gap_mm": 1000 * max(abs(there - here) for there, here in margins),
         **_compare_verdicts(findings),
-        "bounds": {phase.problem.name[4:]: _list_bounds(phase) for phase in findings.phases},
+        "bounds": {
+            phase.problem.name[4:]: [f"{row.lower:g} to {row.upper:g} {row.unit}" for row in phase.problem.variables]
+            for phase in findings.phases
+        },
         "limits": [ssp.problem.value(name) for name in ("heat_loss_W_per_Nm2", "torque_change_limit_Nm", *MEANS)]
         + [dsp.problem.value(name) for name in MEANS],
         "backward": _count_backward(findings),
-        "least_margin_mm": 1000 * min(min(m) for phase in findings.phases for m in _list_least_margins(phase)),
+        "least_margin_mm": 1000
+        * min(end.indexes[i] for phase in findings.phases for end in phase.feasible_ends for i in MARGINS[:2]),
     }
 
 
 def _compute_lever_values(dsp: PhaseFindings) -> dict[str, Any]:
-    """What the text's reading of (28), (29) changes in double support: what the printed solutions cost, and the optimum."""
     optimum, printed = dsp.optimum_with("lever"), dsp.printed_by_choice["lever"]
     best = optimum.verdict.objective if optimum else math.nan
     x = [*optimum.x.values()] if optimum else [math.nan] * len(dsp.optimum.x)
     costs = [100 * (here["power_W"] / best - 1) for here in printed.values()]
     return {"lever_costs": costs, "lever_x": x, "dsp_x": [*dsp.optimum.x.values()]}
-
-
-def _list_bounds(phase: PhaseFindings) -> list[str]:
-    return [f"{row.lower:g} to {row.upper:g} {row.unit}" for row in phase.problem.variables]
 
 
 def _compare_verdicts(findings: NaoFindings) -> dict[str, Any]:
@@ -206,7 +188,7 @@ def _compare_verdicts(findings: NaoFindings) -> dict[str, Any]:
         ]
         changed[choice] = f"{len(words)} of {len(rows)} verdicts are others: {'; '.join(words) or 'none'}"
     return {
-        "tests": f"{len(p)}",
+        "tests": len(p),
         "level": f"{100 * SIGNIFICANT:.0f}",
         "holm": "; ".join(lost) or "none",
         "changed": changed,
@@ -227,22 +209,14 @@ def _count_backward(findings: NaoFindings) -> dict[str, float]:
     return {"runs": sum(v < 0 for v in ends), "count": len(ends), "most": max(0.0, -min(ends)), "others": min(others)}
 
 
-def _list_least_margins(phase: PhaseFindings) -> list[tuple[float, float]]:
-    ends = [run.verdict for runs in phase.searches.values() for run in runs if run.verdict.feasible]
-    return [(end.indexes["dbm_x_min_m"], end.indexes["dbm_y_min_m"]) for end in ends]
-
-
 def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
     """Values of one phase; ``broken`` counts final solutions that violate a constraint between the paper's samples."""
-    ends = [run.verdict for runs in phase.searches.values() for run in runs if run.verdict.feasible]
-    optimum = phase.optimum.verdict
+    ends, optimum = phase.feasible_ends, phase.optimum.verdict
     shares = compute_joint_shares(phase.problem, phase.paper.optima["pso"].x)
-    medians = {
-        name.replace("-", "_"): float(np.median(phase.final_powers(name))) for name in (*nao.SEARCHES, *phase.variants)
-    }
+    names = (*nao.SEARCHES, *phase.variants)
     return {
         "effects": {name: describe_effect(phase, name) for name in phase.choices},
-        "median_W": medians,
+        "median_W": {name.replace("-", "_"): float(np.median(phase.final_powers(name))) for name in names},
         "best_W": phase.best,
         "printed_W": {name: here["power_W"] for name, here in phase.printed_here.items()},
         "more": phase.test("pso-more", "ga-more"),
@@ -262,8 +236,8 @@ def make_tables(findings: NaoFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
     dsp = findings.dsp
     tables: dict[str, Rows] = {
-        nao.SWING_SWEEP: _list_swing_heights(findings),
-        nao.DURATION_SWEEP: [(point.at, point.power_W) for point in findings.durations],
+        "table7-swing-heights": _list_swing_heights(findings),
+        "durations": [(point.at, point.power_W) for point in findings.durations],
         "rank-sum-tests": [row for phase in findings.phases for row in _list_tests(phase)],
         "choices": [row for phase in findings.phases for row in _list_choices(phase)],
         "search-choices": [row for phase in findings.phases for row in _list_variants(phase)],
@@ -288,7 +262,6 @@ def make_tables(findings: NaoFindings) -> dict[str, Rows]:
 
 
 def _list_variables(phase: PhaseFindings) -> Rows:
-    """Tables 6, 8: the optimal solutions; of the searches the run of median power."""
     other = phase.optimum_with("v6")
     rows: list[list[Value]] = []
     for i, variable in enumerate(phase.problem.variables):
@@ -315,24 +288,18 @@ def _list_indexes(phase: PhaseFindings) -> Rows:
 
 def _list_choices(phase: PhaseFindings) -> Rows:
     """The printed solutions and IPOPT's optimum with each other choice."""
-    rows = [_list_choice(phase, "as here", phase.printed_here, phase.optimum)]
-    for name, printed in phase.printed_by_choice.items():
-        rows.append(_list_choice(phase, PAPER.choices[name].title, printed, phase.optimum_with(name)))
+    rows, every = [], {"": phase.printed_here, **phase.printed_by_choice}
+    for choice, printed in every.items():
+        title, best = (
+            (PAPER.choices[choice].title, phase.optimum_with(choice)) if choice else ("as here", phase.optimum)
+        )
+        solved = best is not None and best.claimed and best.verdict.feasible
+        numbers = [printed[name][index] for name in ALGORITHMS for index in ("power_W", "torque_change_Nm")]
+        rows.append([phase.paper.title, title, *numbers, best.verdict.objective if best and solved else "not solved"])
     return rows
 
 
-def _list_choice(
-    phase: PhaseFindings, title: str, printed: Mapping[str, Mapping[str, float]], optimum: RunRecord | None
-) -> list[Value]:
-    row: list[Value] = [phase.paper.title, title]
-    for name in ALGORITHMS:
-        row += [printed[name]["power_W"], printed[name]["torque_change_Nm"]]
-    solved = optimum is not None and optimum.claimed and optimum.verdict.feasible
-    return [*row, optimum.verdict.objective if optimum is not None and solved else "not solved"]
-
-
 def _list_variants(phase: PhaseFindings) -> Rows:
-    """Median power of each choice that the paper leaves open, against both kinds of PSO and GA."""
     rows: list[list[Value]] = []
     for name in (*nao.SEARCHES, *phase.variants):
         powers, p = phase.final_powers(name), [phase.test(name, other).p_two_sided for other in nao.SEARCHES]
@@ -355,7 +322,6 @@ def _list_swing_heights(findings: NaoFindings) -> Rows:
 
 
 def _list_runs(phase: PhaseFindings) -> Rows:
-    """Power at the end of all runs and starts."""
     rows = []
     for name, runs in (*phase.searches.items(), ("ipopt", phase.starts)):
         powers = [run.verdict.objective for run in runs if run.verdict.feasible and run.claimed]
@@ -372,13 +338,9 @@ def _list_tests(phase: PhaseFindings) -> Rows:
     """Section 5.3: Wilcoxon's rank-sum tests of PSO's powers against GA's, and the effect size."""
     tests = [("paper", phase.paper.test, compute_implied_a12(phase))]
     for name in ("pso-constant", "pso"):
-        tests.append(
-            (f"here, {NAMES[name]}", phase.test(name), a12(phase.final_powers(name), phase.final_powers("ga")))
-        )
-    return [
-        [phase.paper.title, name, test.rank_sum, test.z, test.p_two_sided, test.p_less, share]
-        for name, test, share in tests
-    ]
+        share = a12(phase.final_powers(name), phase.final_powers("ga"))
+        tests.append((f"here, {NAMES[name]}", phase.test(name), share))
+    return [[phase.paper.title, name, t.rank_sum, t.z, t.p_two_sided, t.p_less, share] for name, t, share in tests]
 
 
 def compute_implied_a12(phase: PhaseFindings) -> float:
@@ -388,22 +350,18 @@ def compute_implied_a12(phase: PhaseFindings) -> float:
 
 
 def _list_gaps(phase: PhaseFindings) -> Rows:
-    """The paper's solutions: power as printed, as found here, and with the legs' mechanical term counted twice."""
     rows = []
-    for name in ALGORITHMS:
-        printed, here = phase.paper.optima[name].power_W, phase.printed_here[name]["power_W"]
-        twice = phase.paper.optima[name].legs_twice_W
-        rows.append((f"{phase.paper.title}, {name.upper()}", printed, here, printed - here, twice))
+    for name, optimum in phase.paper.optima.items():
+        printed, here = optimum.power_W, phase.printed_here[name]["power_W"]
+        rows.append((f"{phase.paper.title}, {name.upper()}", printed, here, printed - here, optimum.legs_twice_W))
     return rows
 
 
 def _list_simulations(phase: PhaseFindings) -> Rows:
     """Section 5.4: the paper's solutions in MuJoCo."""
-    rows = []
+    rows, keys = [], ("tilt_rad", "planned_beyond_rad", "simulated_beyond_rad")
     for name, found in phase.simulations.items():
-        tilt, planned, simulated = (
-            math.degrees(found[key]) for key in ("tilt_rad", "planned_beyond_rad", "simulated_beyond_rad")
-        )
+        tilt, planned, simulated = (math.degrees(found[key]) for key in keys)
         fell = "stays up" if found["fell_at_s"] is None else f"falls at {found['fell_at_s']:.2f} s"
         rows.append((f"{phase.paper.title}, {name.upper()}", fell, tilt, -planned, -simulated))
     return rows

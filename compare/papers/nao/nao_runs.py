@@ -42,7 +42,6 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "pso-constant-fast": {"solver": "pso-constant", "settings": {"velocity_limit": 1.0}},
 }
 MORE = {f"{name}-more": name for name in SEARCHES}  # searches from further initial populations
-SWING_SWEEP, DURATION_SWEEP = "table7-swing-heights", "durations"
 WEBOTS_DRIVE = Drive(period_s=0.04, interpolation="held", feed_forward="none")  # section 5.4
 
 
@@ -77,9 +76,8 @@ class NaoEffort(Effort):
 
     def choose_other(self, choice: str) -> NaoEffort:
         """Return the effort with another choice: all searches, fewer starts of IPOPT and points of its sweeps."""
-        chosen = replace(self, choice=choice, others=(), choices=("v6",), choice_starts=1)
-        fewer = min(3, self.variant_runs), min(8, self.starts)
-        return replace(chosen, variant_runs=fewer[0], starts=fewer[1], sweep_points=(5, 4))
+        fewer = replace(self, variant_runs=min(3, self.variant_runs), starts=min(8, self.starts), sweep_points=(5, 4))
+        return replace(fewer, choice=choice, others=(), choices=("v6",), choice_starts=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +99,8 @@ def make_tasks(effort: NaoEffort) -> list[Task]:
         for label, kind in VARIANTS.items():
             tasks += [Task(problem=spec, label=label, stop=stop, run=k, **kind) for k in range(effort.variant_runs)]
         more = range(effort.runs, effort.runs + effort.more_runs)
-        tasks += [
-            Task(problem=spec, solver=name, label=label, stop=stop, run=k) for label, name in MORE.items() for k in more
-        ]
+        for label, name in MORE.items():
+            tasks += [Task(problem=spec, solver=name, label=label, stop=stop, run=k) for k in more]
         tasks += [Task(problem=spec, solver=IPOPT, run=k) for k in range(effort.starts)]
         for chosen in list_choices(phase.problem, effort).values():
             tasks += [Task(problem=chosen, solver=IPOPT, run=k) for k in range(effort.choice_starts)]
@@ -154,26 +151,21 @@ def _name_points(task: Task) -> str:
 
 def make_special_sweeps(effort: NaoEffort) -> list[Computation]:
     """Return IPOPT over the paper's swing heights, and over durations of single support; nothing without that phase."""
-    if SSP not in effort.phases:
-        return []
     spec, starts = make_spec(SSP.problem, effort), effort.sweep_starts
-    return [
-        make_sweep(SWING_SWEEP, spec, SWING_HEIGHT, PAPER.swing_heights_m, starts),
-        make_sweep(DURATION_SWEEP, spec, SSP.duration, PAPER.durations_s, starts),
+    sweeps = [
+        make_sweep("table7-swing-heights", spec, SWING_HEIGHT, PAPER.swing_heights_m, starts),
+        make_sweep("durations", spec, SSP.duration, PAPER.durations_s, starts),
     ]
+    return sweeps if SSP in effort.phases else []
 
 
 def make_sweep(name: str, spec: ProblemSpec, position: int, values: Sequence[float], starts: int) -> Computation:
     """Return a sweep over a variable: its optima lead to each other, so they are not runs by themselves."""
-    variable = spec.load().names[position]
-    return make_computation(
-        name, spec, partial(solve_sweep, spec), variable=variable, values=list(values), starts=starts
-    )
+    inputs = {"variable": spec.load().names[position], "values": list(values), "starts": starts}
+    return make_computation(name, spec, partial(solve_sweep, spec), **inputs)
 
 
-def solve_sweep(
-    spec: ProblemSpec, variable: str, values: Sequence[float], starts: int
-) -> list[dict[str, float | bool]]:
+def solve_sweep(spec: ProblemSpec, variable: str, values: Sequence[float], starts: int) -> list[dict[str, Any]]:
     """Return the fields of ``FixedOptimum`` at ascending values, infeasible points included."""
     problem = spec.load()
     solutions = solve_both_ways([problem.fix(**{variable: value}) for value in values], starts=starts)
