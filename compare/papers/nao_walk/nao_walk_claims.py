@@ -36,14 +36,6 @@ class NaoWalkFindings:
         """Return the feasible gaits over speed."""
         return [point for point in self.speeds[heat] if point["feasible"]]
 
-    def cheapest(self, heat: str) -> Point:
-        """Return the gait of least cost of transport."""
-        return min(self.curve(heat), key=lambda point: float(point["cost_of_transport"]))
-
-    def at_default(self, heat: str) -> Point:
-        """Return the gait at the default speed."""
-        return next(point for point in self.curve(heat) if point["speed_m_s"] == SPEED_M_S)
-
     def share(self, gait: str, where: str, heat: str, kind: str = KNEE) -> float:
         """Return the share of a kind of joint in mechanical energy and heat; ``where`` is ``model`` or ``engine``."""
         kinds = self.joints[gait][where]
@@ -82,7 +74,7 @@ def _check_straight(findings: NaoWalkFindings) -> Check:
     heights = findings.torsos
     own, tallest = next(point for point in heights if point["torso_m"] == nao_walk_runs.TORSO_M), heights[-1]
     best = {heat: min(heights, key=lambda point: float(point[f"{heat}_J_per_m"])) for heat in HEATS}
-    tallest_mm, found = 1000 * tallest["torso_m"], []
+    torso_mm, tallest_mm, found = 1000 * nao_walk_runs.TORSO_M, 1000 * tallest["torso_m"], []
     for heat, name in HEATS.items():
         key = f"{heat}_J_per_m"
         at_best, at_tallest = (100 * (point[key] / own[key] - 1) for point in (best[heat], tallest))
@@ -94,49 +86,29 @@ def _check_straight(findings: NaoWalkFindings) -> Check:
     verdict = ClaimVerdict.HOLDS if all(point is tallest for point in best.values()) else ClaimVerdict.SIZE_DIFFERS
     if not all(best[heat][f"{heat}_J_per_m"] <= (1 - LEAST_SAVING) * own[f"{heat}_J_per_m"] for heat in HEATS):
         verdict = ClaimVerdict.FAILS
-    return decide(
-        verdict,
-        torso_mm=1000 * nao_walk_runs.TORSO_M,
-        tallest_mm=tallest_mm,
-        tallest=tallest,
-        own=own,
-        found="; ".join(found),
-        optimum=optimum,
-        gain=100.0 * (1.0 - optimum["power_W"] / SPEED_M_S / own["sheet_J_per_m"]),
-    )
+    gain = 100.0 * (1.0 - optimum["power_W"] / SPEED_M_S / own["sheet_J_per_m"])
+    values = {"tallest": tallest, "own": own, "found": "; ".join(found), "optimum": optimum, "gain": gain}
+    return decide(verdict, torso_mm=torso_mm, tallest_mm=tallest_mm, **values)
 
 
 def _check_heat(findings: NaoWalkFindings) -> Check:
     *heats, _ = findings.straighter
     free, bounded = ({heat: at[bound] for heat, at in findings.straighter.items()} for bound in ("free", "paper"))
     least, sheet = free[heats[0]], free["sheet"]
-    straighter = least["knee_deg"] - sheet["knee_deg"]
-    return require_change(
-        straighter,
-        speed=SPEED_M_S,
-        heats=", ".join(heats),
-        angles=", ".join(f"{free[heat]['knee_deg']:.1f}" for heat in heats),
-        free=sheet,
-        rise=1000.0 * (sheet["hip_m"] - least["hip_m"]),
-        least=heats[0],
-        bounded=[bounded[heat]["knee_deg"] for heat in (heats[0], "sheet")],
-        straighter=straighter,
-    )
+    straighter, rise = least["knee_deg"] - sheet["knee_deg"], 1000.0 * (sheet["hip_m"] - least["hip_m"])
+    values = {"speed": SPEED_M_S, "free": sheet, "rise": rise, "least": heats[0], "straighter": straighter}
+    values |= {"heats": ", ".join(heats), "angles": ", ".join(f"{free[heat]['knee_deg']:.1f}" for heat in heats)}
+    values["bounded"] = [bounded[heat]["knee_deg"] for heat in (heats[0], "sheet")]
+    return require_change(straighter, **values)
 
 
 def _check_efficient(findings: NaoWalkFindings) -> Check:
     plain, fed = findings.over_stiffness("sheet_J_per_m")
     gain, stiffness = _find_saving(findings, plain)
     others, _ = _find_saving(findings, fed)
-    return require_change(
-        100 * gain,
-        plain=_list_energies(findings, plain),
-        fed=_list_energies(findings, fed),
-        change=-100 * gain,
-        stiffness=stiffness,
-        change_fed=-100 * others,
-        gain=100 * gain,
-    )
+    changes = {"gain": 100 * gain, "change": -100 * gain, "change_fed": -100 * others, "stiffness": stiffness}
+    texts = {name: _list_energies(findings, energies) for name, energies in (("plain", plain), ("fed", fed))}
+    return require_change(100 * gain, **changes, **texts)
 
 
 def _check_robust(findings: NaoWalkFindings) -> Check:
@@ -148,36 +120,26 @@ def _check_robust(findings: NaoWalkFindings) -> Check:
         verdict = ClaimVerdict.HOLDS
         if p >= SIGNIFICANT:
             verdict, chance = ClaimVerdict.NOT_SHOWN, f" may be chance, Fisher: p = {p:.2g}"
-    return decide(
-        verdict,
-        count=count,
-        stiffnesses=_list_stiffnesses(findings),
-        plain=", ".join(map(str, plain)),
-        fed=", ".join(map(str, fed)),
-        fewest=fewest,
-        full=full,
-        chance=chance,
-    )
+    texts = {"stiffnesses": _list_stiffnesses(findings), "chance": chance}
+    texts |= {"plain": ", ".join(map(str, plain)), "fed": ", ".join(map(str, fed))}
+    return decide(verdict, count=count, fewest=fewest, full=full, **texts)
 
 
 def _check_fast(findings: NaoWalkFindings) -> Check:
     plain, fed = ([100.0 * speed for speed in speeds] for speeds in findings.over_stiffness("fastest_m_s"))
-    full, best = plain[0], max(plain[1:])
-    return require_change(
-        100 * (best / full - 1) if full else math.inf,
-        stiffnesses=_list_stiffnesses(findings),
-        plain=", ".join(f"{speed:.1f}" for speed in plain),
-        fed=", ".join(f"{speed:.1f}" for speed in fed),
-        gain=100 * (best / full - 1) if full else math.inf,
-    )
+    gain = 100 * (max(plain[1:]) / plain[0] - 1) if plain[0] else math.inf
+    texts = [", ".join(f"{speed:.1f}" for speed in speeds) for speeds in (plain, fed)]
+    return require_change(gain, stiffnesses=_list_stiffnesses(findings), plain=texts[0], fed=texts[1], gain=gain)
 
 
 def _check_speed(findings: NaoWalkFindings) -> Check:
     above, found = [], []
     for heat in SPECS:
-        cheapest, default = findings.cheapest(heat), findings.at_default(heat)
+        curve = findings.curve(heat)
+        cheapest = min(curve, key=lambda point: float(point["cost_of_transport"]))
+        default = next(point for point in curve if point["speed_m_s"] == SPEED_M_S)
         above.append(100.0 * (default["cost_of_transport"] / cheapest["cost_of_transport"] - 1.0))
-        edge = ", the fastest computed" if cheapest is findings.curve(heat)[-1] else ""
+        edge = ", the fastest computed" if cheapest is curve[-1] else ""
         found.append(
             f"with K of the {HEATS[heat]} {default['cost_of_transport']:.3f} there against "
             f"{cheapest['cost_of_transport']:.3f} at {100 * cheapest['speed_m_s']:.1f} cm/s{edge}"
@@ -186,17 +148,13 @@ def _check_speed(findings: NaoWalkFindings) -> Check:
 
 
 def _check_battery(findings: NaoWalkFindings) -> Check:
-    drained = 60.0 * nao_walk_runs.BATTERY_WH / nao_walk_runs.ACTIVE_MIN
+    battery_Wh, active_min = nao_walk_runs.BATTERY_WH, nao_walk_runs.ACTIVE_MIN
+    drained = 60.0 * battery_Wh / active_min
     powers = [findings.engine_W(name, "sheet") for name in ("own-plain", "own")]
     share = max((power for power in powers if power is not None), default=0.0) / drained
-    return decide(
-        ClaimVerdict.UNTESTABLE if 0.0 < share < 1.0 else ClaimVerdict.FAILS,
-        battery_Wh=nao_walk_runs.BATTERY_WH,
-        active_min=nao_walk_runs.ACTIVE_MIN,
-        drained=drained,
-        found=" and ".join("a fall" if power is None else f"{power:.1f} W" for power in powers),
-        share=share,
-    )
+    found = " and ".join("a fall" if power is None else f"{power:.1f} W" for power in powers)
+    values = {"battery_Wh": battery_Wh, "active_min": active_min, "drained": drained, "share": share, "found": found}
+    return decide(ClaimVerdict.UNTESTABLE if 0.0 < share < 1.0 else ClaimVerdict.FAILS, **values)
 
 
 def _find_saving(findings: NaoWalkFindings, energies: Sequence[float | None]) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import join_words
@@ -61,17 +61,11 @@ def _select(results: dict[str, Any], prefix: str) -> dict[str, Any]:
 def compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
     effort = findings.effort
-    disturbances = {
-        "pushes": runs.PUSHES_NS,
-        "slopes": runs.SLOPES_DEG,
-        "frictions": runs.FRICTIONS,
-        "masses": runs.MASS_FACTORS,
-    }
+    disturbances = {"pushes": runs.PUSHES_NS, "slopes": runs.SLOPES_DEG}
+    disturbances |= {"frictions": runs.FRICTIONS, "masses": runs.MASS_FACTORS}
+    straighter = {"paper": next(iter(findings.straighter.values())), "sheet": findings.straighter["sheet"]}
     return {
-        "knees": {
-            name: findings.straighter[key]["free"]["knee_deg"]
-            for name, key in (("paper", next(iter(findings.straighter))), ("sheet", "sheet"))
-        },
+        "knees": {name: found["free"]["knee_deg"] for name, found in straighter.items()},
         "step_mm": 1000 * runs.STEP_M,
         "period_s": runs.make_footsteps().period_s,
         "speed_cm_s": 100 * SPEED_M_S,
@@ -107,19 +101,14 @@ def make_tables(findings: NaoWalkFindings) -> dict[str, Rows]:
         for heat, points in findings.speeds.items()
         for point in points
     ]
-    torsos = [
-        [1000 * at["torso_m"], at["knee_deg"], at["paper_J_per_m"], at["sheet_J_per_m"]] for at in findings.torsos
-    ]
-    straighter = [
-        [HEATS.get(heat, heat), *_list_optimum(at["free"]), *_list_optimum(at["paper"])]
-        for heat, at in findings.straighter.items()
-    ]
+    energies = ("paper_J_per_m", "sheet_J_per_m")
+    torsos = [[1000 * at["torso_m"], at["knee_deg"], *(at[key] for key in energies)] for at in findings.torsos]
+    straighter: list[list[Value]] = []
+    for heat, at in findings.straighter.items():
+        ends = ([1000 * end["hip_m"], end["knee_deg"], end["power_W"]] for end in (at["free"], at["paper"]))
+        straighter.append([HEATS.get(heat, heat), *chain(*ends)])
     joints = _list_joints(findings)
     return {"joints": joints, "torsos": torsos, "straighter": straighter, "drives": drives, "speeds": speeds}
-
-
-def _list_optimum(found: Mapping[str, float]) -> list[float]:
-    return [1000 * found["hip_m"], found["knee_deg"], found["power_W"]]
 
 
 def _list_joints(findings: NaoWalkFindings) -> Rows:
@@ -155,11 +144,10 @@ def _draw_joints(findings: NaoWalkFindings) -> Figure:
     for place, (gait, where, _) in enumerate(BARS):
         bottom = 0.0
         for kind, colour in zip(KINDS, PALETTE, strict=True):
-            energies = findings.joints[gait][where][kind]
-            axes.bar(place, energies["sheet"], 0.7, bottom, color=colour, label=None if place else KINDS[kind])
-            bottom += energies["sheet"]
-            axes.bar(place, energies["mechanical"], 0.7, bottom, color=colour, alpha=0.45)
-            bottom += energies["mechanical"]
+            sheet, mechanical = (findings.joints[gait][where][kind][part] for part in ("sheet", "mechanical"))
+            axes.bar(place, sheet, 0.7, bottom, color=colour, label=None if place else KINDS[kind])
+            axes.bar(place, mechanical, 0.7, bottom + sheet, color=colour, alpha=0.45)
+            bottom += sheet + mechanical
     axes.set_axisbelow(True)
     axes.set_xticks(range(len(BARS)), [label for *_, label in BARS])
     axes.set_ylabel("energy [J/m]")
@@ -168,7 +156,6 @@ def _draw_joints(findings: NaoWalkFindings) -> Figure:
 
 
 def _draw_speeds(findings: NaoWalkFindings) -> Figure:
-    """Cost of transport over speed, and the default speed."""
     figure = new_figure(4.6, 3.0)
     axes = figure.subplots()
     for heat, name, colour in (("paper", "paper", COLOURS["pso"]), ("sheet", "data sheet", COLOURS["ga"])):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from nlp_gait.gaits.nao.problems import make_nao_cycles
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import planned_distance, walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan
-from nlp_gait.simulation.simulate import Conditions, Push, simulate_plan
+from nlp_gait.simulation.simulate import Conditions, Push, Simulation, simulate_plan
 
 # The walk that the maker documents, by the sources of ``nao_walk_claims.toml``; without another source, by Aldebaran's
 # documentation of NAOqi: omni-directional walk, locomotion control (read: beginnings of the pages of several versions; the
@@ -77,53 +78,43 @@ def make_gait_computations(effort: NaoWalkEffort) -> list[Computation]:
     """Return optimal gaits over speed, the robot's own walk at other heights, and optima whose legs may stretch."""
     heats = {f"{heat:g}": replace(SPECS["paper"], values={"heat_loss_W_per_Nm2": heat}) for heat in effort.heats}
     speeds, starts = effort.speeds_m_s, effort.starts
-    curves = [
-        make_computation(f"speeds-{name}", spec, partial(solve_over_speed, spec), speeds=speeds, starts=starts)
-        for name, spec in SPECS.items()
-    ]
-    straighter = [
-        make_computation(f"straighter-{name}", spec, partial(solve_free_height, spec), starts=starts)
-        for name, spec in {**heats, "sheet": SPECS["sheet"]}.items()
-    ]
-    return [*curves, make_computation("torsos", SPECS["paper"], compute_heights, heights=effort.torsos_m), *straighter]
+    found = []
+    for name, spec in SPECS.items():
+        solve_curve = partial(solve_over_speed, spec)
+        found.append(make_computation(f"speeds-{name}", spec, solve_curve, speeds=speeds, starts=starts))
+    found.append(make_computation("torsos", SPECS["paper"], compute_heights, heights=effort.torsos_m))
+    for name, spec in {**heats, "sheet": SPECS["sheet"]}.items():
+        found.append(make_computation(f"straighter-{name}", spec, partial(solve_free_height, spec), starts=starts))
+    return found
 
 
 def make_walk_computations(effort: NaoWalkEffort, optima: Mapping[str, Mapping[str, float]]) -> list[Computation]:
     """Return the energy of the joints in the robot's own walk and in optima, and that walk on softer drives."""
-    gaits: dict[str, tuple[str, str, Mapping[str, float]]] = {
-        "own": ("torque", "", {}),
-        "own-plain": ("none", "", {}),
-        **{f"optimum-{heat}": ("torque", heat, x) for heat, x in optima.items()},
+    gaits: dict[str, dict[str, Any]] = {
+        "own": {"feed_forward": "torque", "heat": "", "x": {}},
+        "own-plain": {"feed_forward": "none", "heat": "", "x": {}},
+        **{f"optimum-{heat}": {"feed_forward": "torque", "heat": heat, "x": dict(x)} for heat, x in optima.items()},
     }
-    spec, steps = SPECS["paper"], effort.walked
-    settings: dict[str, Any] = {"steps": steps, "lengths": effort.steps_m, "disturbed": effort.disturbed}
-    joints = [
-        make_computation(f"joints-{name}", spec, simulate_joints, feed_forward=fed, heat=heat, x=dict(x), steps=steps)
-        for name, (fed, heat, x) in gaits.items()
-    ]
-    drives = [
-        make_computation(
-            f"drives-{fed}-{share:g}", spec, simulate_drives, feed_forward=fed, stiffness=share, **settings
-        )
-        for fed in FEED_FORWARD
-        for share in effort.stiffnesses
-    ]
-    return joints + drives
+    make, steps = partial(make_computation, spec=SPECS["paper"]), effort.walked
+    found = [make(f"joints-{name}", function=simulate_joints, **how, steps=steps) for name, how in gaits.items()]
+    for fed, share in product(FEED_FORWARD, effort.stiffnesses):
+        how: dict[str, Any] = {
+            "feed_forward": fed,
+            "stiffness": share,
+            "lengths": effort.steps_m,
+            "disturbed": effort.disturbed,
+        }
+        found.append(make(f"drives-{fed}-{share:g}", function=simulate_drives, steps=steps, **how))
+    return found
 
 
 def solve_over_speed(spec: ProblemSpec, speeds: Sequence[float], starts: int) -> list[dict[str, Any]]:
     """Return the cheapest gait at each speed."""
-    axis = Axis(name="speed_m_s", values=tuple(speeds))
-    gaits = find(CheapestWalk(problem=spec.load(), axis=axis, starts=starts)).gaits
+    axis, names = Axis(name="speed_m_s", values=tuple(speeds)), ("cost_of_transport", "energy_J_per_m")
     return [
-        {
-            "speed_m_s": gait.at,
-            "feasible": gait.point.feasible,
-            "cost_of_transport": gait.indexes["cost_of_transport"],
-            "energy_J_per_m": gait.indexes["energy_J_per_m"],
-            "x": dict(gait.point.x),
-        }
-        for gait in gaits
+        {"speed_m_s": gait.at, "feasible": gait.point.feasible, "x": dict(gait.point.x)}
+        | {name: gait.indexes[name] for name in names}
+        for gait in find(CheapestWalk(problem=spec.load(), axis=axis, starts=starts)).gaits
     ]
 
 
@@ -135,8 +126,9 @@ def compute_heights(heights: Sequence[float]) -> list[dict[str, float]]:
             walk = plan_own_walk(make_footsteps(torso_m=height))
         except InputError:
             continue
-        plan = make_plan(walk)
-        found.append({"torso_m": height, **_compute_model(plan), "knee_deg": compute_knee_deg(walk)})
+        kinds = _sum_planned(make_plan(walk)).values()
+        energies = {f"{heat}_J_per_m": sum_energy(kinds, heat) for heat in SPECS}
+        found.append({"torso_m": height, **energies, "knee_deg": compute_knee_deg(walk)})
     return found
 
 
@@ -171,18 +163,8 @@ def simulate_joints(feed_forward: str, heat: str, x: Mapping[str, float], steps:
         result = plan_own_walk(make_footsteps())
     plan = make_plan(result, steps)
     trace = simulate_plan(plan, drive=Drive(feed_forward=feed_forward))
-    during = trace.t <= plan.duration_s
-    arrays = plan.signals.arrays
-    planned, (walked, _) = planned_distance(plan), walked_distance(trace)
-    return {
-        "fell_at_s": trace.fell_at_s,
-        "planned_m": planned,
-        "walked_m": walked,
-        "duration_s": plan.duration_s,
-        "knee_deg": compute_knee_deg(result),
-        "model": _sum_by_kind(plan, arrays["tau"], arrays["qd"], arrays["t"], planned),
-        "engine": _sum_by_kind(plan, trace.torque[during], trace.qd[during], trace.t[during], walked),
-    }
+    walk = {"fell_at_s": trace.fell_at_s, "walked_m": walked_distance(trace)[0], "duration_s": plan.duration_s}
+    return {**walk, "model": _sum_planned(plan), "engine": _sum_simulated(plan, trace)}
 
 
 def simulate_drives(
@@ -192,10 +174,8 @@ def simulate_drives(
     plan = make_plan(plan_own_walk(make_footsteps()), steps)
     drive = Drive(full_error_rad=Drive().full_error_rad / stiffness, feed_forward=feed_forward)
     trace = simulate_plan(plan, drive=drive)
-    during = trace.t <= plan.duration_s
-    walked, _ = walked_distance(trace)
-    fell = trace.fell_at_s is not None
-    energy = _sum_by_kind(plan, trace.torque[during], trace.qd[during], trace.t[during], walked).values()
+    during, fell = trace.t <= plan.duration_s, trace.fell_at_s is not None
+    energy = _sum_simulated(plan, trace).values()
     disturbances = _make_disturbances() if disturbed else []
     falls = sum(simulate_plan(plan, disturbance, drive).fell_at_s is not None for disturbance in disturbances)
     fastest = 0.0
@@ -206,10 +186,8 @@ def simulate_drives(
             fastest = max(fastest, walked_distance(tried)[0] / longer.duration_s)
     return {
         "fell": fell,
-        "walked_share": None if fell else walked / planned_distance(plan),
-        "speed_m_s": None if fell else walked / plan.duration_s,
-        "sheet_J_per_m": None if fell else sum_energy(energy, "sheet"),
-        "paper_J_per_m": None if fell else sum_energy(energy, "paper"),
+        "walked_share": None if fell else walked_distance(trace)[0] / planned_distance(plan),
+        **{f"{heat}_J_per_m": None if fell else sum_energy(energy, heat) for heat in SPECS},
         "tracking_rad": float(np.abs(plan.at("q", trace.t[during]) - trace.q[during]).max()),
         "falls": falls,
         "disturbances": len(disturbances),
@@ -219,14 +197,9 @@ def simulate_drives(
 
 def make_footsteps(step_m: float = STEP_M, torso_m: float = TORSO_M) -> Footsteps:
     """Return the footsteps of the robot's own walk, which plans the ZMP of an inverted pendulum."""
-    period_s = STEP_M / SPEED_M_S
-    return Footsteps(
-        step_m=step_m,
-        single_s=(1.0 - DOUBLE_SHARE) * period_s,
-        double_s=DOUBLE_SHARE * period_s,
-        hip_height_m=torso_m,
-        lift_m=LIFT_M,
-    )
+    double_s = DOUBLE_SHARE * STEP_M / SPEED_M_S
+    single_s = (1.0 - DOUBLE_SHARE) * STEP_M / SPEED_M_S
+    return Footsteps(step_m=step_m, single_s=single_s, double_s=double_s, hip_height_m=torso_m, lift_m=LIFT_M)
 
 
 @cache
@@ -243,29 +216,32 @@ def compute_knee_deg(result: Result) -> float:
     return math.degrees(float(trapezoid(q[:, knees].mean(axis=1), t) / (t[-1] - t[0])))
 
 
+def _sum_planned(plan: Plan) -> dict[str, dict[str, float]]:
+    """Return the energies of the model, see ``_sum_by_kind``."""
+    arrays = plan.signals.arrays
+    return _sum_by_kind(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_distance(plan))
+
+
+def _sum_simulated(plan: Plan, trace: Simulation) -> dict[str, dict[str, float]]:
+    """Return the energies of a simulated walk while its plan lasts, see ``_sum_by_kind``."""
+    during, (walked, _) = trace.t <= plan.duration_s, walked_distance(trace)
+    return _sum_by_kind(plan, trace.torque[during], trace.qd[during], trace.t[during], walked)
+
+
 def _sum_by_kind(plan: Plan, torque: Array, rate: Array, t: Array, distance_m: float) -> dict[str, dict[str, float]]:
     """By kind of joint: mechanical energy, and heat with the paper's constant and those of the data sheet [J/m]."""
-    mechanical = trapezoid(np.abs(torque * rate), t, axis=0)
-    paper = plan.heat_loss * trapezoid(torque**2, t, axis=0)
     sum_by_motor = torque.copy()
     first, second = (plan.joints.index(joint) for joint in YAW_PITCHES)  # one motor turns both
     sum_by_motor[:, first], sum_by_motor[:, second] = torque[:, first] + torque[:, second], 0.0
     motors = (plan.robot.joint(joint).motor for joint in plan.joints)
     K = np.array([motor.heat_W_per_Nm2 for motor in motors if motor is not None])
-    sheet = K * trapezoid(sum_by_motor**2, t, axis=0)
-    found = {kind: dict.fromkeys(("mechanical", "paper", "sheet"), 0.0) for kind in KINDS}
+    rates = {"mechanical": np.abs(torque * rate), "paper": plan.heat_loss * torque**2, "sheet": K * sum_by_motor**2}
+    energies = {name: trapezoid(rate, t, axis=0) / distance_m for name, rate in rates.items()}
+    found = {kind: dict.fromkeys(rates, 0.0) for kind in KINDS}
     for column, joint in enumerate(plan.joints):
-        parts = found[joint[1:] if joint[1:] in KINDS else ARMS]
-        for name, energy in (("mechanical", mechanical), ("paper", paper), ("sheet", sheet)):
-            parts[name] += float(energy[column]) / distance_m
+        for name, energy in energies.items():
+            found[joint[1:] if joint[1:] in KINDS else ARMS][name] += float(energy[column])
     return found
-
-
-def _compute_model(plan: Plan) -> dict[str, float]:
-    """Energy per metre in the model, with the heat constant of the paper and with those of the data sheet [J/m]."""
-    arrays = plan.signals.arrays
-    kinds = _sum_by_kind(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_distance(plan)).values()
-    return {f"{heat}_J_per_m": sum_energy(kinds, heat) for heat in ("paper", "sheet")}
 
 
 def sum_energy(kinds: Iterable[Mapping[str, float]], heat: str) -> float:
@@ -274,10 +250,9 @@ def sum_energy(kinds: Iterable[Mapping[str, float]], heat: str) -> float:
 
 
 def _make_disturbances() -> list[Conditions]:
-    pushes = [Push(impulse_Ns=(x * impulse, y * impulse)) for impulse in PUSHES_NS for x, y in DIRECTIONS]
     slopes = [math.radians(slope) for slope in SLOPES_DEG]
     return [
-        *(Conditions(push=push) for push in pushes),
+        *(Conditions(push=Push(impulse_Ns=(x * size, y * size))) for size in PUSHES_NS for x, y in DIRECTIONS),
         *(Conditions(slope_rad=(x * slope, y * slope)) for slope in slopes for x, y in DIRECTIONS),
         *(Conditions(friction=friction) for friction in FRICTIONS),
         *(Conditions(mass_factor=factor) for factor in MASS_FACTORS),
