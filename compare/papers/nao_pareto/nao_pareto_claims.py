@@ -11,12 +11,13 @@ import numpy as np
 
 from compare.analysis.record_statistics import rank_sum
 from compare.papers.claims import SIGNIFICANT, Check, ClaimVerdict, decide
-from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, Case, ParetoEffort, Run
+from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, ParetoEffort
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
 from compare.questions.pareto.pareto_front import SEARCH_NAMES
 from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
 from metaheuristics.array import Array
+from metaheuristics.multi_objective import Snapshot
 from nlp_gait.formulation import GaitProblem
 
 EVEN_POINTS = 200  # of the true front, which distances are measured from
@@ -59,9 +60,10 @@ class Measures:
         values: Array = getattr(self, measure)
         return values if values.ndim == 1 else values[:, -1]
 
-    def find_look(self, evaluations: float) -> int:
-        """Return the number of the last look within some evaluations, or of the first look."""
-        return max(0, int(np.count_nonzero(self.evaluations <= evaluations)) - 1)
+    @property
+    def early(self) -> int:
+        """Number of the last look in the beginning of the budget, or of the first look."""
+        return max(0, int(np.count_nonzero(self.evaluations <= EARLY * self.evaluations[-1])) - 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +74,7 @@ class PhaseFronts:
     criterion: CompetingObjective  # the second objective
     first_front: Sequence[FrontPoint]  # of the gradient method alone, whose ranges count as 1 in the searches
     answer: Challenge  # the front after solving from the searches' best points
-    runs: Mapping[Case, Sequence[Run]]
+    runs: Mapping[tuple[str, int], Sequence[Sequence[Snapshot]]]  # looks at each run by search and budget
 
     @property
     def front(self) -> tuple[FrontPoint, ...]:
@@ -90,7 +92,7 @@ class PhaseFronts:
         return tuple(dict.fromkeys(budget for _, budget in self.runs))
 
     @cached_property
-    def measures(self) -> dict[Case, Measures]:
+    def measures(self) -> dict[tuple[str, int], Measures]:
         """Measures by search and budget."""
         return {case: self._measure(runs) for case, runs in self.runs.items()}
 
@@ -99,7 +101,7 @@ class PhaseFronts:
         scale = Scale(self.first_front)
         return scale.undo(np.concatenate([run[-1].F for run in self.runs[algorithm, budget]]))
 
-    def _measure(self, runs: Sequence[Run]) -> Measures:
+    def _measure(self, runs: Sequence[Sequence[Snapshot]]) -> Measures:
         from pymoo.indicators.hv import HV
         from pymoo.indicators.igd import IGD
 
@@ -136,7 +138,7 @@ def spread_evenly(front: Array) -> Array:
     return np.column_stack([np.interp(places, along, column) for column in front.T])
 
 
-def collect_points(front: Sequence[FrontPoint], runs: Iterable[Run]) -> list[FrontPoint]:
+def collect_points(front: Sequence[FrontPoint], runs: Iterable[Sequence[Snapshot]]) -> list[FrontPoint]:
     """Return the points of all runs that no other point dominates."""
     scale = Scale(front)
     found = []
@@ -149,14 +151,11 @@ def collect_points(front: Sequence[FrontPoint], runs: Iterable[Run]) -> list[Fro
 
 def _check(is_true: Callable[[dict[str, Measures]], Tested], findings: ParetoFindings) -> Check:
     """Check a claim about the searches in each phase with each budget."""
-    return _decide(
-        (
-            f"{phase.problem.name}, {budget:,} evaluations",
-            is_true({name: phase.measures[name, budget] for name in ALGORITHMS}),
-        )
-        for phase in findings.phases
-        for budget in phase.budgets
-    )
+    cases = {}
+    for phase, budget in [(p, budget) for p in findings.phases for budget in p.budgets]:
+        runs = {name: phase.measures[name, budget] for name in ALGORITHMS}
+        cases[f"{phase.problem.name}, {budget:,} evaluations"] = is_true(runs)
+    return _decide(cases)
 
 
 def _check_extreme(findings: ParetoFindings, search: str, ends: Mapping[str, str]) -> Check:
@@ -174,11 +173,15 @@ def _is_extreme_at_ends(search: str, ends: Mapping[str, str], runs: dict[str, Me
 
 
 def _check_knees(findings: ParetoFindings) -> Check:
-    return _decide((phase.problem.name, _has_two_knees(phase)) for phase in findings.phases)
+    cases = {}
+    for phase in findings.phases:
+        knees, unit = phase.bends.knees, phase.criterion.unit
+        shown = [f"{k.value:.4f} {unit} at {k.power_W:.3f} W, {k.turn_deg:.0f} degrees" for k in knees]
+        cases[phase.problem.name] = len(knees) == KNEES, f"{len(knees)} ({', '.join(shown) or 'none'})"
+    return _decide(cases)
 
 
-def _decide(named_cases: Iterable[tuple[str, Tested]]) -> Check:
-    cases = dict(named_cases)
+def _decide(cases: Mapping[str, Tested]) -> Check:
     held = all(holds for holds, _ in cases.values())
     verdicts = {True: ClaimVerdict.HOLDS, False: ClaimVerdict.FAILS}
     found = "; ".join(f"{case}: {numbers}: {verdicts[holds]}" for case, (holds, numbers) in cases.items())
@@ -186,32 +189,32 @@ def _decide(named_cases: Iterable[tuple[str, Tested]]) -> Check:
 
 
 def _is_moderate(runs: dict[str, Measures]) -> Tested:
-    volume, distance = _get_ends(runs)
-    places = [
-        1 + sorted(values, key=values.__getitem__, reverse=best).index("DCNSGA3")
-        for values, best in ((volume, True), (distance, False))
-    ]
+    places = []
+    for measure, best in (("hypervolume", True), ("igd", False)):
+        medians = _find_medians(runs, measure)
+        places.append(1 + sorted(medians, key=medians.__getitem__, reverse=best).index("DCNSGA3"))
     between = all(1 < place < len(runs) for place in places)
     return between, f"place {places[0]} of {len(runs)} by hypervolume, {places[1]} by distance"
 
 
 def _is_faster(runs: dict[str, Measures]) -> Tested:
-    early = {n: m.hypervolume[:, m.find_look(EARLY * m.evaluations[-1])] for n, m in runs.items()}
+    early = {n: m.hypervolume[:, m.early] for n, m in runs.items()}
     leads, numbers = _is_extreme(early, "CMOPSO", max, 100.0, " %")
-    cmopso = runs["CMOPSO"]
-    at = cmopso.evaluations[cmopso.find_look(EARLY * cmopso.evaluations[-1])]
-    until = ", ".join(f"{NAMES[n]} {_format_count(float(np.median(m.until(NEAR))))}" for n, m in runs.items())
+    at, medians = (
+        runs["CMOPSO"].evaluations[runs["CMOPSO"].early],
+        {n: np.median(m.until(NEAR)) for n, m in runs.items()},
+    )
+    until = ", ".join(f"{NAMES[n]} {f'{k:,.0f}' if np.isfinite(k) else 'never'}" for n, k in medians.items())
     return leads, f"after {at:,.0f} {numbers}; {100 * NEAR:.0f} % are reached after {until}"
 
 
 def _is_competitive(runs: dict[str, Measures]) -> Tested:
-    volume, _ = _get_ends(runs)
+    volume = _find_medians(runs, "hypervolume")
     behind = max(volume.values()) - volume["CMOPSO"]
     return behind <= COMPETITIVE, f"{100 * behind:.2f} % behind {NAMES[_first(volume, max)]}"
 
 
 def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], factor: float, unit: str) -> Tested:
-    """Whether a search has the least or greatest median, significantly before the next one."""
     medians = {n: float(np.median(values)) for n, values in samples.items()}
     following = _first({n: median for n, median in medians.items() if n != name}, best)
     p = rank_sum(samples[name].tolist(), samples[following].tolist())
@@ -219,22 +222,9 @@ def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], 
     return _first(medians, best) == name and p < SIGNIFICANT, f"{shown}; against {NAMES[following]} p = {p:.2g}"
 
 
-def _has_two_knees(phase: PhaseFronts) -> Tested:
-    knees, unit = phase.bends.knees, phase.criterion.unit
-    shown = ", ".join(f"{k.value:.4f} {unit} at {k.power_W:.3f} W, {k.turn_deg:.0f} degrees" for k in knees) or "none"
-    return len(knees) == KNEES, f"{len(knees)} ({shown})"
-
-
-def _get_ends(runs: dict[str, Measures]) -> tuple[dict[str, float], dict[str, float]]:
-    """Median hypervolume and distance at the end of all runs."""
-    volume, distance = (
-        {name: float(np.median(m.get_end(measure))) for name, m in runs.items()} for measure in ("hypervolume", "igd")
-    )
-    return volume, distance
-
-
-def _format_count(value: float) -> str:
-    return f"{value:,.0f}" if np.isfinite(value) else "never"
+def _find_medians(runs: dict[str, Measures], measure: str) -> dict[str, float]:
+    """Return the median over all runs of a measure at their ends, by search."""
+    return {name: float(np.median(m.get_end(measure))) for name, m in runs.items()}
 
 
 def _first(values: dict[str, float], best: Callable[..., str]) -> str:

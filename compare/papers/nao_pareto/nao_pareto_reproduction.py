@@ -50,8 +50,7 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFronts:
     given = {"front": [asdict(point) for point in front], "points": [asdict(point) for point in points]}
     inputs = {**fingerprint(problem), "criterion": CRITERION, **given}
     step = Computation(name=f"{phase}-challenge", inputs=inputs, function=lambda: asdict(solve()))
-    (answer,) = runner.compute([step], code=()).values()
-    answer = decode(Challenge, answer)
+    answer = decode(Challenge, runner.compute([step], code=())[step.name])
     return PhaseFronts(problem=problem, criterion=criterion, first_front=front, answer=answer, runs=done)
 
 
@@ -77,19 +76,17 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
 
 def make_tables(findings: ParetoFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
-    tables: dict[str, Rows] = {"fronts": [_make_front_row(phase) for phase in findings.phases]}
+    fronts: list[list[Value]] = []
+    tables: dict[str, Rows] = {"fronts": fronts}
     for phase in findings.phases:
-        tables[f"ends-{phase.problem.name}"] = _make_ends(phase)
-        tables[f"constraints-{phase.problem.name}"] = _make_constraints(phase)
-        tables[f"running-{phase.problem.name}"] = _make_running(phase)
+        ends = [value for end in (phase.front[0], phase.front[-1]) for value in (end.value, end.power_W)]
+        answer, name = phase.answer, phase.problem.name
+        solved = [answer.points, answer.solved, 100 * answer.least_gap, answer.moved]
+        fronts.append([name, len(phase.front), *ends, len(phase.bends.knees), *solved])
+        tables[f"ends-{name}"] = _make_ends(phase)
+        tables[f"constraints-{name}"] = _make_constraints(phase)
+        tables[f"running-{name}"] = _make_running(phase)
     return tables
-
-
-def _make_front_row(phase: PhaseFronts) -> list[Value]:
-    low, high, answer = phase.front[0], phase.front[-1], phase.answer
-    ends = [low.value, low.power_W, high.value, high.power_W]
-    solved = [answer.points, answer.solved, 100 * answer.least_gap, answer.moved]
-    return [phase.problem.name, len(phase.front), *ends, len(phase.bends.knees), *solved]
 
 
 def _make_ends(phase: PhaseFronts) -> Rows:
@@ -129,18 +126,16 @@ def draw_figures(findings: ParetoFindings) -> dict[str, Figure]:
 
 def _draw_running(phase: PhaseFronts) -> Figure:
     """Hypervolume missing and distance over evaluations, with the largest budget: medians, and the range of all runs."""
-    budget = phase.budgets[-1]
     figure = new_figure(6.6, 3.0)
     left, right = figure.subplots(1, 2)
     for name in ALGORITHMS:
-        m = phase.measures[name, budget]
-        colour = SEARCH_COLOURS[name]
+        m = phase.measures[name, phase.budgets[-1]]
         for axes, values in ((left, 100 * (1.0 - m.hypervolume)), (right, m.igd)):
-            shown = np.where(np.isfinite(values), values, np.nan)
             known = np.isfinite(values).all(axis=0)
-            at, shown = m.evaluations[known], shown[:, known]
-            axes.fill_between(at, shown.min(axis=0), shown.max(axis=0), color=colour, alpha=0.12, linewidth=0)
-            axes.plot(at, np.median(shown, axis=0), LINES[name], color=colour, label=NAMES[name])
+            at, shown = m.evaluations[known], values[:, known]
+            paint = {"color": SEARCH_COLOURS[name]}
+            axes.fill_between(at, shown.min(axis=0), shown.max(axis=0), **paint, alpha=0.12, linewidth=0)
+            axes.plot(at, np.median(shown, axis=0), LINES[name], **paint, label=NAMES[name])
     left.set_ylabel("hypervolume missing to the front's [%]")
     right.set_ylabel("inverted generational distance [1]")
     for axes in (left, right):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -38,13 +40,6 @@ class ParetoEffort(Effort):
     intervals: int = 10  # between the samples of a phase, as in the paper of 2023
 
 
-Case = tuple[str, int]
-"""A search and its budget."""
-
-Run = Sequence[Snapshot]
-"""Looks at a run, in the order of their evaluations; only the last one, the end, has points."""
-
-
 def make_spec(phase: str, effort: ParetoEffort) -> ProblemSpec:
     """Return a phase as in the paper of 2023."""
     return ProblemSpec(name=phase, options={"intervals": effort.intervals})
@@ -57,19 +52,15 @@ def choose_looks(budget: int) -> list[int]:
     return [int(g) * FIRST_LOOK for g in np.unique([*generations, budget // FIRST_LOOK])]
 
 
-def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> dict[Case, list[Computation]]:
+def make_searches(phase: str, front: Sequence[FrontPoint], effort: ParetoEffort) -> dict[Any, list[Computation]]:
     """Return all runs by search and budget; ``make_run`` takes the result of one."""
-    spec, ends = make_spec(phase, effort), [[end.value, end.power_W] for end in (front[0], front[-1])]
-
-    def make_search(name: str, budget: int, run: int) -> Computation:
-        title, search = f"{phase}-{name.lower()}-{budget}-{run:02d}", partial(run_search, spec)
-        return make_computation(title, spec, search, ends=ends, algorithm=name, budget=budget, seed=run)
-
-    return {
-        (name, budget): [make_search(name, budget, run) for run in range(effort.runs)]
-        for budget in effort.budgets
-        for name in ALGORITHMS
-    }
+    spec, found = make_spec(phase, effort), defaultdict(list)
+    make = partial(make_computation, spec=spec, function=partial(run_search, spec))
+    ends = [[end.value, end.power_W] for end in (front[0], front[-1])]
+    for budget, name, run in product(effort.budgets, ALGORITHMS, range(effort.runs)):
+        title = f"{phase}-{name.lower()}-{budget}-{run:02d}"
+        found[name, budget].append(make(title, ends=ends, algorithm=name, budget=budget, seed=run))
+    return found
 
 
 def run_search(
@@ -78,17 +69,14 @@ def run_search(
     """Return a run as plain data; ``ends`` are criterion and power at those of the front, whose ranges count as 1."""
     problem = spec.load()
     criterion = make_competing_objective(CRITERION, problem)
-    scale = Scale(
-        [FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=()) for value, power in ends]
-    )
+    scale = Scale([FrontPoint(demanded=value, value=value, power_W=W, violation=0.0, x=()) for value, W in ends])
     objectives = PowerAndCompeting(compile_objective(criterion.drop_demand(problem), threads=1), criterion, scale)
     snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=seed)
-    points = [[] for _ in snapshots[1:]] + [snapshots[-1].X.tolist()]
-    return [
-        {**asdict(snapshot), "X": X, "F": snapshot.F.tolist()} for snapshot, X in zip(snapshots, points, strict=True)
-    ]
+    looks = [{**asdict(snapshot), "X": [], "F": snapshot.F.tolist()} for snapshot in snapshots]
+    looks[-1]["X"] = snapshots[-1].X.tolist()
+    return looks
 
 
-def make_run(looks: Sequence[Mapping[str, Any]]) -> Run:
-    """Return the run of a computation's result."""
+def make_run(looks: Sequence[Mapping[str, Any]]) -> Sequence[Snapshot]:
+    """Return the looks of a computation's result in the order of their evaluations; only the last one has points."""
     return [Snapshot(**{**look, "X": np.array(look["X"]), "F": np.array(look["F"]).reshape(-1, 2)}) for look in looks]
