@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from compare.drawing.figures import COLOURS, new_figure
 from compare.papers.paper_runs import get_point
-from compare.papers.walk12.walk12_findings import Walk12Findings
+from compare.papers.walk12.walk12_findings import Walk12Findings, follow
 from compare.papers.walk12.walk12_paper import find_row
 from compare.papers.walk12.walk12_runs import GA, PAPER, PathPoint
 from compare.study.record import RunRecord
-from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
-from nlp_gait.gaits.walk12.walk12_steps import compute_steps
+from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PAPER_COLOUR = "#E69F00"
@@ -28,9 +26,6 @@ FIGURE_10 = ((4, 9), (5, 8), (6, 7))
 ZMP_FIGURES = {"fig12-13": 0.15, "fig14-15": 1.0, "fig16-17": 0.1}
 TURN_RAD = math.radians(8.0)  # the largest that the paper allows
 TURNING_WEIGHT = 0.9  # on circles the paper keeps lambda >= 0.7
-
-# Label of a gait to its x.
-Gaits = Mapping[str, Sequence[float]]
 
 
 def draw_figures(findings: Walk12Findings) -> dict[str, Figure]:
@@ -46,8 +41,8 @@ def draw_figures(findings: Walk12Findings) -> dict[str, Figure]:
     }
 
 
-def _gaits(findings: Walk12Findings, weight: float) -> Gaits:
-    """The paper's gait and IPOPT's at a lambda, by label."""
+def _gaits(findings: Walk12Findings, weight: float) -> dict[str, Sequence[float]]:
+    """Return x of the paper's gait and IPOPT's at a lambda, by label."""
     return {"paper's gait": find_row(weight).x, "IPOPT": get_point(findings.optimum(PAPER, weight))}
 
 
@@ -56,15 +51,12 @@ def _colour(label: str) -> str:
 
 
 def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
-    """Fig. 8: best f so far after each epoch of the GA of Table II, all seeds."""
     figure = new_figure(4.2, 2.8)
     axes = figure.subplots()
     runs = np.array([run.history.objective for run in ga], dtype=float)
-    epochs = np.arange(runs.shape[1])
-    axes.step(epochs, runs.T, where="post", color=COLOURS["ga"], alpha=0.3, linewidth=0.8)
-    axes.step(
-        epochs, np.median(runs, axis=0), where="post", color=COLOURS["ga"], label=f"GA, median of {len(runs)} runs"
-    )
+    epochs, paint = np.arange(runs.shape[1]), dict[str, Any](where="post", color=COLOURS["ga"])
+    axes.step(epochs, runs.T, **paint, alpha=0.3, linewidth=0.8)
+    axes.step(epochs, np.median(runs, axis=0), **paint, label=f"GA, median of {len(runs)} runs")
     axes.axhline(optimum.verdict.objective, color=COLOURS["ipopt"], linestyle="--", label="IPOPT")
     axes.axvline(15, color="0.5", linewidth=0.8, linestyle=":", label="the paper: converged")
     axes.set(xlabel=f"epoch ({GA.population} evaluations each)", ylabel="best f so far [1]")
@@ -72,12 +64,11 @@ def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
     return figure
 
 
-def _draw_angles(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 10) -> Figure:
-    """Figs. 9, 10: joint angles over some steps, the left leg's joint above the right leg's."""
+def _draw_angles(gaits: Mapping[str, Sequence[float]], pairs: Sequence[tuple[int, int]]) -> Figure:
     figure = new_figure(6.3, 5.2)
     grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
     for label, x in gaits.items():
-        arrays = compute_steps(load_point_mass_biped(), np.array(x), steps=steps, intervals=40).arrays
+        arrays = follow(x, steps=10, intervals=40)
         for row, pair in zip(grid, pairs, strict=True):
             for axes, joint in zip(row, pair, strict=True):
                 degrees = np.degrees(arrays["q"][:, joint - 1])
@@ -92,14 +83,18 @@ def _draw_angles(gaits: Gaits, pairs: Sequence[tuple[int, int]], steps: int = 10
     return figure
 
 
-def _draw_zmp(gaits: Gaits) -> Figure:
-    """Figs. 12 to 17: the ZMP over one step, in the plane of the sole and over time."""
-    robot = load_point_mass_biped()
+def _draw_zmp(gaits: Mapping[str, Sequence[float]]) -> Figure:
+    from matplotlib.patches import Rectangle
+
     figure = new_figure(6.3, 3.0)
     plane, time = figure.subplots(1, 2)
-    _sole(plane, robot)
+    robot = load_point_mass_biped()
+    back, front, width = (MILLIMETRES * m for m in (robot.foot_back_m, robot.foot_front_m, robot.foot_width_m))
+    sole: dict[str, Any] = {"facecolor": "#d9e6f2", "edgecolor": "0.4", "linewidth": 0.8}
+    plane.add_patch(Rectangle((-back, -width / 2), back + front, width, **sole))
+    plane.plot(0, 0, color="0.4", marker="+")
     for label, x in gaits.items():
-        arrays = compute_steps(robot, np.array(x), steps=1, intervals=400).arrays
+        arrays = follow(x, steps=1, intervals=400)
         zmp = MILLIMETRES * arrays["zmp_foot"]
         colour = _colour(label)
         plane.plot(zmp[:, 0], zmp[:, 1], color=colour, label=label)
@@ -112,15 +107,6 @@ def _draw_zmp(gaits: Gaits) -> Figure:
     time.set(xlabel="time [s]", ylabel="ZMP from the stance ankle [mm]")
     time.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2)
     return figure
-
-
-def _sole(axes: Axes, robot: PointMassBiped) -> None:
-    from matplotlib.patches import Rectangle
-
-    back, width = MILLIMETRES * robot.foot_back_m, MILLIMETRES * robot.foot_width_m
-    length = back + MILLIMETRES * robot.foot_front_m
-    axes.add_patch(Rectangle((-back, -width / 2), length, width, facecolor="#d9e6f2", edgecolor="0.4", linewidth=0.8))
-    axes.plot(0, 0, color="0.4", marker="+")
 
 
 def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) -> Figure:
@@ -149,9 +135,7 @@ def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) ->
 
 def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
     """Footprints and the waist's path over one full circle, seen from above."""
-    robot = load_point_mass_biped()
-    steps = int(np.ceil(2 * np.pi / turn_rad))
-    arrays = compute_steps(robot, np.array(x), steps=steps, intervals=20, turn_rad=turn_rad).arrays
+    arrays = follow(x, steps=int(np.ceil(2 * np.pi / turn_rad)), intervals=20, turn_rad=turn_rad)
     figure = new_figure(3.6, 3.4)
     axes = figure.subplots()
     axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")

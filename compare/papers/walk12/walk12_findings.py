@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from compare.papers.paper_runs import Runs, choose_best, list_objectives
 from compare.papers.walk12 import walk12_runs
-from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4_DIGITS, PaperRow
-from compare.papers.walk12.walk12_runs import PAPER, PathPoint, compute_f1, title_table_3
+from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4_DIGITS, PaperRow
+from compare.papers.walk12.walk12_runs import PAPER, PathPoint, compute_f, compute_f1, title_table_3
 from compare.papers.walk12.walk12_walks import WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
@@ -36,7 +36,13 @@ class Walk12Findings:
     front: Sequence[PathPoint]  # largest f1 for each step length
     printed_step: Mapping[str, float]  # optimal f with the paper's integration step, by lambda
     walks: Sequence[WalkedGait]  # in the engine; none without it
-    _f1: dict[Zmp, Sequence[float]] = field(default_factory=dict)
+
+    def best(self, title: str, solver: str = IPOPT) -> RunRecord:
+        """Return IPOPT's best start on a problem, or a search's run of median f, of which infeasible runs are the least."""
+        runs = self.runs[title, solver]
+        if solver == IPOPT:
+            return choose_best(runs)
+        return runs[int(np.argsort(list_f(runs), kind="stable")[(len(runs) - 1) // 2])]
 
     def records(self, label: str, weight: float, solver: str) -> Sequence[RunRecord]:
         """Return the runs of a solver at a lambda under a normalisation."""
@@ -44,28 +50,21 @@ class Walk12Findings:
 
     def optimum(self, label: str, weight: float) -> RunRecord:
         """Return IPOPT's best start at a lambda under a normalisation."""
-        return choose_best(self.records(label, weight, IPOPT))
+        return self.best(title_table_3(label, weight))
 
     @cached_property
     def own_f1max(self) -> float:
         """The model's largest f1 [1/(m^2 s)]."""
         return walk12_runs.find_f1max(self.runs, title_table_3(PAPER, 1.0))
 
-    @property
-    def f1_of_table_3(self) -> Sequence[float]:
-        """f1 of the printed gaits of Table III [1/(m^2 s)]."""
-        return self.f1_by("exact")
-
     @cached_property
     def stable(self) -> Sequence[StableShare]:
         """When each gait of Table III satisfies (8)."""
         return [compute_stable_share(row.x) for row in TABLE_3]
 
-    def f1_by(self, zmp: Zmp) -> Sequence[float]:
+    def f1_by(self, zmp: Zmp = "exact") -> Sequence[float]:
         """Return f1 of the printed gaits of Table III by a reading of the ZMP [1/(m^2 s)]."""
-        if zmp not in self._f1:
-            self._f1[zmp] = [compute_f1(row, zmp=zmp) for row in TABLE_3]
-        return self._f1[zmp]
+        return [compute_f1(row, zmp=zmp) for row in TABLE_3]
 
     def describe_f1_change(self, zmp: Zmp, by: Zmp = "exact") -> str:
         """Return the least and greatest change of f1 of the printed gaits from a reading of the ZMP to another, as words."""
@@ -75,16 +74,13 @@ class Walk12Findings:
     def f_of_printed_gaits(self, label: str, zmp: Zmp = "exact") -> list[float]:
         """Return f of the printed gaits in the model under a normalisation."""
         f1max = F1MAX if label == PAPER else self.own_f1max
-        known = zip(TABLE_3, self.f1_by(zmp), strict=True)
-        return [row.weight * f1 / f1max + (1 - row.weight) * row.x[0] / F2MAX for row, f1 in known]
+        return [compute_f(row, f1max, zmp=zmp) for row in TABLE_3]
 
     def list_optima(self, zmp: Zmp) -> list[float]:
         """Return the optimal f by a reading of the ZMP at each lambda where it is solved, under the paper's f1max."""
         if zmp == "exact":
             return list_objectives(self.optimum(PAPER, row.weight) for row in TABLE_3)
-        return list_objectives(
-            choose_best(self.runs[f"{zmp}-{weight:g}", IPOPT]) for weight in walk12_runs.READINGS[zmp]
-        )
+        return list_objectives(self.best(f"{zmp}-{weight:g}") for weight in walk12_runs.READINGS[zmp])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,19 +94,21 @@ class StableShare:
 
 def compute_stable_share(x: tuple[float, ...]) -> StableShare:
     """Return when a gait is statically stable."""
-    robot = load_point_mass_biped()
-    arrays = compute_steps(robot, np.array(x), steps=1, intervals=1000).arrays
+    robot, arrays = load_point_mass_biped(), follow(x, steps=1, intervals=1000)
     zmp_x, zmp_y = arrays["zmp_foot"].T
     inside = (-robot.foot_back_m <= zmp_x) & (zmp_x <= robot.foot_front_m) & (np.abs(zmp_y) <= robot.foot_width_m / 2)
     times = arrays["t"][inside]
     return StableShare(share=float(inside.mean()), first_s=float(times.min()), last_s=float(times.max()))
 
 
-def choose_median(runs: Sequence[RunRecord]) -> RunRecord:
-    """Return the run of median f; infeasible runs are the least."""
-    return sorted(runs, key=lambda run: run.verdict.objective if run.verdict.feasible else -math.inf)[
-        (len(runs) - 1) // 2
-    ]
+def follow(x: Sequence[float], **options: Any) -> Mapping[str, Array]:
+    """Return the time histories of a gait, see ``compute_steps``."""
+    return compute_steps(load_point_mass_biped(), np.array(x), **options).arrays
+
+
+def list_f(records: Sequence[RunRecord]) -> list[float]:
+    """Return f at the end of each run; minus infinity without a feasible gait."""
+    return [r.verdict.objective if r.verdict.feasible else -math.inf for r in records]
 
 
 def list_rounded(row: PaperRow) -> list[PaperRow]:
@@ -122,22 +120,10 @@ def list_rounded(row: PaperRow) -> list[PaperRow]:
 
 def compute_zmp_error(x: tuple[float, ...], zmp: Zmp) -> float:
     """Return the largest distance over a step between the ZMP by a reading and the point without moment [m]."""
-    points = [
-        compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=400, zmp=reading).arrays["zmp_foot"]
-        for reading in (zmp, get_args(Zmp)[-1])
-    ]
+    points = [follow(x, steps=1, intervals=400, zmp=reading)["zmp_foot"] for reading in (zmp, get_args(Zmp)[-1])]
     return float(np.linalg.norm(points[0] - points[1], axis=1).max())
 
 
-def compute_leg_lengths(x: tuple[float, ...]) -> Array:
-    """Return the distances between hip and ankle of both legs over a step [m]."""
-    robot = load_point_mass_biped()
-    arrays = compute_steps(robot, np.array(x), steps=1, intervals=400).arrays
-    knees = arrays["q"][:, [JOINTS.index(name) for name in KNEES]]
-    return np.sqrt(robot.thigh_m**2 + robot.shank_m**2 + 2 * robot.thigh_m * robot.shank_m * np.cos(knees))
-
-
-def compute_straightest_knee(x: Sequence[float]) -> float:
-    """Return the least angle of a knee in a step [rad]."""
-    arrays = compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=1000).arrays
-    return float(arrays["q"][:, [JOINTS.index(name) for name in KNEES]].min())
+def compute_knees(x: Sequence[float], intervals: int = 1000) -> Array:
+    """Return the angles of both knees over a step (m, 2) [rad]."""
+    return follow(x, steps=1, intervals=intervals)["q"][:, [JOINTS.index(name) for name in KNEES]]

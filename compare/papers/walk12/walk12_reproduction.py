@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
+from itertools import product
 from typing import Any, get_args
 from xml.etree import ElementTree as Xml
 
@@ -15,14 +16,13 @@ from compare.judge import DENSE_INTERVALS
 from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.walk12 import walk12_claims, walk12_findings, walk12_paper, walk12_step_time_claims, walk12_walks
+from compare.papers.walk12 import walk12_claims, walk12_paper, walk12_walks
 from compare.papers.walk12 import walk12_runs as runs
-from compare.papers.walk12.walk12_claims import count_upright
+from compare.papers.walk12.walk12_claims import count_upright, list_f1max
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
-from compare.papers.walk12.walk12_findings import Walk12Findings, list_rounded
+from compare.papers.walk12.walk12_findings import Walk12Findings, compute_knees, follow, list_f, list_rounded
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
-from compare.papers.walk12.walk12_step_time_claims import list_f1max
 from compare.papers.walk12.walk12_walks import DRIVES, PERTURBATION_RAD, WALKED_STEPS, WalkedGait
 from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
@@ -33,14 +33,16 @@ from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS, make_rigid_bodies
 from nlp_gait.gaits.walk12.walk12_model import Zmp
 from nlp_gait.gaits.walk12.walk12_problem import Horizon
-from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
+from nlp_gait.gaits.walk12.walk12_steps import JOINTS
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
 from nlp_gait.simulation.simulate import FALLEN_HEIGHT, FALLEN_TILT
 
-CHECKS = bind_checks("walk12/walk12_claims.toml", {**vars(walk12_claims), **vars(walk12_step_time_claims)})
+CHECKS = bind_checks("walk12/walk12_claims.toml", vars(walk12_claims))
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
 PLATEAU_M = 1e-4  # a step length this close to its bound is on a plateau
+SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
+SEARCHES = ("ga", "pso")
 
 
 def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
@@ -49,9 +51,8 @@ def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     records |= runner.run_tasks(runs.make_second_tasks(effort, records))
     paths = runner.compute(runs.make_paths(effort), code=(runs,))
     weighted, front = ([PathPoint(**row) for row in rows] for rows in paths.values())
-    optima = {
-        row.weight: get_point(choose_best(records[runs.title_table_3(PAPER, row.weight), IPOPT])) for row in TABLE_3
-    }
+    starts = {row.weight: records[runs.title_table_3(PAPER, row.weight), IPOPT] for row in TABLE_3}
+    optima = {weight: get_point(choose_best(done)) for weight, done in starts.items()}
     walks = runner.compute(runs.make_walks(effort, optima), code=(walk12_walks,))
     return Walk12Findings(
         effort=effort,
@@ -68,8 +69,7 @@ def make_trajectories(findings: Walk12Findings) -> list[Table]:
     header = ["t_s", *(f"{joint}_rad" for joint in JOINTS), "zmp_x_m", "zmp_y_m", "left_stance"]
     tables = []
     for name, weight, turn_rad in (("walk-straight", 0.15, 0.0), ("walk-circle", TURNING_WEIGHT, TURN_RAD)):
-        x = np.array(get_point(findings.optimum(PAPER, weight)))
-        arrays = compute_steps(load_point_mass_biped(), x, intervals=50, turn_rad=turn_rad).arrays
+        arrays = follow(get_point(findings.optimum(PAPER, weight)), intervals=50, turn_rad=turn_rad)
         rows = np.column_stack([arrays[signal] for signal in ("t", "q", "zmp", "left_stance")]).tolist()
         tables.append(Table(name=name, columns=dict.fromkeys(header, ""), rows=rows))
     return tables
@@ -77,7 +77,8 @@ def make_trajectories(findings: Walk12Findings) -> list[Table]:
 
 def compute_values(findings: Walk12Findings) -> dict[str, Any]:
     """Return the values of the places in the report's text."""
-    problem, robot, lengths = load("walk12"), load_point_mass_biped(), _get_step_lengths()
+    problem, robot = load("walk12"), load_point_mass_biped()
+    lengths = [problem.value(f"step_length_m.{end}") for end in ("lower", "upper")]
     return {
         "effort": findings.effort,
         "steps": WALKED_STEPS,
@@ -92,7 +93,6 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         "s_bounds": lengths,
         "longest_mm": 1e3 * lengths[1],
         "stable_step_s": TABLE_3[-1].step_time_s,
-        "hip_speed": lengths[1] / 2 / TABLE_3[-1].step_time_s,
         "hip_aside_mm": 1e3 * robot.hip_distance_m / 2,
         "sole_reach_mm": 1e3 * robot.foot_width_m / 2,
         "branch_m": CHECKS["inverse-kinematics"](findings).values["branch_m"],
@@ -100,40 +100,37 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         "corner_leg_mm": 1e3 * (robot.leg_m - 2 * CORNER_M),
         "instants": int(problem.options["intervals"]) // 2 + 1,
         "circle_off_mm": CHECKS["circle"](findings).values["off"],
-        "time_s": {name: _compute_time(findings, name) for name in ("ga", IPOPT)},
+        "time_s": {
+            name: float(
+                np.median([run.time_s.solve for row in TABLE_3 for run in findings.records(PAPER, row.weight, name)])
+            )
+            for name in ("ga", IPOPT)
+        },
         **_compute_normalisation(findings),
-        **_compute_tradeoff(findings),
+        **_compute_tradeoff(findings, *lengths),
         **_compute_errata(findings),
         **_compute_choices(findings),
     }
-
-
-def _get_step_lengths() -> tuple[float, float]:
-    """Bounds of the step length [m]."""
-    problem = load("walk12")
-    return problem.value("step_length_m.lower"), problem.value("step_length_m.upper")
 
 
 def _compute_normalisation(findings: Walk12Findings) -> dict[str, Any]:
     ga = list_f(findings.records(PAPER, 1.0, "ga"))
     optima = zip(TABLE_3, list_objectives(_list_optima(findings, MODEL)), strict=True)
     gaps = {row.weight: row.f - f for row, f in optima}
-    leads = {
-        f"lead_{label}": compute_range(
-            get_dense(optimum)["f"] - f
-            for optimum, f in zip(_list_optima(findings, label), findings.f_of_printed_gaits(label), strict=True)
-        )
-        for label in (PAPER, MODEL)
-    }
+    leads = {}
+    for label in (PAPER, MODEL):
+        pairs = zip(_list_optima(findings, label), findings.f_of_printed_gaits(label), strict=True)
+        leads[f"lead_{label}"] = compute_range(get_dense(optimum)["f"] - f for optimum, f in pairs)
+    last_f1 = findings.f1_by()[-1]
     return {
         **leads,
         "own_f1max": findings.own_f1max,
         "dense_f1max": get_dense(findings.optimum(PAPER, 1.0))["f1_per_m2s"],
         "ga_f1": (min(ga) * F1MAX, max(ga) * F1MAX),
         "ga_f1_median": float(np.median(ga)) * F1MAX,
-        "last_f1": findings.f1_of_table_3[-1],
-        "model_part": 100 * (findings.f1_of_table_3[-1] / TABLE_3[-1].implied_f1 - 1),
-        "search_part": 100 * (findings.own_f1max / findings.f1_of_table_3[-1] - 1),
+        "last_f1": last_f1,
+        "model_part": 100 * (last_f1 / TABLE_3[-1].implied_f1 - 1),
+        "search_part": 100 * (findings.own_f1max / last_f1 - 1),
         "printed_above": ", ".join(f"{w:g} (by {gap:.4f})" for w, gap in gaps.items() if gap > PRINTED_DIGIT),
     }
 
@@ -142,8 +139,8 @@ def _list_optima(findings: Walk12Findings, label: str) -> list[RunRecord]:
     return [findings.optimum(label, row.weight) for row in TABLE_3]
 
 
-def _compute_tradeoff(findings: Walk12Findings) -> dict[str, Any]:
-    weighted, (shortest, longest) = findings.weighted, _get_step_lengths()
+def _compute_tradeoff(findings: Walk12Findings, shortest: float, longest: float) -> dict[str, Any]:
+    weighted = findings.weighted
     s, Q = np.array([(point.step_length_m, point.Q_m2s) for point in findings.front]).T
     rise = (1 / Q[:-1] - 1 / Q[-1]) / (s[-1] - s[:-1])  # of f1, from the longest step to each shorter one
     return {
@@ -158,6 +155,8 @@ def _compute_tradeoff(findings: Walk12Findings) -> dict[str, Any]:
 
 def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
     (corner,) = findings.runs["corner", IPOPT]
+    rounded = [list_rounded(row) for row in TABLE_4]  # each as printed first
+    gaps = {h: np.array([[_compute_gap(near, h) for near in rows] for rows in rounded]) for h in HORIZONS}
     return {
         "f1_change": {zmp: findings.describe_f1_change(zmp) for zmp in get_args(Zmp)},
         "read": {zmp: _describe_reading(findings, zmp) for zmp in runs.READINGS},
@@ -170,14 +169,11 @@ def _compute_errata(findings: Walk12Findings) -> dict[str, Any]:
         "f1_read": CHANGES,
         "shares": SHARES,
         "stable_intervals": ", ".join(
-            f"{findings.stable[k].first_s:.2f} to {findings.stable[k].last_s:.2f} s at λ = {TABLE_3[k].weight:g}"
-            for k in (0, 1, -1)
+            f"{stable.first_s:.2f} to {stable.last_s:.2f} s at λ = {row.weight:g}"
+            for row, stable in [(TABLE_3[k], findings.stable[k]) for k in (0, 1, -1)]
         ),
-        "gap": {h: compute_range(_compute_gap(row, h) for row in TABLE_4) for h in HORIZONS},
-        "least_gap": {
-            h: compute_range(min(_compute_gap(near, h) for near in list_rounded(row)) for row in TABLE_4)
-            for h in HORIZONS
-        },
+        "gap": {h: compute_range(gaps[h][:, 0]) for h in HORIZONS},
+        "least_gap": {h: compute_range(gaps[h].min(axis=1)) for h in HORIZONS},
         "f1max_by_T": join_words(f"{value:.0f}" for value in list_f1max(findings, "step")),
     }
 
@@ -189,7 +185,7 @@ def _compute_gap(row: PaperRow, horizon: Horizon) -> float:
 
 def _describe_reading(findings: Walk12Findings, zmp: Zmp) -> str:
     """Return f1max, the optimum at lambda = 0.15 and where the optimum moves between both ends of s, by a reading."""
-    ends = [choose_best(findings.runs[f"{zmp}-{weight:g}", IPOPT]) for weight in (0.15, 1.0)]
+    ends = [findings.best(f"{zmp}-{weight:g}") for weight in (0.15, 1.0)]
     (long, low), (short, high) = (
         (get_point(run)[0] / F2MAX, run.verdict.indexes["f1_per_m2s"] / F1MAX) for run in ends
     )
@@ -203,18 +199,13 @@ def _describe_reading(findings: Walk12Findings, zmp: Zmp) -> str:
 def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
     """Effects of the reach limit, the quadrature and the GA's settings that are not as printed."""
     weights = runs.BENT_FREELY_WEIGHTS
-    unbent = [choose_best(findings.runs[f"no-reach-margin-{weight:g}", IPOPT]) for weight in weights]
-    simpson = [choose_best(findings.runs[f"simpson-{row.weight:g}", IPOPT]) for row in TABLE_3]
+    unbent = [findings.best(f"no-reach-margin-{weight:g}") for weight in weights]
+    simpson = [findings.best(f"simpson-{row.weight:g}") for row in TABLE_3]
     shifts = [abs(f - findings.optimum(PAPER, float(w)).verdict.objective) for w, f in findings.printed_step.items()]
     ga = {name: findings.records(PAPER, runs.VARIANTS_WEIGHT, name) for name in ("ga", *runs.GA_VARIANTS)}
-    epoch = runs.GA_EVALUATIONS - runs.GA.population
-    earlier = [
-        f for r in ga["ga"] for e, f in zip(r.history.evaluations, r.history.objective, strict=True) if e == epoch
-    ]
-    bounds = {
-        name: _find_bound(record)
-        for name, record in (("bound", findings.optimum(PAPER, 1.0)), ("simpson_bound", simpson[-1]))
-    }
+    epoch, histories = runs.GA_EVALUATIONS - runs.GA.population, [run.history for run in ga["ga"]]
+    earlier = [f for h in histories for e, f in zip(h.evaluations, h.objective, strict=True) if e == epoch]
+    bounds = {"bound": _find_bound(findings.optimum(PAPER, 1.0)), "simpson_bound": _find_bound(simpson[-1])}
     return {
         "walked": "; ".join(f"{drives}: {count_upright(findings.walks, drives, 'paper')}" for drives in DRIVES),
         "ga_gap": _compute_ga_gaps(findings, [runs.title_table_3(PAPER, row.weight) for row in TABLE_3]),
@@ -224,9 +215,7 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "bent_weights": join_words(f"{weight:g}" for weight in weights),
         "unbent": join_words(f"{f:.6f}" for f in list_objectives(unbent)),
         "bent": join_words(f"{findings.optimum(PAPER, weight).verdict.objective:.6f}" for weight in weights),
-        "straightest": min(
-            walk12_findings.compute_straightest_knee(get_point(best)) for best in _list_optima(findings, PAPER)
-        ),
+        "straightest": min(compute_knees(get_point(best)).min() for best in _list_optima(findings, PAPER)),
         "printed_step": f"the optima at λ = {', '.join(findings.printed_step)} change by at most {max(shifts):.0e} in f",
         "simpson_claim": max(r.verdict.objective - get_dense(r)["f"] for r in simpson),
         "simpson_f1max": simpson[-1].verdict.objective * F1MAX,
@@ -238,14 +227,8 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
 
 def _compute_ga_gaps(findings: Walk12Findings, titles: Iterable[str]) -> tuple[float, float]:
     """Least and greatest distance [%] of the median f of the GA's runs from the optimum."""
-    pairs = ((findings.runs[title, "ga"], choose_best(findings.runs[title, IPOPT])) for title in titles)
+    pairs = ((findings.runs[title, "ga"], findings.best(title)) for title in titles)
     return compute_range(100 * (1 - float(np.median(list_f(ga))) / best.verdict.objective) for ga, best in pairs)
-
-
-def _compute_time(findings: Walk12Findings, solver: str) -> float:
-    """Median time of a run on Table III [s]."""
-    found = [run.time_s.solve for row in TABLE_3 for run in findings.records(PAPER, row.weight, solver)]
-    return float(np.median(found))
 
 
 def _list_simulator_numbers() -> dict[str, Any]:
@@ -274,18 +257,9 @@ def _find_bound(record: RunRecord) -> float | None:
     return find_reference(record.definition["problem"]).bound
 
 
-SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
-SEARCHES = ("ga", "pso")
-
-
 def get_dense(record: RunRecord) -> Mapping[str, float]:
     """Return the judge's indexes on the dense grid, which this problem has."""
     return record.verdict.dense or {}
-
-
-def list_f(records: Sequence[RunRecord]) -> list[float]:
-    """Return f at the end of each run; minus infinity without a feasible gait."""
-    return [r.verdict.objective if r.verdict.feasible else -math.inf for r in records]
 
 
 def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
@@ -297,24 +271,28 @@ def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
         "readings": _list_readings(findings),
         "table4": _list_table_4(findings),
         "quadrature": _list_quadratures(findings),
-        "walks": [_make_walk_row(walk) for walk in findings.walks],
+        "walks": [
+            [
+                w.weight,
+                w.by,
+                w.step_time_s,
+                w.drives,
+                w.steps,
+                w.fell_at_s,
+                w.walked_share,
+                f"{w.upright} of {w.starts}",
+            ]
+            for w in findings.walks
+        ],
         "second-optima": [row for weight in (0.9, 1.0) for row in _list_second_optima(findings, weight)],
     }
-
-
-def _make_walk_row(walk: WalkedGait) -> Sequence[Value]:
-    upright = f"{walk.upright} of {walk.starts}"
-    return [walk.weight, walk.by, walk.step_time_s, walk.drives, walk.steps, walk.fell_at_s, walk.walked_share, upright]
 
 
 def _list_quadratures(findings: Walk12Findings) -> Rows:
     """Optimal f under the paper's normalisation by each rule for Q, with the shipped proven bounds."""
     rows = []
     for row in TABLE_3:
-        best, simpson = (
-            findings.optimum(PAPER, row.weight),
-            choose_best(findings.runs[f"simpson-{row.weight:g}", IPOPT]),
-        )
+        best, simpson = findings.optimum(PAPER, row.weight), findings.best(f"simpson-{row.weight:g}")
         ours = [best.verdict.objective, _find_bound(best), findings.printed_step.get(f"{row.weight:g}")]
         rows.append([row.weight, *ours, simpson.verdict.objective, get_dense(simpson)["f"], _find_bound(simpson)])
     return rows
@@ -329,12 +307,11 @@ def _list_second_optima(findings: Walk12Findings, weight: float) -> Rows:
     for run in (best, *([choose_best(other)] if other else [])):
         agreeing = sum(abs(end.verdict.objective - run.verdict.objective) < SAME_OPTIMUM for end in ends)
         x = get_point(run)
-        rows.append([weight, agreeing, run.verdict.objective, *x, walk12_findings.compute_straightest_knee(x)])
+        rows.append([weight, agreeing, run.verdict.objective, *x, float(compute_knees(x).min())])
     return rows
 
 
 def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
-    """F of the paper's gait and of every solver under one normalisation."""
     rows = []
     for row, of_printed_gait in zip(TABLE_3, findings.f_of_printed_gaits(label), strict=True):
         cells: list[Value] = [row.weight, row.f, of_printed_gait]
@@ -344,18 +321,15 @@ def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
         begun, optimum = findings.records(label, row.weight, IPOPT), findings.optimum(label, row.weight)
         f_best = optimum.verdict.objective
         agreeing = sum(r.claimed and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
-        times = [
-            float(np.median([r.time_s.solve for r in done]))
-            for done in (findings.records(label, row.weight, "ga"), begun)
-        ]
+        solved = (findings.records(label, row.weight, "ga"), begun)
+        times = [float(np.median([run.time_s.solve for run in done])) for done in solved]
         rows.append([*cells, f_best, get_dense(optimum)["f"], agreeing, *times])
     return rows
 
 
 def _list_gaits(findings: Walk12Findings) -> Rows:
-    """Gaits behind Table III under the paper's normalisation, and how long each is statically stable."""
     rows: list[Sequence[Value]] = []
-    for row, f1, stable in zip(TABLE_3, findings.f1_of_table_3, findings.stable, strict=True):
+    for row, f1, stable in zip(TABLE_3, findings.f1_by(), findings.stable, strict=True):
         rows.append([row.weight, "paper", *row.x, f1, stable.share])
         for solver in (*SEARCHES, IPOPT):
             found = choose_best(findings.records(PAPER, row.weight, solver))
@@ -373,15 +347,13 @@ def _list_readings(findings: Walk12Findings) -> Rows:
 
 
 def _list_table_4(findings: Walk12Findings) -> Rows:
-    """The paper's step times under both horizons of Q."""
     rows: list[Sequence[Value]] = []
-    for row in TABLE_4:
-        for horizon in HORIZONS:
-            optimum = choose_best(findings.runs[runs.title_table_4(row, horizon), IPOPT])
-            words = {"step": "0 to T", "1s": "1 s"}[horizon]
-            f1max = runs.find_f1max(findings.runs, runs.title_table_4(row, horizon, most_stable=True))
-            ours = [compute_f1(row, horizon=horizon), f1max, optimum.verdict.objective, *get_point(optimum)]
-            rows.append([row.step_time_s, words, row.f1max, row.f, row.implied_f1, *ours])
+    for row, horizon in product(TABLE_4, HORIZONS):
+        optimum = findings.best(runs.title_table_4(row, horizon))
+        f1max = runs.find_f1max(findings.runs, runs.title_table_4(row, horizon, most_stable=True))
+        ours = [compute_f1(row, horizon=horizon), f1max, optimum.verdict.objective, *get_point(optimum)]
+        words = {"step": "0 to T", "1s": "1 s"}[horizon]
+        rows.append([row.step_time_s, words, row.f1max, row.f, row.implied_f1, *ours])
     return rows
 
 

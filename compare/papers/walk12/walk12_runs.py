@@ -12,7 +12,7 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.papers.paper_runs import Effort, Runs, choose_best, make_computation, make_search_tasks, make_start_tasks
-from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4, PaperRow
+from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, PaperRow
 from compare.papers.walk12.walk12_walks import simulate_walks
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
@@ -161,10 +161,16 @@ def find_f1max(runs: Runs, title: str) -> float:
     return choose_best(runs[title, IPOPT]).verdict.objective * F1MAX
 
 
+@cache
 def compute_f1(row: PaperRow, **options: str) -> float:
     """Return f1 of a printed gait at its step time [1/(m^2 s)]."""
     problem = load_walk12(**options).with_values(step_time_s=row.step_time_s)
     return build_exact_model(problem).at(problem.check_x(row.x), problem.p).indexes["f1_per_m2s"]
+
+
+def compute_f(row: PaperRow, f1max: float, **options: str) -> float:
+    """Return f of a printed gait in the model under a normalisation."""
+    return row.weight * compute_f1(row, **options) / f1max + (1 - row.weight) * row.x[0] / F2MAX
 
 
 def make_paths(effort: Walk12Effort) -> list[Computation]:
