@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import product
 from typing import Any, get_args
 
@@ -61,9 +61,7 @@ class Walk12Effort(Effort):
     )
     lengths_m: tuple[float, ...] = tuple(np.round(np.linspace(0.05, 0.13, 33), 6).tolist())  # steps of the Pareto front
     printed_step_weights: tuple[float, ...] = (0.15, 0.9, 1.0)  # solved with the paper's integration step
-    walked_weights: tuple[float, ...] = tuple(
-        row.weight for row in TABLE_3
-    )  # simulated, the paper's gait and the optimum
+    walked_weights: tuple[float, ...] = tuple(row.weight for row in TABLE_3)  # simulated: printed gait and optimum
     perturbed_starts: int = 4  # of each of these with each drive
 
     @property
@@ -108,20 +106,17 @@ def make_first_tasks(effort: Walk12Effort) -> Iterator[Task]:
     for row, horizon in product(TABLE_4, HORIZONS):
         title = title_table_4(row, horizon, most_stable=True)
         most_stable = _make_spec(title, 1.0, F1MAX, {"horizon": horizon}, step_time_s=row.step_time_s)
-        yield from make_start_tasks(most_stable, effort.starts)
-        yield from make_search_tasks(most_stable, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from _make_runs(effort, most_stable, "ga")
     for zmp, weights in READINGS.items():
         for weight in weights:
-            read = _make_spec(f"{zmp}-{weight:g}", weight, F1MAX, {"zmp": zmp})
-            yield from make_start_tasks(read, effort.starts)
+            yield from _make_runs(effort, _make_spec(f"{zmp}-{weight:g}", weight, F1MAX, {"zmp": zmp}))
     for weight in BENT_FREELY_WEIGHTS:
-        yield from make_start_tasks(
-            _make_spec(f"no-reach-margin-{weight:g}", weight, F1MAX, reach_margin_rad=0.0), effort.starts
-        )
+        freely = _make_spec(f"no-reach-margin-{weight:g}", weight, F1MAX, reach_margin_rad=0.0)
+        yield from _make_runs(effort, freely)
     for row in TABLE_3:
         simpson = _make_spec(f"simpson-{row.weight:g}", row.weight, F1MAX, {"quadrature": "simpson"})
-        yield from make_start_tasks(simpson, effort.starts)
-    yield from make_start_tasks(_make_spec("below", BELOW_WEIGHT, F1MAX), effort.starts)
+        yield from _make_runs(effort, simpson)
+    yield from _make_runs(effort, _make_spec("below", BELOW_WEIGHT, F1MAX))
     variants = _make_spec(title_table_3(PAPER, VARIANTS_WEIGHT), VARIANTS_WEIGHT, F1MAX)
     for label, algorithm in GA_VARIANTS.items():
         yield from make_search_tasks(variants, label, algorithm, effort.runs, GA_EVALUATIONS)
@@ -135,25 +130,27 @@ def make_second_tasks(effort: Walk12Effort, runs: Runs) -> Iterator[Task]:
     for row, horizon in product(TABLE_4, HORIZONS):
         f1max = find_f1max(runs, title_table_4(row, horizon, most_stable=True))
         options, title = {"horizon": horizon}, title_table_4(row, horizon)
-        spec = _make_spec(title, row.weight, f1max, options, step_time_s=row.step_time_s)
-        yield from make_start_tasks(spec, effort.starts)
-        yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from _make_runs(effort, _make_spec(title, row.weight, f1max, options, step_time_s=row.step_time_s), "ga")
 
 
 def _make_table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Task]:
     for row in TABLE_3:
-        spec = _make_spec(title_table_3(label, row.weight), row.weight, f1max)
-        yield from make_start_tasks(spec, effort.starts)
+        yield from _make_runs(effort, _make_spec(title_table_3(label, row.weight), row.weight, f1max), "ga", "pso")
+
+
+def _make_runs(effort: Walk12Effort, spec: ProblemSpec, *searches: str) -> Iterator[Task]:
+    yield from make_start_tasks(spec, effort.starts)
+    if "ga" in searches:
         yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+    if "pso" in searches:
         yield from make_search_tasks(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
 
 
 def _make_spec(
     label: str, weight: float, f1max: float, options: Mapping[str, str] | None = None, **values: float
 ) -> ProblemSpec:
-    return ProblemSpec(
-        name="walk12", options=options or {}, values={**values, "lambda": weight, "f1max": f1max}, label=label
-    )
+    values |= {"lambda": weight, "f1max": f1max}
+    return ProblemSpec(name="walk12", options=options or {}, values=values, label=label)
 
 
 def find_f1max(runs: Runs, title: str) -> float:
@@ -193,10 +190,8 @@ def make_walks(effort: Walk12Effort, optima: Mapping[float, Sequence[float]]) ->
     spec, starts = ProblemSpec(name="walk12"), effort.perturbed_starts
     rows = [row for row in TABLE_3 if row.weight in effort.walked_weights]
     gaits = [(row.weight, by, x) for row in rows for by, x in (("paper", [*row.x]), ("IPOPT", [*optima[row.weight]]))]
-    return [
-        make_computation(f"walks-{gait[0]:g}-{gait[1]}", spec, simulate_walks, gait=gait, starts=starts)
-        for gait in gaits
-    ]
+    make = partial(make_computation, spec=spec, function=simulate_walks, starts=starts)
+    return [make(f"walks-{gait[0]:g}-{gait[1]}", gait=gait) for gait in gaits]
 
 
 def solve_with_printed_step(starts: Mapping[str, Sequence[float]]) -> dict[str, float]:

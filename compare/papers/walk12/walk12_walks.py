@@ -62,10 +62,10 @@ def simulate_walks(gait: tuple[float, str, Sequence[float]], starts: int) -> lis
         drive = Drive(feed_forward=added, interpolation=between, period_s=period_s)
         plan = _drive_as_printed(plan, torque, set_points)
         walk = measure_walk(plan, simulate_plan(plan, None, drive), drive, WALKED_STEPS)
-        known = {"weight": weight, "by": by, "step_time_s": step_time_s, "drives": drives, "starts": starts}
         share = None if walk.walked_m is None else walk.walked_m / walk.planned_m
-        known |= {"steps": walk.steps_done, "fell_at_s": walk.measurements.fell_at_s, "walked_share": share}
         ends = [simulate_plan(plan, None, drive, on_step=_perturb(seed)).fell_at_s for seed in range(starts)]
+        known = {"weight": weight, "by": by, "step_time_s": step_time_s, "drives": drives, "starts": starts}
+        known |= {"steps": walk.steps_done, "fell_at_s": walk.measurements.fell_at_s, "walked_share": share}
         found.append(known | {"upright": ends.count(None)})
     return found
 
@@ -83,7 +83,6 @@ def _perturb(seed: int) -> OnStep:
 
 
 def _drive_as_printed(plan: Plan, torque: bool, set_points: bool) -> Plan:
-    """Return a plan with the motors' holding torque, or with ten set-points for each step."""
     if torque:
         joints = {name: replace(joint, torque_limit_Nm=MOTOR_TORQUE_NM) for name, joint in plan.robot.joints.items()}
         plan = replace(plan, robot=replace(plan.robot, joints=joints))
