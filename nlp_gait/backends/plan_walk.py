@@ -240,7 +240,7 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progres
     for k in range(check_count("starts", starts)):
         x0: Array = np.clip(problem.start_point(rng), problem.lower, problem.upper)
         if cycle is not None:
-            gait = solve(cycle, seed=k, solver=IpoptSettings(few_rows=False), workers=1)
+            gait = solve(cycle, seed=k, workers=1)
             progress(f"start {k + 1}, cycle: {gait.status}")
             x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
         found = solve(problem, x0=x0, solver=solver, workers=1)

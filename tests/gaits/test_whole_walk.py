@@ -183,7 +183,7 @@ def test_what_cannot_be_planned_is_refused(options: dict[str, float], words: str
 def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
     row = ConstraintValue(name="ssp_reach[left leg, 3]", value=1.0, lower=None, upper=0.99, violation=0.01, unit="1")
     x0 = problem.start_point(np.random.default_rng(0))
-    quick = nlp_gait.IpoptSettings(iterations=1, compiled=False, few_rows=False, hessian="limited-memory")
+    quick = nlp_gait.IpoptSettings(iterations=1, compiled=False, hessian="limited-memory")
     solution = nlp_gait.solve(problem, x0=x0, solver=quick)
     plan = WalkPlan(problem=problem, solution=solution, steps=STEPS, distance_m=1.0, duration_s=1.0, energy_J=1.0)
     assert not plan.feasible and plan.obstacles

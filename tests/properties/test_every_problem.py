@@ -30,7 +30,7 @@ SEARCHABLE = [name for name in PROBLEMS if name not in TRANSCRIBED]
 # A start of the others takes seconds; the tests of stairs, humanoids and walking solve them.
 SOLVABLE = [name for name in SEARCHABLE if not name.startswith("stairs-") and not name.endswith("-cycle")]
 INTERVALS = {"nao-ssp": 4, "nao-dsp": 4, "humanoid-ssp": 4, "humanoid-dsp": 4}
-SOLVER = IpoptSettings(few_rows=False, compiled=False, hessian="limited-memory")
+SOLVER = IpoptSettings(compiled=False, hessian="limited-memory")
 DERIVATIVES = {"nao-ssp": ("analytic", "finite-difference"), "nao-dsp": ("analytic", "finite-difference")}
 VARIANTS = [(name, kind) for name in SEARCHABLE for kind in DERIVATIVES.get(name, (None,))]
 of_every_variant = pytest.mark.parametrize(

@@ -78,7 +78,8 @@ class IpoptSettings(Solver):
             is a compiler.
         linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never
             replaced by another one.
-        few_rows: begin with the rows that matter, see ``working_set``; False begins with all rows.
+        few_rows: begin with the rows that matter, see ``working_set``; None if the functions are compiled, because selecting
+            the rows takes a run. False begins with all rows.
         widths: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those
             of the NLP. Narrower ones follow if the exact functions refuse the last stage's point.
     """
@@ -91,7 +92,7 @@ class IpoptSettings(Solver):
     hessian: str | None = None
     compiled: bool | None = None
     linear_solver: str | None = None
-    few_rows: bool = True
+    few_rows: bool | None = None
     widths: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -113,7 +114,8 @@ class IpoptSettings(Solver):
         # give the same result.
         pays = solves * build_nlp(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
         compiled = pays if self.compiled is None else self.compiled
-        return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled)
+        few_rows = compiled if self.few_rows is None else self.few_rows
+        return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled, few_rows=few_rows)
 
     def prepare(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """Return IPOPT for a problem, built once for all its copies; CompilerError if compiled functions are required and fail.
@@ -127,7 +129,7 @@ class IpoptSettings(Solver):
             if self.compiled:
                 raise
             LOG.warning("IPOPT's functions are interpreted: %s", error)
-            return replace(self, compiled=False).prepare(problem)
+            return replace(chosen, compiled=False).prepare(problem)
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
         return self.prepare(problem).run(problem, x0, stop)

@@ -22,7 +22,7 @@ LESS = {
     "poses": 3,
     "printed_poses": 2,
     "plan_intervals": 12,
-    "plan_settings": {"iterations": 5, "compiled": False, "few_rows": False},
+    "plan_settings": {"iterations": 5, "compiled": False},
 }
 
 DRAWN = ("fig06-07", "fig13", "fig28")  # sticks, the network, the rollout

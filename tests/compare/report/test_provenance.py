@@ -31,4 +31,4 @@ def test_handling_and_gradient_methods_are_described_too() -> None:
     )
     assert changed.startswith("constraint handling: ") and "weight: 2.0" in changed and "(default Deb)" in changed
     budget, changed, defaults = compare_with_defaults(run(solver="ipopt", settings={"few_rows": False}))
-    assert budget == "no limit" and changed == "few_rows: false (default true)" and "few_rows" not in defaults
+    assert budget == "no limit" and changed == "few_rows: false (default null)" and "few_rows" not in defaults

@@ -26,7 +26,7 @@ CURVES = {"nao-ssp": 9, "nao-dsp": 7}
 ROUNDING = 1e-12
 # Central differences on a grid of 4,000 intervals.
 DIFFERENCE_TOLERANCE = 1e-5
-SOLVER = IpoptSettings(few_rows=False, compiled=False, hessian="limited-memory")
+SOLVER = IpoptSettings(compiled=False, hessian="limited-memory")
 RICH = [order for order in SPANS if order not in ("cubic", "measured")]
 
 

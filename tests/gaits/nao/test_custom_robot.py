@@ -29,7 +29,7 @@ from tests.robots.files import written
 TORQUE_TOLERANCE_NM = 1e-10
 TORSO_TOLERANCE_M = 1e-12
 NAMES = ("nao-ssp", "nao-dsp")
-SOLVER = IpoptSettings(few_rows=False, compiled=False, hessian="limited-memory")
+SOLVER = IpoptSettings(compiled=False, hessian="limited-memory")
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ def problem() -> GaitProblem:
 
 @pytest.fixture(scope="module")
 def solution(problem: GaitProblem) -> nlp_gait.Solution:
-    return nlp_gait.solve(problem, starts=1, seed=1, solver=nlp_gait.IpoptSettings(compiled=False, few_rows=False))
+    return nlp_gait.solve(problem, starts=1, seed=1, solver=nlp_gait.IpoptSettings(compiled=False))
 
 
 @pytest.mark.slow

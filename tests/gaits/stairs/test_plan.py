@@ -22,7 +22,7 @@ BEST_ENERGY_J = 110.880
 # Best known governing parameters rounded: a start from which the optimum is found in a second or two, without the run that
 # finds the rows that matter.
 NEAR_BEST = (0.69, 0.09, 0.24, 0.09, 0.7, 1.45, 0.58, 0.8, 1.3, 0.32, 0.12)
-SOLVER = nlp_gait.IpoptSettings(few_rows=False, compiled=False, hessian="limited-memory")
+SOLVER = nlp_gait.IpoptSettings(compiled=False, hessian="limited-memory")
 
 # Lower and upper limit of each link's angle and of both knees' [rad], and what counts as a violation of 1.
 LIMITS = {

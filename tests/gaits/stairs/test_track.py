@@ -21,7 +21,7 @@ NETWORK_ANGLE_RAD, NETWORK_COST = 1e-2, 0.01
 # The archive of ants and IPOPT end within this of each other (relative).
 AGREEMENT = 1e-5
 # To compile the derivatives takes longer than a short rollout's solve.
-INTERPRETED = nlp_gait.IpoptSettings(compiled=False, few_rows=False)
+INTERPRETED = nlp_gait.IpoptSettings(compiled=False)
 
 
 @pytest.fixture(scope="module")
