@@ -84,11 +84,6 @@ def write_nlp_source(found: NlpPlan) -> str:
     )
 
 
-def write_casadi_source(found: NlpPlan) -> str:
-    """Return the same with CasADi's interface."""
-    return f"{write_nlp_source(found)}\n{read_native_source('nlp_gait.backends.derivatives', 'casadi.hpp')}"
-
-
 def _write_rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
     text = ",\n".join(_braces(row) for row in rows)
     return f"static const int {name}[][{width}] = {{{text or '{0}'}}};"
@@ -151,13 +146,14 @@ class CompiledNlp:
         lanes = native_lanes()
         names = [*NLP_VALUES, *list(DERIVATIVES.values())[: 3 if second else 2]]
         graph = ca.Function("nlp", [nlp["x"], nlp["p"]], [nlp["f"], nlp["g"]]).serialize()
+        interface = "\n" + read_native_source("nlp_gait.backends.derivatives", "casadi.hpp")
         # The library is found without generating its source, by what the source depends on.
         loaded, _ = load_library(
             "\0".join([graph, version("casadi"), _hash_generator(), str(second)]),
             find_compiler(),
             (*FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"),
             names,
-            lambda: write_casadi_source(make_nlp_plan(split_nlp(nlp), second=second)),
+            lambda: write_nlp_source(make_nlp_plan(split_nlp(nlp), second=second)) + interface,
         )
         library = loaded._name  # noqa: SLF001 (documented; what was checked, whatever the path names now)
         self.functions = {name: ca.external(name, library) for name in names}
@@ -184,9 +180,13 @@ class CompiledNlp:
             (f, gradient), (g, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
             pairs = [(_numbers(machine(w, p)), _numbers([f, g])), (slope, _numbers([ca.dot(gradient, d), J @ d]))]
             if "nlp_hess_l" in self.functions:
-                ahead, behind = (self._evaluate_gradient(w + step * d, p, weights) for step in (STEP, -STEP))
+                ahead, behind = (
+                    [self.functions[name](w + step * d, p)[1] for name in ("nlp_grad_f", "nlp_jac_g")]
+                    for step in (STEP, -STEP)
+                )
+                change = ahead[0] - behind[0] + (ahead[1] - behind[1]).T @ weights
                 H = self.functions["nlp_hess_l"](w, p, 1.0, weights)
-                pairs.append(((ahead - behind) / (2 * STEP), _numbers([ca.triu2symm(H) @ d])))
+                pairs.append((_numbers([change / (2 * STEP)]), _numbers([ca.triu2symm(H) @ d])))
             agreeing += all(_agree(expected, value) for expected, value in pairs)
             if (checked := checked + 1) == CHECK_POINTS:
                 break
@@ -194,10 +194,6 @@ class CompiledNlp:
             raise CompilerError(
                 f"{library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
             )
-
-    def _evaluate_gradient(self, w: Array, p: Array, weights: Array) -> Array:
-        (_, slope), (_, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
-        return _numbers([slope + J.T @ weights])
 
 
 @cache

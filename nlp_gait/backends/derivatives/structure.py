@@ -60,7 +60,10 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
     stages = []
     for call, inputs, outputs in zip(calls, given, found, strict=True):
         function = call.which_function()
-        inner = _concatenate(_expand(function.find_functions(0)[0] if function.class_name() == "Map" else function))
+        inner = _expand(function.find_functions(0)[0] if function.class_name() == "Map" else function)
+        arguments = inner.sx_in()  # all nonzeros become one vector
+        ends = [ca.vertcat(*map(nonzeros, parts)) for parts in (arguments, inner.call(arguments))]
+        inner = ca.Function(inner.name(), ends[:1], ends[1:])
         count = function.nnz_in() // inner.nnz_in()
         stages.append(
             Stage(
@@ -89,17 +92,6 @@ def _expand(function: ca.Function) -> ca.Function:
         return function.expand()
     except RuntimeError as error:
         raise NotMapped(str(error).splitlines()[-1]) from error
-
-
-def _concatenate(function: ca.Function) -> ca.Function:
-    """Return a function from the nonzeros of all inputs, as one vector, to those of all outputs."""
-    inputs = function.sx_in()
-    outputs = function.call(inputs)
-    return ca.Function(
-        function.name(),
-        [ca.vertcat(*(nonzeros(each) for each in inputs))],
-        [ca.vertcat(*(nonzeros(each) for each in outputs))],
-    )
 
 
 def _by_sample(matrices: list[SX], count: int) -> SX:

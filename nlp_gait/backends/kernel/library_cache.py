@@ -101,15 +101,12 @@ def find_cache_folder() -> Path:
         base = base.parent.resolve() / base.name
         make_folder(base, mode=0o700)
         reason = _find_danger(base.lstat(), stat.S_ISDIR) or _find_danger_above(base)
-        if reason is None and _forbids_code(base):
-            reason = "its mount has the option noexec"
+        reason = reason or ("its mount has the option noexec" if _forbids_code(base) else None)
     except (OSError, RuntimeError) as error:
         reason = str(error)
-    if reason is None:
-        return base
-    folder = private_folder()
-    warn_once(f"the cache folder {base} cannot be used ({reason}); compiled code is stored for this process only")
-    return folder
+    if reason is not None:
+        warn_once(f"the cache folder {base} cannot be used ({reason}); compiled code is stored for this process only")
+    return base if reason is None else private_folder()
 
 
 def _find_danger(status: os.stat_result, has_type: Callable[[int], bool]) -> str | None:
@@ -155,13 +152,13 @@ def private_folder() -> Path:
         if place is None:
             raise OSError(f"no code may be loaded from {', '.join(places)}: their mounts have the option noexec")
         folder = Path(tempfile.mkdtemp(prefix="nlp-gait-", dir=place)).resolve()
-    atexit.register(_remove_folder, folder, os.getpid())
+
+    @atexit.register
+    def remove(owner: int = os.getpid()) -> None:
+        if os.getpid() == owner:  # not in a fork of it
+            shutil.rmtree(folder, ignore_errors=True)
+
     return folder
-
-
-def _remove_folder(folder: Path, owner: int) -> None:
-    if os.getpid() == owner:  # not in a fork of it
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def load_if_valid(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:

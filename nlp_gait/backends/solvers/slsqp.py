@@ -61,16 +61,16 @@ class Slsqp(Solver):
         try:
             with threadpool_limits(limits=1, user_api="blas"):  # their number changes LAPACK's rounding
                 result = minimize(
-                    lambda z: functions.evaluate(z)[0],
+                    lambda z: functions.evaluate(z.tobytes())[0][0],
                     (x0 - functions.offset) / functions.scale,
-                    jac=lambda z: functions.differentiate(z)[0],
+                    jac=lambda z: functions.differentiate(z.tobytes())[0],
                     method="SLSQP",
                     bounds=list(zip(functions.lower, functions.upper, strict=True)),
                     constraints=[
                         {
                             "type": "ineq",
-                            "fun": lambda z: functions.evaluate(z)[1],
-                            "jac": lambda z: functions.differentiate(z)[1],
+                            "fun": lambda z: functions.evaluate(z.tobytes())[1][0],
+                            "jac": lambda z: functions.differentiate(z.tobytes())[1],
                         }
                     ],
                     options={"maxiter": self.evaluations, "ftol": TOLERANCE},
@@ -123,22 +123,14 @@ class _Functions:
         self.best: tuple[float, float, Array] = (math.inf, math.inf, problem.lower)
         self.history: list[Best] = []
         # SLSQP evaluates the cost and the rows of a point one after the other; here they are evaluated together.
-        self._evaluate_once = lru_cache(maxsize=1)(lambda key: self._evaluate(np.atleast_2d(np.frombuffer(key))))
-        self._differentiate_once = lru_cache(maxsize=1)(self._differentiate)
+        self.evaluate = lru_cache(maxsize=1)(lambda key: self._evaluate(np.atleast_2d(np.frombuffer(key))))
+        self.differentiate = lru_cache(maxsize=1)(self._differentiate)
         self.started = time.perf_counter()
 
-    def evaluate(self, z: Array) -> tuple[float, Array]:
-        """Return cost and rows (m,) at z (n,)."""
-        f, rows = self._evaluate_once(z.tobytes())
-        return float(f[0]), rows[0]
-
-    def differentiate(self, z: Array) -> tuple[Array, Array]:
-        """Return gradient (n,) of the cost and Jacobian (m, n) of the rows at z (n,)."""
-        return self._differentiate_once(z.tobytes())
-
     def _differentiate(self, key: bytes) -> tuple[Array, Array]:
+        """Return gradient (n,) of the cost and Jacobian (m, n) of the rows at z (n,)."""
         z = np.frombuffer(key)
-        f, rows = self._evaluate_once(key)
+        f, rows = self.evaluate(key)
         step = np.where(z + STEP <= self.upper, STEP, -STEP)
         step[self.upper - self.lower < STEP] = STEP  # a fixed variable; its slope is not used
         shifted_f, shifted_rows = self._evaluate(z + np.diag(step))
@@ -160,16 +152,13 @@ class _Functions:
         g = self._objective.constraints(X)[:, : len(self._row_scale)]
         self.objective_s += time.perf_counter() - before
         self.calls += len(Z)
-        self._remember_best(X, f, violation)
+        violations = np.where(violation <= FEASIBILITY_TOLERANCE, 0.0, violation)
+        leader = int(np.lexsort((f, violations))[0])
+        self.best = min(
+            self.best, (float(violations[leader]), float(f[leader]), X[leader].copy()), key=lambda best: best[:2]
+        )
+        objective = self._problem.objective.sign * self.best[1] if self.best[0] == 0.0 else None
+        self.history.append(Best(self.calls, objective, time.perf_counter() - self.started))
         sides = [(g - self._row_lower) / self._row_scale, (self._row_upper - g) / self._row_scale]
         finite = [np.isfinite(self._row_lower), np.isfinite(self._row_upper)]
         return f, np.hstack([side[:, known] for side, known in zip(sides, finite, strict=True)])
-
-    def _remember_best(self, X: Array, f: Array, violation: Array) -> None:
-        violations = np.where(violation <= FEASIBILITY_TOLERANCE, 0.0, violation)
-        leader = int(np.lexsort((f, violations))[0])
-        found = (float(violations[leader]), float(f[leader]), X[leader].copy())
-        if found[:2] < self.best[:2]:
-            self.best = found
-        objective = self._problem.objective.sign * self.best[1] if self.best[0] == 0.0 else None
-        self.history.append(Best(self.calls, objective, time.perf_counter() - self.started))

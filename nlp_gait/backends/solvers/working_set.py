@@ -8,6 +8,7 @@ converge on some of the rows, it starts again with all of them.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -46,7 +47,7 @@ class WorkingSet:
         self._nlp, self._functions, self._options = nlp, functions, options
         self._whole, self._watch = whole, watch
         self._begin = always
-        self._solvers: dict[bytes, tuple[ca.Function, IterationWatch]] = {}
+        self._get_solver = lru_cache(CACHED_SOLVERS)(self._make_solver)
         self._stats: dict[str, Any] = {}
 
     def learn(self, **arguments: Any) -> None:
@@ -74,7 +75,7 @@ class WorkingSet:
         rows, start = self._begin, arguments["x0"]
         for _ in range(ROUNDS):
             chosen = np.flatnonzero(rows)
-            solver = self._get_solver(rows)
+            solver, _ = self._get_solver(rows.tobytes())
             sides = {side: np.asarray(arguments[side])[chosen] for side in ("lbg", "ubg")}
             found = solver(**{**arguments, **sides, "x0": start})
             stats = solver.stats()
@@ -104,16 +105,9 @@ class WorkingSet:
             for name, value in stats.items()
         }
 
-    def _get_solver(self, rows: Rows) -> ca.Function:
-        key = rows.tobytes()
-        if key not in self._solvers:
-            if len(self._solvers) == CACHED_SOLVERS:
-                del self._solvers[next(iter(self._solvers))]
-            self._solvers[key] = self._make_solver(np.flatnonzero(rows).tolist())
-        return self._solvers[key][0]
-
-    def _make_solver(self, rows: list[int]) -> tuple[ca.Function, IterationWatch]:
+    def _make_solver(self, chosen: bytes) -> tuple[ca.Function, IterationWatch]:
         """Make IPOPT on some of the rows, within milliseconds: it uses parts of the results of the functions of all rows."""
+        rows = np.flatnonzero(np.frombuffer(chosen, dtype=bool)).tolist()
         functions, x, p = self._functions, self._nlp["x"], self._nlp["p"]
         nlp: dict[str, Any] = {"x": x, "p": p, "f": functions["nlp_f"](x, p), "g": functions["nlp_g"](x, p)[rows]}
         g, jacobian = functions["nlp_jac_g"](x, p)
