@@ -1,14 +1,15 @@
-"""Data files: read strictly, written atomically.
+"""Data files: read strictly, written atomically and durably.
 
 Only regular files of valid UTF-8 are read. JSON must not repeat a key or contain numbers that exceed 64 bits or are not finite,
 or text that cannot be encoded. A file is written under another name, flushed to the disk and renamed; a link of its name is
-replaced, never followed. Then its folder is flushed, so that the file survives a power cut.
+replaced, never followed. An operating system holds writes in memory for some seconds; the content of a file, its name and the
+name of its folder reach the disk independently. So its folder is flushed, too, and the file survives a power cut.
 """
 
 from __future__ import annotations
 
-import contextlib
 import csv
+import errno
 import io
 import json
 import math
@@ -16,14 +17,14 @@ import os
 import re
 import secrets
 import stat
+import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import GaitError, InputError, OutputError
 
 LARGEST_FILE = 64 * 2**20  # bytes; a record has about 10 kB, a result with thousands of variables some MB
@@ -35,6 +36,59 @@ BYTE_ORDER_MARK = "\ufeff"
 LEFTOVER_AGE_S = 60.0
 TEMPORARY = re.compile(r"\.[0-9a-f]{16}\.tmp")
 FORMULA = tuple("=+-@")  # a spreadsheet computes a cell that begins with one of these
+# Errors of systems on which a folder cannot be opened or flushed.
+NOT_FOR_FOLDERS = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno.EBADF, errno.EISDIR)
+
+
+def rename(path: Path, target: Path) -> None:
+    """Rename a file within its folder, durably, replacing an existing file; raises OSError."""
+    path.replace(target)
+    flush(target.parent)
+
+
+def flush(path: Path) -> None:
+    """Wait until a file's content, or the names in a folder if it can be flushed, are on the disk; raises OSError."""
+    is_folder = path.is_dir()
+    try:
+        descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)
+        try:
+            if sys.platform == "darwin":  # where fsync does not flush the disk's cache
+                import fcntl
+
+                fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
+            else:
+                os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        if not (is_folder and error.errno in NOT_FOR_FOLDERS):
+            raise
+
+
+@contextmanager
+def lock_folder(path: Path) -> Iterator[None]:
+    """Let one process at a time into such a block for a folder; no lock where the system or the file system has none."""
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def make_folder(path: Path, mode: int = 0o777) -> None:
+    """Make a folder and its parents, all with a mode, durably; existing ones are left alone; raises OSError."""
+    for folder in reversed([path, *(parent for parent in path.parents if not parent.exists())]):
+        is_new = not folder.exists()
+        folder.mkdir(mode=mode, exist_ok=True)
+        if is_new:
+            flush(folder.parent)
 
 
 def make_file_name(name: str) -> str:
@@ -199,7 +253,7 @@ def replace_file(path: Path) -> Iterator[Path]:
             rename(temporary, path)
     finally:
         if temporary is not None:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
 

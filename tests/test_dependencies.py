@@ -21,7 +21,6 @@ LAYERS = (
     "nlp_gait.errors",
     "nlp_gait.providers",
     "nlp_gait.processes",
-    "nlp_gait.disk",
     "nlp_gait.files",
     "nlp_gait.columns",
     "nlp_gait.notebook",

@@ -58,7 +58,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/gaitbench/c_export.py": ("tests/gaitbench/test_c_export.py",),
     "nlp_gait/gaitbench/adapters": ("tests/gaitbench/test_adapters.py",),
     "compare/bench/leaderboard.py": ("tests/compare/bench/test_bench.py",),
-    "nlp_gait/disk.py": ("tests/faults/test_disk.py", "tests/faults/test_power_cuts.py"),
+    "nlp_gait/files.py": ("tests/faults/test_disk.py", "tests/faults/test_power_cuts.py"),
     "compare/study/run_task.py": (
         "tests/compare/study/test_run_isolated.py",
         "tests/compare/study/test_gradient_runs.py",

@@ -12,9 +12,8 @@ from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from nlp_gait.decoding import decode
-from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
-from nlp_gait.files import convert_errors, read_json
+from nlp_gait.files import convert_errors, make_folder, read_json
 
 MANIFEST = "manifest.json"
 MOST_FILES, LARGEST_FILE, LARGEST_TOTAL = 200_000, 64 * 2**20, 2 * 2**30  # [bytes]

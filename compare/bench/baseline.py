@@ -22,9 +22,8 @@ from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import HASH
-from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
-from nlp_gait.files import replace_file
+from nlp_gait.files import make_folder, replace_file
 from nlp_gait.gaitbench.facts import Subset
 from nlp_gait.gaitbench.generated import is_generated, list_test_seeds, make_id
 

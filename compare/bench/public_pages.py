@@ -14,8 +14,8 @@ from compare.report.document import Document, Prose, Section
 from compare.report.writing import write_document
 from compare.study.record import RunRecord
 from nlp_gait.backends.identity import hash_json
-from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
+from nlp_gait.files import make_folder
 from nlp_gait.progress import Progress, ignore_progress
 
 

@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from nlp_gait.disk import make_folder
 from nlp_gait.errors import CompilerError, InputError, OutputError
-from nlp_gait.files import check_output, check_output_name, is_forced, make_writable_folder, write_text
+from nlp_gait.files import check_output, check_output_name, is_forced, make_folder, make_writable_folder, write_text
 
 REGISTER = "written"  # folder in the cache folder
 

@@ -13,9 +13,8 @@ from typing import Any
 from compare.study.definition import hash_definition
 from compare.study.record import RunRecord, read_record
 from compare.study.task import Task
-from nlp_gait.disk import lock_folder, rename
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import convert_errors, make_writable_folder, write_json
+from nlp_gait.files import convert_errors, lock_folder, make_writable_folder, rename, write_json
 
 RECORDS = "records"
 KEY_DIGITS = 8

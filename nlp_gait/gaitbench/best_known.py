@@ -13,9 +13,8 @@ from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
-from nlp_gait.disk import make_folder
 from nlp_gait.errors import InputError
-from nlp_gait.files import replace_nan, write_json
+from nlp_gait.files import make_folder, replace_nan, write_json
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id

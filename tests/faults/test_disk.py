@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nlp_gait import disk
+from nlp_gait import files as disk
 
 
 @pytest.fixture

@@ -164,9 +164,8 @@ def test_without_flushes_the_disk_loses_it(
 
 # Writers that hold a temporary file of ``replace_file``, or write where nothing is kept.
 ALLOWED = {
-    "nlp_gait/disk.py",
     "nlp_gait/files.py",
-    "nlp_gait/backends/kernel/library_cache.py",  # in its workshop; what is kept goes through nlp_gait.disk
+    "nlp_gait/backends/kernel/library_cache.py",  # in its workshop; what is kept goes through nlp_gait.files
     "nlp_gait/export/formats.py",
     "nlp_gait/simulation/film/video.py",
     "compare/archive/unpack.py",  # into a temporary folder

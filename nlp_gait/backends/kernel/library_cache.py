@@ -22,9 +22,8 @@ from functools import cache
 from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import Compiler
-from nlp_gait.disk import flush, make_folder, rename
 from nlp_gait.errors import CompilerError, warn_once
-from nlp_gait.files import convert_errors, make_temporary_folder
+from nlp_gait.files import convert_errors, flush, make_folder, make_temporary_folder, rename
 
 FOLDER_VARIABLE = "NLP_GAIT_CACHE"
 OPEN_FILES = Path("/proc/self/fd")  # of Linux: each open file and folder under its number
