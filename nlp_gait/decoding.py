@@ -97,11 +97,8 @@ def decode_value(kind: Any, raw: Any, where: str) -> Any:
         return _decode_union(parts, raw, where)
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where} must be an object, got {format_value(raw)}")
-    keys, values = parts
-    return {
-        decode_value(keys, key, f"a key of {where}"): decode_value(values, value, f"{where}.{key}")
-        for key, value in raw.items()
-    }
+    key, value = parts
+    return {decode_value(key, k, f"a key of {where}"): decode_value(value, v, f"{where}.{k}") for k, v in raw.items()}
 
 
 def _decode_union(parts: tuple[Any, ...], raw: Any, where: str) -> Any:

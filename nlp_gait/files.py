@@ -310,9 +310,8 @@ def _shorten(text: str) -> str:
 @contextmanager
 def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> Iterator[Path]:
     """Yield a temporary folder, removed at the end; raises ``error`` if the system has no place for it."""
-    with convert_errors(
-        "no folder for temporary files", error, "free some disk space, or set TMPDIR to another folder"
-    ):
+    remedy = "free some disk space, or set TMPDIR to another folder"
+    with convert_errors("no folder for temporary files", error, remedy):
         folder = tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)
     with folder as name:
         yield Path(name)

@@ -41,9 +41,8 @@ class ExactModel:
     @lock_casadi
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
         """Return the values at x (n,) and parameter values p (k,)."""
-        cost, violation, g, lower, upper, indexes = (
-            np.array(value).ravel() for value in self.function(np.asarray(x), p)
-        )
+        found = (np.array(value).ravel() for value in self.function(np.asarray(x), p))
+        cost, violation, g, lower, upper, indexes = found
         if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
             violation = np.full(1, math.nan)
         named = dict(zip(self.index_names, indexes.tolist(), strict=True))

@@ -40,12 +40,8 @@ def _find_files(problem: GaitProblem) -> list[str]:
 def identify_problem(problem: GaitProblem) -> dict[str, Any]:
     """Return the problem's part of a definition: how to load it, and a hash of its content."""
     content = [problem.build_once(_hash_mathematics), problem.p.tolist(), problem.names]
-    part = {
-        "name": problem.address,
-        "options": dict(problem.options),
-        "parameters": dict(problem.values),
-        HASH: hash_json(content),
-    }
+    part = {"name": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
+    part[HASH] = hash_json(content)
     files = problem.build_once(_find_files)
     if files:
         part[FILES] = files

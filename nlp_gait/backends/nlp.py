@@ -68,9 +68,8 @@ class NlpModel:
         lower, upper = (np.array(bound).ravel() for bound in self.row_bounds(problem.p))
         wrong = np.flatnonzero(np.isnan(lower) | np.isnan(upper))
         if wrong.size:
-            raise InputError(
-                f"{problem.name}: a bound of {self.row_names[wrong[0]]} is NaN at these parameters; change them"
-            )
+            row = self.row_names[wrong[0]]
+            raise InputError(f"{problem.name}: a bound of {row} is NaN at these parameters; change them")
         free = np.full(self.lifted, np.inf)
         return {
             "lbx": np.concatenate([(problem.lower - self.offset) / self.scale, -free]),
@@ -92,10 +91,8 @@ def _build(problem: GaitProblem) -> NlpModel:
     symbols = problem.symbols()
     z, p, width = MX.sym("z", n), symbols.p, MX.sym("width")
     ops = Lifted(width)
-    assembly = problem.assemble(
-        Point(x=ca.DM(offset) + ca.DM(problem.scale) * z, p=p, positions=symbols.positions), ops
-    )
-
+    point = Point(x=ca.DM(offset) + ca.DM(problem.scale) * z, p=p, positions=symbols.positions)
+    assembly = problem.assemble(point, ops)
     rows = [constraint.columns for constraint in assembly.constraints]
     values, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
     bounds = ca.Function("row_bounds", [p], [ca.densify(lower), ca.densify(upper)])
@@ -159,9 +156,8 @@ def _check_sense(
     is_loose = np.isin(columns, loose)
     column_owner, away = columns[is_loose], senses[is_loose]
     outputs = ca.vertcat(cost, values, *(lift.rows for lift in lifts))
-    slopes = ca.Function(
-        "slopes", [inputs, variables], [ca.jacobian(outputs, ca.vertcat(*(lifts[i].variable for i in loose)))]
-    )
+    moved = ca.vertcat(*(lifts[i].variable for i in loose))
+    slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(outputs, moved)])
     lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
     tight = _per_row(lifts, [lift.tight for lift in lifts]) > 0
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.

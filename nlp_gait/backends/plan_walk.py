@@ -153,11 +153,9 @@ def plan_walk(
         problem = problem.with_values(**{LEAST_SPEED: speed_m_s, GREATEST_SPEED: speed_m_s})
     if distance_m is not None:
         problem = _fix_step(problem, distance_m)
-    cycle = (
-        None
-        if name == "nao-walk" and not more
-        else load(name.replace("walk", "cycle"), robot=robot, intervals=intervals)
-    )
+    cycle = None
+    if name != "nao-walk" or more:
+        cycle = load(name.replace("walk", "cycle"), robot=robot, intervals=intervals)
     if ahead is None and problem.value(f"{STEP}.lower") == problem.value(f"{STEP}.upper"):
         ahead = problem.value(f"{STEP}.lower")
     if cycle is not None and ahead is not None:

@@ -139,9 +139,7 @@ def run_starts(
     count = min(workers or 1, len(points))
     if count > 1:
         build_exact_model(problem)  # every run needs it: built before the fork
-        yield from run_in_forks(
-            lambda k, is_ending: solver.run(problem, points[k], is_ending), len(points), count, stop
-        )
+        yield from run_in_forks(lambda k, is_over: solver.run(problem, points[k], is_over), len(points), count, stop)
         return
     for point in points:
         yield solver.run(problem, point, stop)

@@ -178,9 +178,8 @@ class Constraint:
 def _count_rows(owner: str, field: str, value: object) -> int:
     if not isinstance(value, MX):
         remedy = f"; write MX({value})" if isinstance(value, (int, float)) else ""
-        raise InputError(
-            f"{owner}: {field} must be a CasADi MX, got {type(value).__name__} {format_value(value)}{remedy}"
-        )
+        got = f"{type(value).__name__} {format_value(value)}"
+        raise InputError(f"{owner}: {field} must be a CasADi MX, got {got}{remedy}")
     if value.shape[1] != 1:
         raise InputError(f"{owner}: {field} must be a column, got shape {value.shape}; casadi.vec makes one")
     return int(value.shape[0])
@@ -247,9 +246,8 @@ class PointOf(Generic[Expression]):
 
     def extend(self, name: str, value: Expression) -> PointOf[Expression]:
         """Return the point with one more variable at the end."""
-        return PointOf(
-            x=ca.vertcat(self.x, value), p=self.p, positions={**self.positions, name: ("x", int(self.x.shape[0]))}
-        )
+        positions = {**self.positions, name: ("x", int(self.x.shape[0]))}
+        return PointOf(x=ca.vertcat(self.x, value), p=self.p, positions=positions)
 
 
 # Input of an assembly; one instant of a motion, mapped over the samples; numbers.

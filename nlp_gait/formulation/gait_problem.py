@@ -152,9 +152,8 @@ class GaitProblem:
         for name, value in values.items():
             parameter = self._parameter(name)
             if not is_number(value):
-                raise InputError(
-                    f"parameter {name!r} must be a finite number [{parameter.unit}], got {format_value(value)}"
-                )
+                got = format_value(value)
+                raise InputError(f"parameter {name!r} must be a finite number [{parameter.unit}], got {got}")
             if abs(float(value)) > LARGEST:
                 raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:

@@ -26,7 +26,7 @@ from nlp_gait.files import convert_errors, read_json
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.progress import Progress
 from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.boxes import halve
 from nlp_gait.proofs.branch_and_bound import Certificate, certify, target_cost
@@ -54,9 +54,8 @@ class CertificateFile:
 
 def make_certificate_file(problem: GaitProblem, certificate: Certificate) -> CertificateFile:
     """Return the certificate of a problem with its problem and code."""
-    return CertificateFile(
-        problem=identify_problem(problem), code_sha256=hash_code(make_bounds(problem)), certificate=certificate
-    )
+    code = hash_code(make_bounds(problem))
+    return CertificateFile(problem=identify_problem(problem), code_sha256=code, certificate=certificate)
 
 
 def read_certificate(path: Path) -> CertificateFile:
@@ -171,15 +170,11 @@ def check_certificate(
     raise InputError(f"{len(path)} of {paths} paths do not end after {DEEPEST_PATH} halvings: the bound is not proven")
 
 
-def repeat_proof(
-    file: CertificateFile, *, progress: Progress = ignore_progress, checkpoint: Path | None = None
-) -> Certificate:
+def repeat_proof(file: CertificateFile, progress: Progress, checkpoint: Path) -> Certificate:
     """Prove the bound of a certificate again, as a whole; arguments and errors as ``certify`` and ``check_certificate``."""
     (problem, _), proof = _check_numbers(file), file.certificate
-    x = np.array(proof.x)
-    return certify(
-        problem, x, tolerance=proof.tolerance, time_limit_s=math.inf, progress=progress, checkpoint=checkpoint
-    )
+    limits = {"tolerance": proof.tolerance, "time_limit_s": math.inf}
+    return certify(problem, np.array(proof.x), **limits, progress=progress, checkpoint=checkpoint)
 
 
 def _check_numbers(file: CertificateFile) -> tuple[GaitProblem, float]:
@@ -189,10 +184,9 @@ def _check_numbers(file: CertificateFile) -> tuple[GaitProblem, float]:
         raise InputError("the certificate is of a proof that was not finished; only its bound can be used")
     if not 0.0 < proof.tolerance < 1.0:
         raise InputError(f"the certificate's tolerance must be between 0 and 1, got {proof.tolerance}")
-    if not (math.isfinite(proof.bound) and math.isfinite(proof.objective)):
-        raise InputError(
-            f"the certificate's bound and objective must be finite, got {proof.bound} and {proof.objective}"
-        )
+    bound, objective = proof.bound, proof.objective
+    if not (math.isfinite(bound) and math.isfinite(objective)):
+        raise InputError(f"the certificate's bound and objective must be finite, got {bound} and {objective}")
     if not (proof.boxes >= 1 and 0.0 <= proof.time_s < math.inf and 0.0 <= proof.cpu_s < math.inf):
         raise InputError(
             f"the certificate's proof must have at least one box and 0 s, got {proof.boxes}, {proof.time_s} s, "

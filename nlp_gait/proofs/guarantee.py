@@ -133,6 +133,5 @@ def _violation(
     rows: time_search.TimeRows, k: int, piece: tuple[float, float], least: float, most: float
 ) -> RowViolation:
     known, (from_s, to_s) = most if np.isfinite(most) else None, piece
-    return RowViolation(
-        row=rows.names[k], unit=rows.units[k], from_s=from_s, to_s=to_s, least=max(least, 0.0), most=known
-    )
+    row, unit = rows.names[k], rows.units[k]
+    return RowViolation(row=row, unit=unit, from_s=from_s, to_s=to_s, least=max(least, 0.0), most=known)

@@ -146,9 +146,8 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
         for c in by_kind["root-mean-square"]
         for name, unit, value, lower, upper in _split(c)
     ]
-    indexes = [
-        (name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in source.means if name in still.indexes
-    ]
+    means_of = [name for name in source.means if name in still.indexes]
+    indexes = [(name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
     others, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]

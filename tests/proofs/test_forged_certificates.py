@@ -15,6 +15,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.progress import ignore_progress
 from nlp_gait.proofs import certificate as certificates
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.proofs.certificate import (
@@ -174,6 +175,6 @@ def test_an_honest_certificate_passes_and_its_proof_repeats(
     found = check_certificate(honest, paths=40)
     assert found.same_code and found.paths == 40 and found.best == pytest.approx(honest.certificate.objective, rel=1e-6)
     assert 0.2 * honest.certificate.boxes < found.boxes < 5 * honest.certificate.boxes  # an estimate
-    repeated = repeat_proof(honest, checkpoint=tmp_path / "open")
+    repeated = repeat_proof(honest, ignore_progress, checkpoint=tmp_path / "open")
     assert repeated.closed
     assert (repeated.boxes, repeated.bound) == (honest.certificate.boxes, honest.certificate.bound)

@@ -47,9 +47,8 @@ class Hessian:
         plan.reset(SECOND, self.place, len(keys), marker)
         for d, c, row, first, second in contributions:
             plan.add_product(SECOND, row, self.place + np.searchsorted(keys, d * assembler.n + c), first, second)
-        self.sparsity = ca.Sparsity.triplet(
-            assembler.n, assembler.n, (keys % assembler.n).tolist(), (keys // assembler.n).tolist()
-        )
+        n = assembler.n
+        self.sparsity = ca.Sparsity.triplet(n, n, (keys % n).tolist(), (keys // n).tolist())
 
     def _add_glue(self, glue: Glue, weights: Integers, contributions: Products) -> None:
         """Add the weights of the outputs that glue reads, and its own second derivatives."""
@@ -58,9 +57,8 @@ class Hessian:
         for weight, entries in zip(weights.tolist(), glue.entries, strict=True):
             for j, factor in entries:
                 if j >= assembler.n:
-                    plan.add_product(
-                        SECOND, Row(np.zeros(1, int), np.array([weight])), self.bar_places[[j]], factor, ONE
-                    )
+                    row = Row(np.zeros(1, int), np.array([weight]))
+                    plan.add_product(SECOND, row, self.bar_places[[j]], factor, ONE)
         curved = [i for i, entries in enumerate(glue.entries) if any(f not in plan.initial for _, f in entries)]
         if not curved:
             return
@@ -103,10 +101,8 @@ class Hessian:
                 if samples.by_column:
                     parts = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
                     columns = union(parts)
-                    base = place + (e * ma + a) * samples.width
-                    _add_outer(
-                        row, Row(columns, base + np.searchsorted(samples.columns[e], columns)), ONE, contributions
-                    )
+                    places = place + (e * ma + a) * samples.width + np.searchsorted(samples.columns[e], columns)
+                    _add_outer(row, Row(columns, places), ONE, contributions)
                     continue
                 for b in np.flatnonzero(pattern[a]):
                     factor = place + ((e * ma + a) * ma + b if found.directional else e * upper.nnz() + at[a, b])

@@ -212,30 +212,28 @@ class StagePlaces:
         if found.directional:
             place = plan.allocate(count * nv * self.width)
             write = PlaceBlock(place, nv * self.width, nv, self.width, 1)
-            plan.add_call(
-                FIRST, Call(number, count, self.count_directions(), (self.read, self.place_directions(plan)), (write,))
-            )
+            inputs = (self.read, self.place_directions(plan))
+            plan.add_call(FIRST, Call(number, count, self.count_directions(), inputs, (write,)))
         else:
             nonzeros = found.jacobian.nnz()
             place = plan.allocate(count * nonzeros)
-            plan.add_call(
-                FIRST, Call(number, count, None, (self.read,), (PlaceBlock(place, nonzeros, nonzeros, 1, 0),))
-            )
+            write = PlaceBlock(place, nonzeros, nonzeros, 1, 0)
+            plan.add_call(FIRST, Call(number, count, None, (self.read,), (write,)))
         at = np.full((nv, ma), -1)
         output, source = found.jacobian.get_triplet()
         at[output, source] = np.arange(len(output))
         mark, begin = len(plan.steps[FIRST]), plan.size
         for e in range(count):
             for o, name in enumerate(self.used):
-                inputs = np.flatnonzero(at[o] >= 0)
-                rows = [self.rows[e][a] for a in inputs]
+                read = np.flatnonzero(at[o] >= 0)
+                rows = [self.rows[e][a] for a in read]
                 columns = union(row.columns for row in rows)
                 y = self.before + e * self.outputs + name
                 if self.by_column:
                     base = place + (e * nv + o) * self.width
                     assembler.derivatives[y] = Row(columns, base + np.searchsorted(self.columns[e], columns))
                     continue
-                slopes = place + ((e * nv + o) * ma + inputs if found.directional else e * nonzeros + at[o, inputs])
+                slopes = place + ((e * nv + o) * ma + read if found.directional else e * nonzeros + at[o, read])
                 if all(len(row.places) == 1 and row.places[0] == ONE for row in rows) and len(columns) == len(rows):
                     order = np.argsort([row.columns[0] for row in rows])
                     assembler.derivatives[y] = Row(columns, slopes[order])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -254,7 +255,5 @@ class DerivativePlan:
 def find_runs(targets: Integers, sources: Integers) -> list[tuple[int, int, int]]:
     """Split two lists of places into runs in which both increase by one; return target, source, length of each."""
     ends = np.flatnonzero((np.diff(targets) != 1) | (np.diff(sources) != 1)) + 1
-    begins = [0, *ends.tolist()] if len(targets) else []
-    return [
-        (int(targets[i]), int(sources[i]), j - i) for i, j in zip(begins, [*begins[1:], len(targets)], strict=False)
-    ]
+    cuts = [0, *ends.tolist(), len(targets)] if len(targets) else []
+    return [(int(targets[i]), int(sources[i]), j - i) for i, j in pairwise(cuts)]

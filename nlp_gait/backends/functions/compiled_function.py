@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import re
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -45,11 +46,9 @@ LOOPS = ("Map", "ThreadMap", "MapSum")
 
 def make_kernel(function: ca.Function) -> ca.Function:
     """Return a function ``kernel`` with the same arguments and dense results; raises InputError where that is impossible."""
-    for i in range(function.n_in()):
+    for i, name in enumerate(function.name_in()):
         if not function.sparsity_in(i).is_dense():
-            raise InputError(
-                f"argument {function.name_in(i)} of {function.name()} is sparse; make it dense with casadi.densify"
-            )
+            raise InputError(f"argument {name} of {function.name()} is sparse; make it dense with casadi.densify")
     if any(_find_unsupported(function)) or _count_operations(function) <= MOST_EXPANDED:
         function = _expand(function)
     symbols, results = apply_to_symbols(function)
@@ -264,9 +263,7 @@ def _compile(function: ca.Function, threads: int, lanes: int) -> CompiledFunctio
     compiled = CompiledFunction(function, make_kernel(function), threads, lanes)
     draw = Random(0).random
     sizes = [function.size_in(i) for i in range(function.n_in())]
-    points = [
-        np.array([[draw() for _ in range(rows * columns)] for _ in range(CHECK_POINTS)]) for rows, columns in sizes
-    ]
+    points = [np.array([[draw() for _ in range(math.prod(s))] for _ in range(CHECK_POINTS)]) for s in sizes]
     results = [np.empty((CHECK_POINTS, function.numel_out(i))) for i in range(function.n_out())]
     compiled._evaluate([(values, False) for values in points], results, slice(0, CHECK_POINTS))
     expected = [

@@ -37,6 +37,8 @@ BLOCKS = (64, 16, 4, 1)
 class NativeKernel:
     """Evaluates a kernel in a compiled library; safe to call from several threads at once."""
 
+    backend: Literal["compiled"] = "compiled"
+
     def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
         """Build the library for 1, 2, 4 or 8 lanes, or load it from the cache; raises CompilerError.
 
@@ -73,6 +75,8 @@ def get_address(array: Array) -> int:
 
 class InterpretedKernel:
     """Evaluates a kernel in CasADi's virtual machine, one thread at a time: many times slower, the same numbers."""
+
+    backend: Literal["interpreted"] = "interpreted"
 
     def __init__(self, problem: GaitProblem) -> None:
         kernel = build_kernel(problem)
@@ -168,9 +172,7 @@ class CompiledObjective:
         self.lower = problem.lower  #: (n,) current lower bounds
         self.upper = problem.upper  #: (n,) current upper bounds
         self.row_names = kernel.model.row_names  #: (m,) constraint rows, in the order of ``constraints``
-        self.backend: Literal["compiled", "interpreted"] = (
-            "compiled" if isinstance(evaluator, NativeKernel) else "interpreted"
-        )
+        self.backend: Literal["compiled", "interpreted"] = evaluator.backend
         self.description = evaluator.description  #: backend, compiler and lane count, in words
         self._evaluator = evaluator
         self._lower, self._upper = kernel.row_bounds(problem)

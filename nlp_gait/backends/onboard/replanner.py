@@ -87,9 +87,8 @@ class Replanner:
     def __init__(self, problem: GaitProblem, near: Outcome, *, predict: bool = False) -> None:
         """Use ``replanner`` instead."""
         if near.guess is None or not near.converged:
-            raise InputError(
-                f"{problem.name}: planning again needs an optimum by IPOPT to begin from; it {near.status}"
-            )
+            name = problem.name
+            raise InputError(f"{name}: planning again needs an optimum by IPOPT to begin from; it {near.status}")
         self.problem = problem
         self._ipopt = IpoptSettings(hessian="exact").prepare(problem, solves=SOLVES)
         self._functions = NlpFunctions(problem, self._ipopt.functions)
@@ -207,9 +206,8 @@ class _Run:
         self._problem, self._at, self._steps, self._scale = problem, at, steps, scale
         model = at.model
         at.set_parameters(problem.p)
-        self._z_lower, self._z_upper = (
-            (bound - model.offset) / model.scale for bound in (problem.lower, problem.upper)
-        )
+        self._z_lower = (problem.lower - model.offset) / model.scale
+        self._z_upper = (problem.upper - model.offset) / model.scale
         self._n, self._width, self._multipliers = model.variables, guess.width, guess.rows
         self.iterations, self.converged, self.note = 0, False, ""
         self._go_to(guess.primal.copy())
@@ -288,6 +286,7 @@ class _Run:
         if not self.converged and self._best is not None:
             self._go_to(self._best[1])
         feasible = self._violation <= FEASIBILITY_TOLERANCE and math.isfinite(at.cost[0])
+        rows = self._multipliers.copy()
         return Replan(
             x=np.clip(at.model.point(self._w), self._problem.lower, self._problem.upper),
             objective=self._problem.objective.sign * float(at.cost[0]),
@@ -298,9 +297,7 @@ class _Run:
             solver="sqp",
             note=self.note,
             violated=(),
-            guess=Guess(
-                primal=self._w, bounds=np.zeros(len(self._w)), rows=self._multipliers.copy(), width=self._width
-            ),
+            guess=Guess(primal=self._w, bounds=np.zeros(len(self._w)), rows=rows, width=self._width),
         )
 
     def _go_to(self, w: Array) -> None:

@@ -42,9 +42,8 @@ class KktFunctions:
     def matrices(self) -> ca.Function:
         """(w, p, lam) to the Hessian of L in w, and the Jacobian of the rows in w."""
         w, p, lam = self._symbols()
-        return ca.Function(
-            "matrices", [w, p, lam], [ca.jacobian(self.gradient(w, p, lam), w), ca.jacobian(self.values(w, p)[1], w)]
-        )
+        outputs = self.gradient(w, p, lam), self.values(w, p)[1]
+        return ca.Function("matrices", [w, p, lam], [ca.jacobian(output, w) for output in outputs])
 
     @cached_property
     def by_parameters(self) -> ca.Function:

@@ -162,18 +162,12 @@ def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Ar
     """
     values, lower, upper = optimum.rows
     inactive, active = optimum.side == 0, optimum.active
-    priced = np.abs(optimum.multipliers[active]) > WEAK
+    priced, side = np.abs(optimum.multipliers[active]) > WEAK, optimum.side[active]
     rate = change.values + moved
-    room = [
-        (upper - values)[inactive],
-        (values - lower)[inactive],
-        (optimum.multipliers * optimum.side)[active][priced],
-    ]
-    shrinks = [
-        (rate - change.upper)[inactive],
-        (change.lower - rate)[inactive],
-        -(optimum.side[active][:, None] * multipliers)[priced],
-    ]
+    prices = (optimum.multipliers[active] * side)[priced]
+    room = [(upper - values)[inactive], (values - lower)[inactive], prices]
+    falls = -(side[:, None] * multipliers)[priced]
+    shrinks = [(rate - change.upper)[inactive], (change.lower - rate)[inactive], falls]
     distance, speed = np.maximum(np.concatenate(room), 0.0)[:, None], np.concatenate(shrinks)
     with np.errstate(divide="ignore", invalid="ignore"):
         at = np.where(np.abs(speed) > STILL, distance / speed, np.inf)

@@ -99,9 +99,8 @@ class IpoptSettings(Solver):
         if not 0.0 < self.tolerance < 1.0:
             raise InputError(f"tolerance must be within (0, 1), got {self.tolerance}")
         if self.iterations < 1 or not self.time_limit_s > 0.0:
-            raise InputError(
-                f"iterations and time_limit_s must be positive, got {self.iterations}, {self.time_limit_s}"
-            )
+            got = f"{self.iterations}, {self.time_limit_s}"
+            raise InputError(f"iterations and time_limit_s must be positive, got {got}")
         if not all(before > after > 0.0 for before, after in pairwise((math.inf, *self.widths))):
             raise InputError(f"widths must be positive and narrow from stage to stage, got {self.widths}")
         if self.hessian not in (None, "exact", "limited-memory"):

@@ -154,9 +154,8 @@ class _Functions:
         self.calls += len(Z)
         violations = np.where(violation <= FEASIBILITY_TOLERANCE, 0.0, violation)
         leader = int(np.lexsort((f, violations))[0])
-        self.best = min(
-            self.best, (float(violations[leader]), float(f[leader]), X[leader].copy()), key=lambda best: best[:2]
-        )
+        found = (float(violations[leader]), float(f[leader]), X[leader].copy())
+        self.best = min(self.best, found, key=lambda best: best[:2])
         objective = self._problem.objective.sign * self.best[1] if self.best[0] == 0.0 else None
         self.history.append(Best(self.calls, objective, time.perf_counter() - self.started))
         sides = [(g - self._row_lower) / self._row_scale, (self._row_upper - g) / self._row_scale]

@@ -111,10 +111,8 @@ class WorkingSet:
         functions, x, p = self._functions, self._nlp["x"], self._nlp["p"]
         nlp: dict[str, Any] = {"x": x, "p": p, "f": functions["nlp_f"](x, p), "g": functions["nlp_g"](x, p)[rows]}
         g, jacobian = functions["nlp_jac_g"](x, p)
-        derivatives = {
-            "grad_f": functions["nlp_grad_f"],
-            "jac_g": ca.Function("nlp_jac_g", [x, p], [g[rows], jacobian[rows, :]]),
-        }
+        jac_g = ca.Function("nlp_jac_g", [x, p], [g[rows], jacobian[rows, :]])
+        derivatives = {"grad_f": functions["nlp_grad_f"], "jac_g": jac_g}
         if "nlp_hess_l" in functions:
             weight, weights = MX.sym("lam_f"), MX.sym("lam_g", len(rows))
             all_weights = MX.zeros(self._nlp["g"].shape[0], 1)
