@@ -23,7 +23,7 @@ from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
-from nlp_gait.symbolic.simplification import simplify
+from nlp_gait.symbolic.tape import simplify
 
 BATCH = 1000
 

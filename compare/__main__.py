@@ -5,8 +5,7 @@ import sys
 
 from nlp_gait.errors import describe_shortage
 from nlp_gait.interrupts import exit_on_interrupt
-from nlp_gait.processes import kill_children
-from nlp_gait.working_folder import hide_working_folder
+from nlp_gait.processes import hide_working_folder, kill_children
 
 LEAST_BYTES = 2**30  # of address space; a study in one process or a worker takes up to half of it
 

@@ -63,7 +63,6 @@ def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[
 
 @cache
 def _fields(cls: Any) -> dict[str, tuple[Any, bool]]:
-    """Return the type of each field and whether it is required."""
     hints = get_type_hints(cls)
     return {f.name: (hints[f.name], f.default is MISSING and f.default_factory is MISSING) for f in fields(cls)}
 

@@ -65,24 +65,21 @@ class NoWorkersError(WorkerError):
     """Worker processes cannot begin: to try again would not help."""
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+def unknown(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """Return the error for an unknown name of a kind, for example ``"problem"``, with the nearest of all known names."""
     if not isinstance(name, str):
-        return UnknownNameError(f"the name of {_with_article(kind)} must be a text, got {format_value(name)}")
+        article = "an" if kind[0] in "aeiou" else "a"
+        return UnknownNameError(f"the name of {article} {kind} must be a text, got {format_value(name)}")
     choices = sorted(known)
     near = difflib.get_close_matches(name, choices, n=3, cutoff=0.4)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known: {', '.join(choices)}"
     return UnknownNameError(f"unknown {kind} {name!r}; {hint}")
 
 
-def _with_article(kind: str) -> str:
-    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
-
-
 def check_name(kind: str, name: object) -> None:
     """Raise InputError unless the name of a problem, solver or the like is a text."""
     if not isinstance(name, str):
-        raise InputError(f"the name of {_with_article(kind)} must be a text, got {format_value(name)}")
+        raise InputError(str(unknown(kind, name, ())))
 
 
 def check_count(name: str, value: object, *, at_least: int = 1, at_most: int | None = None) -> int:

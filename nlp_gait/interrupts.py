@@ -54,15 +54,7 @@ def defer_interrupts() -> Iterator[Callable[[], bool]]:
 
     For compiled code that would swallow the exception: CasADi takes it for a failed evaluation and continues.
     """
-    presses: list[int] = []
-
-    def count(number: int, frame: FrameType | None) -> None:
-        presses.append(number)
-        if len(presses) > 1:
-            raise KeyboardInterrupt
-
-    count.defers = True  # type: ignore[attr-defined]
-    with _handle_interrupts(count):
+    with _count_interrupts(1) as presses:
         yield lambda: bool(presses)
 
 
@@ -84,18 +76,28 @@ def delay_interrupts() -> Iterator[None]:
 @contextmanager
 def remember_interrupts() -> Iterator[Callable[[], None]]:
     """Yield a function that raises KeyboardInterrupt again if something inside has swallowed the one of Ctrl-C."""
-    pressed: list[int] = []
-
-    def remember(number: int, frame: FrameType | None) -> None:
-        pressed.append(number)
-        raise KeyboardInterrupt
 
     def check() -> None:
         if pressed:
             raise KeyboardInterrupt
 
-    with _handle_interrupts(remember):
+    with _count_interrupts(0) as pressed:
         yield check
+
+
+@contextmanager
+def _count_interrupts(deferred: int) -> Iterator[list[int]]:
+    """Yield the presses of Ctrl-C inside; all but the deferred first ones raise KeyboardInterrupt."""
+    presses: list[int] = []
+
+    def count(number: int, frame: FrameType | None) -> None:
+        presses.append(number)
+        if len(presses) > deferred:
+            raise KeyboardInterrupt
+
+    count.defers = deferred > 0  # type: ignore[attr-defined]
+    with _handle_interrupts(count):
+        yield presses
 
 
 @contextmanager

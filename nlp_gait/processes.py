@@ -1,7 +1,8 @@
 """Child processes: forks that share some work, one isolated fork, or joblib's workers. None of them outlives its parent.
 
 A fork has everything that its parent has and starts within milliseconds; only its results are pickled. Workers start afresh:
-their functions are pickled too.
+their functions are pickled too. Python files in the working folder never run by themselves, and user code that changes the folder
+changes nothing else.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ from typing import Any, TypeVar
 
 from nlp_gait.errors import NoWorkersError, WorkerError, describe_shortage
 from nlp_gait.interrupts import block_interrupts_in_children, never
-from nlp_gait.working_folder import show_working_folder
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -36,6 +36,32 @@ COUNTER_BYTES = 8
 HIDDEN_WARNINGS = "ignore:resource_tracker"
 SPARE_DESCRIPTORS = 12  # that joblib needs beside one for each worker
 PR_SET_PDEATHSIG = 1
+VARIABLE = "PYTHONSAFEPATH"  # any text: Python searches no module in the working folder
+OWN_VALUE = "nlp-gait"
+
+
+def hide_working_folder() -> None:
+    """Let all child processes search no module in the working folder: ``python -c`` and ``-m`` would search there first."""
+    if not os.environ.get(VARIABLE):
+        os.environ[VARIABLE] = OWN_VALUE
+
+
+def show_working_folder() -> None:
+    """Undo ``hide_working_folder`` for programs that user code starts, which may be Python files with modules next to them."""
+    if os.environ.get(VARIABLE) == OWN_VALUE:
+        del os.environ[VARIABLE]
+
+
+@contextmanager
+def keep_working_folder() -> Iterator[None]:
+    """Return to the working folder at the end, for code that may leave it."""
+    folder = os.open(".", os.O_RDONLY) if os.name == "posix" else os.getcwd()
+    try:
+        yield
+    finally:
+        os.chdir(folder)
+        if isinstance(folder, int):
+            os.close(folder)
 
 
 def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:

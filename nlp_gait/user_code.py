@@ -251,7 +251,6 @@ def check_reference(text: str, kind: Kind) -> None:
 
 
 def _find_names(body: Iterable[ast.AST]) -> Iterator[str]:
-    """Yield the names that statements bind at the top level."""
     for node in body:
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
             yield node.name
@@ -326,7 +325,6 @@ def _run_file(path: str, content: bytes) -> ModuleType:
 
 
 def _read_source(place: CodeReference, text: str) -> tuple[str, bytes]:
-    """Return the path and the content of a file or module."""
     if place.is_file:
         path = place.home
         check_path(path, f"code of {text!r}, {path!r}", UserCodeError)

@@ -17,7 +17,6 @@ ROOT = Path(__file__).parents[1]
 # A layer imports from itself and from earlier layers only.
 LAYERS = (
     "nlp_gait.interrupts",
-    "nlp_gait.working_folder",
     "nlp_gait.errors",
     "nlp_gait.providers",
     "nlp_gait.processes",

@@ -17,9 +17,9 @@ from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_r
 from compare.questions.question import Answer, Question, Work, make_csv_table
 from compare.report.document import Figure, Part, Table, Value, text_table
 from nlp_gait.backends.identity import fingerprint
-from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decode

@@ -23,7 +23,7 @@ from compare.study.references import find_reference
 from compare.study.run_task import run_task, try_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
 from nlp_gait.backends.identity import identify_problem
-from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Solution

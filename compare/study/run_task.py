@@ -20,8 +20,7 @@ from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.files import LARGEST_FILE, check_plain
 from nlp_gait.formulation.solution import Best
-from nlp_gait.processes import run_in_isolation
-from nlp_gait.working_folder import keep_working_folder
+from nlp_gait.processes import keep_working_folder, run_in_isolation
 
 Run = Callable[[Task, RunRecord | None], RunRecord]
 """Performs one run of a task, from the run that it polishes if it does; it is sent to worker processes."""

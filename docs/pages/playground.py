@@ -36,7 +36,7 @@ from nlp_gait.gaits.nao.body import connect_joints, make_nao
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact
-from nlp_gait.symbolic.simplification import simplify
+from nlp_gait.symbolic.tape import simplify
 
 ID = "ssp-v5"
 FRAMES = 61  # of a gait; the page interpolates between them

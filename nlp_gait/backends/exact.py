@@ -81,7 +81,6 @@ def find_violated_rows(rows: Iterable[ConstraintValue]) -> tuple[ConstraintValue
 
 
 def _compute_violations(values: ExactValues) -> Array:
-    """Return (m,) violations in the units of the rows; NaN if a row is NaN."""
     return np.maximum(np.maximum(values.lower - values.g, values.g - values.upper), 0.0)
 
 

@@ -16,7 +16,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.export.c_files import format_comment
 from nlp_gait.formulation import Array, GaitProblem, InstantPoint
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
-from nlp_gait.symbolic.simplification import simplify
+from nlp_gait.symbolic.tape import simplify
 
 # Files by their templates, in addition to those of the NLP.
 TEMPLATES = {

@@ -85,7 +85,6 @@ def find_maker(name: str) -> Maker:
 
 
 def _user_maker(name: str) -> Maker:
-    """Return the maker of a user-defined problem, which checks the mathematics."""
     user_code.allow_code(name, "problem")
     found: Any = user_code.load_object(name, "problem")
     path = user_code.parse_reference(name, "problem").home

@@ -161,7 +161,6 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
 
 
 def _split(constraint: Constraint) -> list[tuple[Any, ...]]:
-    """Return name, unit, value and bounds of every row."""
     columns = [ca.vertsplit(column) for column in constraint.columns]
     return [(name, constraint.unit, *parts) for name, *parts in zip(constraint.row_names, *columns, strict=True)]
 

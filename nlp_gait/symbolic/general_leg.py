@@ -75,8 +75,6 @@ class LegMotion(NamedTuple):
 
 
 class _Chain(NamedTuple):
-    """Forward kinematics of a leg from its foot."""
-
     rotations: list[SX]  #: (3, 3) of the links before each joint, the torso first
     axes: list[SX]  #: (3,) of each joint in the world
     levers: list[SX]  #: (3,) from each joint to the hip centre

@@ -25,7 +25,7 @@ from compare.questions import sweep
 from compare.study.record import read_record
 from compare.study.store import Computation
 from nlp_gait.backends.kernel.compiled import CompiledObjective
-from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.backends.solvers.solver import IterationWatch
 from nlp_gait.interrupts import (
     Interrupted,

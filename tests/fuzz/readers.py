@@ -154,7 +154,7 @@ def read_mjcf(path: Path) -> None:
 def read_a_certificate(path: Path) -> None:
     """A certificate, read and followed: it says what stands there, and what passes has the incumbent's objective."""
     file, raw = read_certificate(path), _plain(path)
-    same({"schema": 1, **raw}, replace_nan(file.to_json()), "certificate")
+    same({"schema": 1, **raw}, replace_nan(asdict(file)), "certificate")
     check_certificate(file, paths=2)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from nlp_gait.working_folder import OWN_VALUE, VARIABLE, hide_working_folder, show_working_folder
+from nlp_gait.processes import OWN_VALUE, VARIABLE, hide_working_folder, show_working_folder
 from tests.faults.processes import ROOT
 
 LOADED = (

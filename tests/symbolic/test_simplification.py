@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from casadi import DM, SX
 
-from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
+from nlp_gait.symbolic.tape import simplify, tabulate_last_input
 
 # A few roundings in double precision.
 TOLERANCE = 1e-14

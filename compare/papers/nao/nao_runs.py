@@ -18,7 +18,7 @@ from compare.study.store import Computation, Store
 from compare.study.task import IPOPT, Handling, ProblemSpec, Stop, Task
 from metaheuristics.algorithms.genetic import GeneticAlgorithm, Polynomial, SimulatedBinary
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import make_plan

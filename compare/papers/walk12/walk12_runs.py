@@ -19,8 +19,7 @@ from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
 from metaheuristics.algorithms.genetic import Flip
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.optima.continuation import Continuation
-from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solve import Continuation, solve
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.walk12.walk12_model import Zmp
 from nlp_gait.gaits.walk12.walk12_problem import VARIABLES, Horizon

@@ -10,8 +10,7 @@ import numpy as np
 
 from compare.questions.pareto.competing import REWARD, CompetingObjective, add_reward
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
-from nlp_gait.backends.solve import make_solution, solve
+from nlp_gait.backends.solve import Continuation, find_cheapest_feasible, make_solution, solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError

@@ -21,7 +21,7 @@ from compare.questions.pareto.front import solve_ends
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import Figure
 from compare.study.task import describe_problem
-from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 

@@ -77,7 +77,6 @@ def _expand(function: ca.Function) -> ca.Function:
 
 
 def _count_operations(function: ca.Function) -> int:
-    """Return about how many scalar operations a supported function has."""
     if function.is_a("SXFunction"):
         return function.n_instructions()
     parts = function.find_functions(0)

@@ -88,7 +88,6 @@ class NlpFunctions:
 
 
 def _bind(function: ca.Function, inputs: tuple[Array, ...], outputs: tuple[Array | None, ...]) -> Callable[[], None]:
-    """Return a call of a function that reads and writes the given arrays."""
     buffer: Any
     buffer, call = function.buffer()
     for i, array in enumerate(inputs):

@@ -203,7 +203,6 @@ class StepSolver:
         return np.concatenate([self._program.rows[is_active], self._unit[np.abs(self._z_prices) > PRICED]])
 
     def _reduce(self, ties: IntArray) -> _Program:
-        """Eliminate all lifted variables."""
         at, n, by_s = self._functions, self.n, self._functions.rows_by_s
         divide: Callable[..., Array]
         if self._alone:

@@ -263,7 +263,6 @@ class _Run:
             longest = min(2.0 * longest, LONGEST) if share == 1.0 else max(share * length, ROUNDING)
 
     def _miss(self, step: Step, cost: float) -> float:
-        """Return by how much a full step missed the predicted cost."""
         return abs(float(self._at.cost[0]) - cost + step.decrease)
 
     def _correct(self, step: Step, w: Array, g: Array, z_lower: Array, z_upper: Array, weight: float) -> Step:

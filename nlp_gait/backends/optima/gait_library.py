@@ -111,8 +111,6 @@ class LibraryPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class _LibraryFile:
-    """Keys of a library's file that are read."""
-
     problem: str
     options: Mapping[str, str | int | float | bool]
     parameters: Mapping[str, float]

@@ -21,7 +21,7 @@ from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant, Loa
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
-from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
+from nlp_gait.symbolic.tape import simplify, tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion
 
 Derivatives = Literal["analytic", "finite-difference"]

@@ -18,7 +18,7 @@ from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
-from nlp_gait.symbolic.simplification import simplify
+from nlp_gait.symbolic.tape import simplify
 from nlp_gait.symbolic.trajectories import Motion
 
 if TYPE_CHECKING:

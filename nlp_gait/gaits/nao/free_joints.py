@@ -29,7 +29,7 @@ from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.simplification import simplify, tabulate_last_input
+from nlp_gait.symbolic.tape import simplify, tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, fit_spline
 
 YAW_PITCH = "HipYawPitch"  # curve of both hips

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from casadi import MX
 
-from nlp_gait.backends.optima.continuation import Continuation, solve_both_ways
+from nlp_gait.backends.solve import Continuation, solve_both_ways
 from nlp_gait.backends.solvers import ipopt
 from nlp_gait.formulation import Constraint, GaitProblem
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

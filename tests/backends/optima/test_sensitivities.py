@@ -11,9 +11,9 @@ from casadi import MX
 
 from nlp_gait import load, solve
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Constraint, GaitProblem
 from nlp_gait.formulation.solution import Outcome

@@ -12,9 +12,8 @@ import pytest
 
 from compare.questions.local_optima import run_stored_starts
 from compare.study.store import Store
-from nlp_gait.backends.optima.continuation import Continuation, find_cheapest_feasible, solve_both_ways
 from nlp_gait.backends.optima.optimum import find_optimum
-from nlp_gait.backends.solve import solve
+from nlp_gait.backends.solve import Continuation, find_cheapest_feasible, solve, solve_both_ways
 from nlp_gait.backends.solvers.nlpsol import CasadiSolver, probe
 from nlp_gait.backends.solvers.registry import SOLVERS, make_solver
 from nlp_gait.backends.solvers.solver import Solver, judge_point

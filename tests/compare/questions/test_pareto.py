@@ -20,7 +20,7 @@ from compare.questions.pareto.pareto_surface import ParetoSurface
 from compare.questions.pareto.searches import SearchFront, compute_qualities
 from compare.questions.question import Work, find
 from compare.study.store import Store
-from nlp_gait.backends.optima.continuation import solve_both_ways
+from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Solution
