@@ -27,6 +27,11 @@ class ExactValues(NamedTuple):
     upper: Array  #: (m,)
     indexes: dict[str, float]  #: performance figures by name
 
+    @property
+    def feasible(self) -> bool:
+        """Whether the point is feasible, with a finite cost."""
+        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.cost)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExactModel:
@@ -55,18 +60,12 @@ class ExactModel:
 
     def rows(self, values: ExactValues, chosen: Iterable[int] | None = None) -> tuple[ConstraintValue, ...]:
         """Return all rows, or chosen ones, with their names and units."""
-        violations = _compute_violations(values)
-        return tuple(
-            ConstraintValue(
-                name=self.row_names[k],
-                value=float(values.g[k]),
-                lower=float(values.lower[k]) if math.isfinite(values.lower[k]) else None,
-                upper=float(values.upper[k]) if math.isfinite(values.upper[k]) else None,
-                violation=float(violations[k]),
-                unit=self.row_units[k],
-            )
-            for k in (range(len(self.row_names)) if chosen is None else chosen)
-        )
+        violations, found = _compute_violations(values), []
+        for k in range(len(self.row_names)) if chosen is None else chosen:
+            low, high = (float(end[k]) if math.isfinite(end[k]) else None for end in (values.lower, values.upper))
+            name, unit, value, miss = self.row_names[k], self.row_units[k], float(values.g[k]), float(violations[k])
+            found.append(ConstraintValue(name=name, value=value, lower=low, upper=high, violation=miss, unit=unit))
+        return tuple(found)
 
 
 def build_exact_model(problem: GaitProblem) -> ExactModel:
@@ -96,21 +95,15 @@ def _build(problem: GaitProblem) -> ExactModel:
     # fmax returns the other argument for NaN, which must not pass for feasible: it is neither above nor below a bound.
     comparable = (g <= upper) + (g > upper)
     violations = ca.fmax(ca.fmax(lower - g, g - upper), 0) / comparable
-    outputs = {
-        "cost": problem.objective.sign * assembly.objective,
-        "violation": ca.sum1(violations / scale),
-        "g": g,
-        "lower": lower,
-        "upper": upper,
-        "indexes": ca.vertcat(*assembly.indexes.values()),
-    }
+    cost, violation = problem.objective.sign * assembly.objective, ca.sum1(violations / scale)
+    outputs = {"cost": cost, "violation": violation, "g": g, "lower": lower, "upper": upper}
+    outputs["indexes"] = ca.vertcat(*assembly.indexes.values())
     function = ca.Function("exact", [point.x, point.p], list(outputs.values()), ["x", "p"], list(outputs))
-    row_names = [name for c in constraints for name in c.row_names]
-    row_units = [c.unit for c in constraints for _ in c.row_names]
+    names = [name for c in constraints for name in c.row_names]
+    units = [c.unit for c in constraints for _ in c.row_names]
+    names += [f"bounds[{name}]" for name in problem.names]
+    units += [variable.unit for variable in problem.variables]
+    scales, indexes = np.array(ca.evalf(scale)).ravel(), tuple(assembly.indexes)
     return ExactModel(
-        function=function,
-        row_names=(*row_names, *(f"bounds[{name}]" for name in problem.names)),
-        row_units=(*row_units, *(variable.unit for variable in problem.variables)),
-        row_scales=np.array(ca.evalf(scale)).ravel(),
-        index_names=tuple(assembly.indexes),
+        function=function, row_names=tuple(names), row_units=tuple(units), row_scales=scales, index_names=indexes
     )

@@ -162,29 +162,23 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
             status = f"no start converged to a feasible point; the least infeasible one {best.status}"
         status += f"; violated: {names}; relax these limits or widen the bounds" if names else ""
         status += "" if np.isfinite(best.cost) else f"; {problem.objective.name} is {best.cost} there"
+    prices = _find_active(problem, values, best.guess) if best.converged and best.guess is not None else ()
+    same = ("claimed", "objective", "violation", "iterations", "solver", "linear_solver", "functions")
     return Solution(
         problem=problem.address,
         options=dict(problem.options),
         parameters=dict(problem.values),
-        claimed=best.claimed,
         status=status,
-        objective=best.objective,
         objective_name=problem.objective.name,
         objective_unit=problem.objective.unit,
         x=problem.by_name(best.x),
-        violation=best.violation,
         worst_violations=violations[:10],
-        iterations=best.iterations,
         evaluations=sum((outcome.evaluations for outcome in outcomes), Evaluations()),
         time_s=SolveTime(build=best.build_s, compile=best.compile_s, solve=sum(outcome.time_s for outcome in outcomes)),
-        solver=best.solver,
-        linear_solver=best.linear_solver,
-        functions=best.functions,
-        active_constraints=_find_active(problem, values, best.guess)
-        if best.converged and best.guess is not None
-        else (),
+        active_constraints=prices,
         starts=tuple(outcomes),
         seed=seed,
+        **{name: getattr(best, name) for name in same},
     )
 
 
@@ -203,17 +197,16 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[
             break
         if i < rows and values.lower[i] == values.upper[i]:
             continue
-        at_upper = slopes[i] < 0  # a higher upper bound lowers the cost, a higher lower bound raises it
-        found.append(
-            ActiveConstraint(
-                name=exact.row_names[i],
-                side="upper" if at_upper else "lower",
-                bound=float(values.upper[i] if at_upper else values.lower[i]),
-                unit=exact.row_units[i],
-                price=float(problem.objective.sign * slopes[i]),
-                price_unit=f"{'' if unit == '1' else f'{unit} '}per {exact.row_units[i]}",
-            )
+        side = (
+            "upper" if slopes[i] < 0 else "lower"
+        )  # a higher upper bound lowers the cost, a higher lower bound raises it
+        name, row_unit, bound = exact.row_names[i], exact.row_units[i], float(getattr(values, side)[i])
+        price, price_unit = (
+            float(problem.objective.sign * slopes[i]),
+            f"{'' if unit == '1' else f'{unit} '}per {row_unit}",
         )
+        active = ActiveConstraint(name=name, side=side, bound=bound, unit=row_unit, price=price, price_unit=price_unit)
+        found.append(active)
     return tuple(found)
 
 

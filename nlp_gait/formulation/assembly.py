@@ -57,14 +57,8 @@ class Variable:
 
     def bound(self, end: Literal["lower", "upper"]) -> Parameter:
         """Return one bound as a parameter, ``<variable>.lower`` or ``<variable>.upper``."""
-        return Parameter(
-            name=f"{self.name}.{end}",
-            unit=self.unit,
-            default=self.lower if end == "lower" else self.upper,
-            description=f"{end} bound of {self.name}",
-            minimum=self.minimum,
-            maximum=self.maximum,
-        )
+        name, text = f"{self.name}.{end}", f"{end} bound of {self.name}"
+        return parameters((name, self.unit, getattr(self, end), text, self.minimum, self.maximum))[0]
 
 
 def _check_number(owner: str, field: str, value: object) -> None:

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.formulation.assembly import Point, Variable
+from nlp_gait.formulation.assembly import Point, Variable, variables
 from nlp_gait.formulation.signals import Array
 
 
@@ -27,18 +27,13 @@ class Block:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Variables, column by column."""
-        suffix = self.unit.replace("/", "_").replace("^", "")
-        return tuple(
-            Variable(
-                name=f"{self.quantity}_{row}_{suffix}[{k}]",
-                unit=self.unit,
-                lower=lower,
-                upper=upper,
-                description=f"{self.description} {row} at instant {k}",
-            )
+        suffix, text = self.unit.replace("/", "_").replace("^", ""), self.description
+        table = (
+            (f"{self.quantity}_{row}_{suffix}[{k}]", self.unit, *ends, f"{text} {row} at instant {k}")
             for k in range(self.columns)
-            for row, (lower, upper) in zip(self.rows, self.limits, strict=True)
+            for row, ends in zip(self.rows, self.limits, strict=True)
         )
+        return variables(*table)
 
     @property
     def size(self) -> int:

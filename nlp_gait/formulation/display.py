@@ -156,14 +156,9 @@ def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[
     """Return a gait on a flat floor, with the centre of mass and the zero-moment point of its time histories."""
     arrays = signals.arrays
     x = np.concatenate([sole.corners[..., 0].ravel() for sole in soles])
-    return Skeleton(
-        t=arrays["t"],
-        limbs=tuple(limbs),
-        soles=tuple(soles),
-        ground=np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]]),
-        com=arrays["com"],
-        zmp=np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))]),
-    )
+    ground = np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
+    t, com, zmp = arrays["t"], arrays["com"], np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))])
+    return Skeleton(t=t, limbs=tuple(limbs), soles=tuple(soles), ground=ground, com=com, zmp=zmp)
 
 
 def make_rectangle(back: float, front: float, right: float, left: float) -> Array:

@@ -220,12 +220,8 @@ class Solution:
     def to_json(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, with the schema version of results."""
         shown = ("claimed", "feasible", "status", "objective", "violation", "iterations", "time_s")
-        starts = [
-            {
-                "index": index,
-                **{name: getattr(start, name) for name in shown},
-                **{name: dict(zip(self.x, getattr(start, name).tolist(), strict=True)) for name in ("x0", "x")},
-            }
-            for index, start in enumerate(self.starts)
-        ]
+        starts = []
+        for index, start in enumerate(self.starts):
+            points = {name: dict(zip(self.x, getattr(start, name).tolist(), strict=True)) for name in ("x0", "x")}
+            starts.append({"index": index, **{name: getattr(start, name) for name in shown}, **points})
         return {"schema": 1, **asdict(replace(self, starts=())), "feasible": self.feasible, "starts": starts}

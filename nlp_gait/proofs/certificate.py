@@ -141,14 +141,9 @@ def check_certificate(
     path, weight, sizes, dropped = origin, np.ones(len(origin)), np.ones(paths), paths - len(origin)
     for depth in range(DEEPEST_PATH):
         if not len(path):
+            size, same = float(sizes[: (paths + 1) // 2].mean()), file.code_sha256 == hash_code(bounds)
             return CertificateCheck(
-                best=best,
-                source=source,
-                paths=paths,
-                pieces=dropped,
-                deepest=depth,
-                boxes=float(sizes[: (paths + 1) // 2].mean()),
-                same_code=file.code_sha256 == hash_code(bounds),
+                best=best, source=source, paths=paths, pieces=dropped, deepest=depth, boxes=size, same_code=same
             )
         sizes[path] += 2.0 * weight
         halves = bounds.prune(halve(open_, cut), target)

@@ -17,7 +17,7 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
-from nlp_gait.backends.derivatives.plan import CODES, EXPRESSIONS, FIRST, SECOND, VALUES, format_number, write_function
+from nlp_gait.backends.derivatives.plan import CODES, EXPRESSIONS, format_number, write_function
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.kernel.compiler import find_compiler, lane_flags, native_lanes, read_native_source
 from nlp_gait.backends.kernel.library_cache import load_library
@@ -33,26 +33,20 @@ def write_nlp_source(found: NlpPlan) -> str:
     """Return C++ of an NLP's functions (see ``native/nlp.hpp``); the lane count is the macro LANES."""
     plan = found.plan
     m, n = found.jacobian.shape
+    phases = dict(zip(("value", "first", "second"), plan.steps, strict=True))
     sizes = {
         "VARIABLES": n,
         "PARAMETERS": found.parameters,
         "ROWS": m,
         "SIZE": plan.size,
         "INITIALS": len(plan.initial),
-        "MOST_IN": max((function.nnz_in() for function in plan.functions), default=1),
-        "MOST_OUT": max((function.nnz_out() for function in plan.functions), default=1),
-        "W": found.w,
-        "P": found.p,
-        "VALUE": found.rows,
-        "WEIGHT": found.weights,
-        "GRADIENT": found.gradient,
-        "HESSIAN": found.hessian_place,
-        "JACOBIAN_NONZEROS": found.jacobian.nnz(),
-        "HESSIAN_NONZEROS": found.hessian.nnz(),
-        "VALUE_STEPS": len(plan.steps[VALUES]),
-        "FIRST_STEPS": len(plan.steps[FIRST]),
-        "SECOND_STEPS": len(plan.steps[SECOND]),
     }
+    sizes["MOST_IN"] = max((function.nnz_in() for function in plan.functions), default=1)
+    sizes["MOST_OUT"] = max((function.nnz_out() for function in plan.functions), default=1)
+    sizes |= {"W": found.w, "P": found.p, "VALUE": found.rows, "WEIGHT": found.weights, "GRADIENT": found.gradient}
+    sizes |= {"HESSIAN": found.hessian_place, "HESSIAN_NONZEROS": found.hessian.nnz()}
+    sizes |= {"JACOBIAN_NONZEROS": found.jacobian.nnz()}
+    sizes |= {f"{phase.upper()}_STEPS": len(steps) for phase, steps in phases.items()}
     cases = " ".join(
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
         for operation, expression in EXPRESSIONS.items()
@@ -74,9 +68,7 @@ def write_nlp_source(found: NlpPlan) -> str:
             _write_rows("tape", 4, plan.tape),
             _write_rows("runs", 4, plan.runs),
             _write_rows("products", 5, plan.products),
-            _write_rows("value_steps", 3, plan.steps[VALUES]),
-            _write_rows("first_steps", 3, plan.steps[FIRST]),
-            _write_rows("second_steps", 3, plan.steps[SECOND]),
+            *(_write_rows(f"{phase}_steps", 3, steps) for phase, steps in phases.items()),
             _write_calls(found),
             f"#define OPERATIONS {cases}",
             read_native_source("nlp_gait.backends.derivatives", "nlp.hpp"),

@@ -65,14 +65,9 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
         ends = [ca.vertcat(*map(nonzeros, parts)) for parts in (arguments, inner.call(arguments))]
         inner = ca.Function(inner.name(), ends[:1], ends[1:])
         count = function.nnz_in() // inner.nnz_in()
-        stages.append(
-            Stage(
-                function=inner,
-                count=count,
-                inputs=_by_sample([u.pop(0) for _ in inputs], count),
-                outputs=_by_sample([v.pop(0) for _ in outputs], count),
-            )
-        )
+        read = _by_sample([u.pop(0) for _ in inputs], count)
+        made = _by_sample([v.pop(0) for _ in outputs], count)
+        stages.append(Stage(function=inner, count=count, inputs=read, outputs=made))
     return Structure(w=w, p=q, stages=tuple(stages), rows=ca.vertcat(ca.densify(cost), ca.densify(rows)))
 
 

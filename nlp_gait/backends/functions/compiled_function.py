@@ -222,14 +222,9 @@ class CompiledFunction:
             self._local.address = ctypes.c_void_p(get_address(self._local.memory))
         inputs = [get_address(values if shared else values[cut]) for values, shared in pieces]
         outputs = [get_address(result[cut]) for result in results]
-        failed = self._native(
-            (ctypes.c_void_p * len(inputs))(*inputs),
-            bytes(shared for _, shared in pieces),
-            (ctypes.c_void_p * len(outputs))(*outputs),
-            ctypes.c_longlong(cut.stop - cut.start),
-            self._local.address,
-        )
-        if failed:
+        given, made = ((ctypes.c_void_p * len(each))(*each) for each in (inputs, outputs))
+        is_shared, rows = bytes(shared for _, shared in pieces), ctypes.c_longlong(cut.stop - cut.start)
+        if self._native(given, is_shared, made, rows, self._local.address):
             raise RuntimeError(f"{self.function.name()} reported a failure")
 
 

@@ -155,12 +155,8 @@ class Replanner:
             found = self._solve_by_ipopt(problem, found)
         if judge:
             values = self._exact.at(found.x, problem.p)
-            found = replace(
-                found,
-                objective=problem.objective.sign * values.cost,
-                feasible=values.violation <= FEASIBILITY_TOLERANCE and math.isfinite(values.cost),
-                violated=self._exact.find_violated(values),
-            )
+            objective, violated = problem.objective.sign * values.cost, self._exact.find_violated(values)
+            found = replace(found, objective=objective, feasible=values.feasible, violated=violated)
         return replace(found, time_s=time.perf_counter() - started)
 
     def _change(self, p: Mapping[str, float] | Sequence[float] | Array | None) -> GaitProblem:

@@ -17,7 +17,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import read_json
 from nlp_gait.formulation import Array, GaitProblem, Result, load
 from nlp_gait.formulation.result import explain_errors
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue
+from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.user_code import resolve_code
 
 
@@ -59,13 +59,9 @@ class GaitLibrary:
         problem = self.problem.place(at)
         x = np.clip(x, problem.lower, problem.upper)
         model = build_exact_model(problem)
-        found = model.at(x, problem.p)
-        return LibraryGait(
-            result=Result(problem=problem, x=x),
-            objective=problem.objective.sign * found.cost,
-            feasible=bool(found.violation <= FEASIBILITY_TOLERANCE) and math.isfinite(found.cost),
-            violated=model.find_violated(found),
-        )
+        found, result = model.at(x, problem.p), Result(problem=problem, x=x)
+        objective, violated = problem.objective.sign * found.cost, model.find_violated(found)
+        return LibraryGait(result=result, objective=objective, feasible=found.feasible, violated=violated)
 
     def covers(self, **at: float) -> bool:
         """Return whether there is an optimum at all corners around a value of every axis; raises as ``interpolate``."""

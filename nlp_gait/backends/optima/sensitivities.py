@@ -92,15 +92,10 @@ def tabulate_sensitivities(problem: GaitProblem, solution: Solution) -> Sensitiv
     found = parameter_sensitivities(find_optimum(problem, min(solution.starts, key=lambda outcome: outcome.rank)))
     values = np.vstack([found.objective, found.x])
     values[:, np.logical_not(found.defined)] = np.nan
-    return SensitivityTable(
-        quantities=(
-            (problem.objective.name, problem.objective.unit),
-            *((variable.name, variable.unit) for variable in problem.variables),
-        ),
-        parameters=tuple((parameter.name, parameter.unit) for parameter in problem.parameters),
-        values=values,
-        reach=found.reach,
-    )
+    goal = problem.objective
+    quantities = ((goal.name, goal.unit), *((variable.name, variable.unit) for variable in problem.variables))
+    parameters = tuple((parameter.name, parameter.unit) for parameter in problem.parameters)
+    return SensitivityTable(quantities=quantities, parameters=parameters, values=values, reach=found.reach)
 
 
 @lock_casadi

@@ -174,17 +174,11 @@ class Ipopt(Solver):
         functions = {name: all_rows.get_function(name) for name in names if all_rows.has_function(name)}
         #: of the NLP, by the names of ``nlpsol``
         self.functions = functions = native.functions if self.compiled else functions
-        warm_options: dict[str, Any] = {
-            **options,
-            **{option: functions[name] for option, name in DERIVATIVES.items() if name in functions},
-            "ipopt.mu_strategy": "monotone",
-            "ipopt.mu_init": WARM_BARRIER,
-            "ipopt.warm_start_init_point": "yes",
-            "ipopt.warm_start_bound_push": 1e-6,
-            "ipopt.warm_start_slack_bound_push": 1e-6,
-            "ipopt.warm_start_mult_bound_push": 1e-6,
-        }
-        self.warm = ca.nlpsol("warm", "ipopt", nlp, warm_options)
+        derivatives = {option: functions[name] for option, name in DERIVATIVES.items() if name in functions}
+        warm: dict[str, Any] = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": WARM_BARRIER}
+        warm |= {f"ipopt.warm_start_{what}_push": 1e-6 for what in ("bound", "slack_bound", "mult_bound")}
+        warm["ipopt.warm_start_init_point"] = "yes"
+        self.warm = ca.nlpsol("warm", "ipopt", nlp, {**options, **derivatives, **warm})
         self.cold: ca.Function | WorkingSet = all_rows
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
             self.cold = self._make_working_set(problem, functions, general, all_rows)
@@ -290,13 +284,8 @@ def find_linear_solver(wanted: str | None = None) -> str:
     """Return the linear solver that IPOPT uses here, by its log: its default, or the wanted one; InputError if that fails."""
     x = ca.MX.sym("x")
     with make_temporary_folder("nlp-gait-ipopt-") as folder:
-        log = folder / "ipopt.log"
-        options: dict[str, Any] = {
-            **QUIET,
-            "ipopt.output_file": str(log),
-            "ipopt.file_print_level": 5,
-            **({} if wanted is None else {"ipopt.linear_solver": wanted}),
-        }
+        log, chosen = folder / "ipopt.log", {} if wanted is None else {"ipopt.linear_solver": wanted}
+        options = {**QUIET, "ipopt.output_file": str(log), "ipopt.file_print_level": 5, **chosen}
         probe = ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)
         probe(x0=1.0)
         found = re.search(r"linear solver (\S+?)[,.\s]", log.read_text() if log.exists() else "")

@@ -44,13 +44,8 @@ def probe(name: str) -> str | None:
     It solves a small problem in a separate process: a solver may be listed and still fail to load, or crash.
     """
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", PROBE, name],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=PROBE_TIME_LIMIT_S,
-        )
+        command, limit_s = [sys.executable, "-P", "-c", PROBE, name], PROBE_TIME_LIMIT_S
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=limit_s)
     except subprocess.TimeoutExpired:
         return f"it does not return within {PROBE_TIME_LIMIT_S:g} s"
     if done.returncode == 0:

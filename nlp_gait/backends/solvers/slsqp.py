@@ -58,6 +58,8 @@ class Slsqp(Solver):
 
         started = time.perf_counter()
         functions = _Functions(problem, self, stop)
+        rows: dict[str, Any] = {"type": "ineq", "fun": lambda z: functions.evaluate(z.tobytes())[1][0]}
+        rows["jac"] = lambda z: functions.differentiate(z.tobytes())[1]
         try:
             with threadpool_limits(limits=1, user_api="blas"):  # their number changes LAPACK's rounding
                 result = minimize(
@@ -66,13 +68,7 @@ class Slsqp(Solver):
                     jac=lambda z: functions.differentiate(z.tobytes())[0],
                     method="SLSQP",
                     bounds=list(zip(functions.lower, functions.upper, strict=True)),
-                    constraints=[
-                        {
-                            "type": "ineq",
-                            "fun": lambda z: functions.evaluate(z.tobytes())[1][0],
-                            "jac": lambda z: functions.differentiate(z.tobytes())[1],
-                        }
-                    ],
+                    constraints=[rows],
                     options={"maxiter": self.evaluations, "ftol": TOLERANCE},
                 )
             status, converged, iterations = str(result.message), bool(result.success), int(result.get("nit", 0))
