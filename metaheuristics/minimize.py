@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import cache
@@ -27,16 +28,21 @@ from metaheuristics.preparation import (
 )
 
 
-def limit_blas_threads() -> AbstractContextManager[object]:
-    """Return a context in which NumPy's and SciPy's BLAS and LAPACK use one thread, so that equal seeds give equal bits."""
-    limits: AbstractContextManager[object] = _find_libraries().limit(limits=1, user_api="blas")
+# Packages whose searches and objectives use NumPy's BLAS and LAPACK alone.
+WITHOUT_SCIPY = ("metaheuristics.algorithms", "nlp_gait", "compare")
+
+
+def limit_blas_threads(*users: object) -> AbstractContextManager[object]:
+    """Return a context in which the BLAS and LAPACK that objects may use have one thread, so that equal seeds give equal bits."""
+    if not all(type(user).__module__.startswith(WITHOUT_SCIPY) for user in users):
+        import scipy.linalg  # noqa: F401  its LAPACK is not NumPy's, and only loaded libraries are found
+    libraries = _find_libraries("scipy.linalg" in sys.modules)
+    limits: AbstractContextManager[object] = libraries.limit(limits=1, user_api="blas")
     return limits
 
 
 @cache
-def _find_libraries() -> ThreadpoolController:
-    import scipy.linalg  # noqa: F401  SciPy's LAPACK is not NumPy's; only loaded libraries are found
-
+def _find_libraries(with_scipy: bool) -> ThreadpoolController:
     return ThreadpoolController()
 
 
@@ -232,7 +238,7 @@ def minimize(
         )
 
     try:
-        with limit_blas_threads():
+        with limit_blas_threads(algorithm, objective):
             if isinstance(search, CallingSearch):
                 return result(_run_calling(search, generation, limits_reached))
             while True:
