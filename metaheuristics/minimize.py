@@ -27,7 +27,6 @@ from metaheuristics.preparation import (
     seed_sequence,
 )
 
-
 # Packages whose searches and objectives use NumPy's BLAS and LAPACK alone.
 WITHOUT_SCIPY = ("metaheuristics.algorithms", "nlp_gait", "compare")
 
