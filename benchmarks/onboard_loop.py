@@ -17,11 +17,11 @@ import numpy as np
 import nlp_gait
 from nlp_gait.formulation import Result
 from nlp_gait.simulation.drive import Drive
+from nlp_gait.simulation.engine import Sensing
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.measurements import measure_walk
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.replanning import Replanning
-from nlp_gait.simulation.sensors import Sensing
 from nlp_gait.simulation.simulate import DIRECTIONS, Conditions, Push, simulate_plan
 
 STEPS = 4

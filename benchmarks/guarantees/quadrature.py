@@ -16,8 +16,7 @@ from scipy.optimize import differential_evolution
 
 import nlp_gait
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
-from nlp_gait.gaits.walk12.walk12_model import compute_knee_cosines, compute_legs, compute_zmp
+from nlp_gait.gaits.walk12.walk12_model import compute_knee_cosines, compute_legs, compute_zmp, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_problem import make_rule
 from nlp_gait.symbolic.nonsmooth import Exact
 

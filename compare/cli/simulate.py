@@ -149,8 +149,8 @@ def simulate(
     from nlp_gait.formulation.result import load_result
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.film.film import parse_picture_size
+    from nlp_gait.simulation.film.recording import show_in_window
     from nlp_gait.simulation.film.video import check_frames, check_video_path
-    from nlp_gait.simulation.film.viewer import show_in_window
     from nlp_gait.simulation.load_sharing import Sharing
     from nlp_gait.simulation.load_sharing import share_loads as redistribute
     from nlp_gait.simulation.mjcf import make_plan_model

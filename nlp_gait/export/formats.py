@@ -6,12 +6,12 @@ import json
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.keyframes import write_keyframes
-from nlp_gait.export.set_points import COUPLED, SetPoints, make_set_points, to_naoqi
+from nlp_gait.export.set_points import COUPLED, make_set_points, to_naoqi
 from nlp_gait.export.webots import write_motion
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
 from nlp_gait.formulation import Result, Signals, sample_signals
@@ -44,10 +44,12 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     """
     if name not in FORMATS:
         raise unknown("format", name, FORMATS)
+    if name in ("webots", "naoqi", "ros"):
+        _check_motors(result)
     if name == "webots":
-        write_motion(path, _make_motor_set_points(result, period_ms))
+        write_motion(path, make_set_points(result, period_ms))
     elif name == "naoqi":
-        points = _make_motor_set_points(result, period_ms)
+        points = make_set_points(result, period_ms)
         if not set(COUPLED) <= set(points.joints):
             raise InputError(
                 f"only NAO has NAOqi, which commands joints such as {COUPLED[0]!r}; the robot of "
@@ -61,10 +63,36 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     elif name == "csv":
         write_signals_csv(path, sample_at_period(result, period_ms))
     elif name == "ros":
-        _check_motors(result)
         write_json(path, to_ros(sample_at_period(result, period_ms)))
     else:
         write_signals_json(path, result, sample_at_period(result, period_ms))
+
+
+def write_keyframes(result: Result, period_ms: int) -> str:
+    """Return the simulated model with a key for each row of the gait; raises InputError for a robot that moves in a plane.
+
+    ``qpos`` has the root's place [m] and attitude (w, x, y, z) and the joints' angles [rad], ``ctrl`` these angles as set-points.
+    """
+    plan = make_plan(result)
+    if plan.planar:
+        raise InputError(
+            f"the robot of {result.problem.name!r} moves in a plane and has no keyframes; export it as mjcf"
+        )
+    root = Xml.fromstring(make_plan_model(plan, Drive()))
+    times = sample_at_period(result, period_ms).arrays["t"]
+    # The engine's coordinates are in the order of the joints in the model, its controls in that of the actuators.
+    joints, driven = (
+        [plan.joints.index(part.attrib["name"]) for part in root.iter(tag)] for tag in ("joint", "position")
+    )
+    q = plan.at("q", times)
+    poses = np.hstack([plan.at("hip", times), plan.attitude(times), q[:, joints]])
+    keys = Xml.SubElement(root, "keyframe")
+    for t, pose, targets in zip(times.tolist(), poses, q[:, driven], strict=True):
+        values = {"qpos": pose, "ctrl": targets}
+        texts = {name: " ".join(map(repr, array.tolist())) for name, array in values.items()}
+        Xml.SubElement(keys, "key", {"name": f"{t:.6g} s", "time": repr(t), **texts})
+    Xml.indent(root)
+    return Xml.tostring(root, encoding="unicode") + "\n"
 
 
 def write_signals_csv(path: Path, signals: Signals) -> None:
@@ -110,12 +138,6 @@ def write_npz(path: Path, signals: Signals) -> None:
     """Write all arrays and the joint names (columns of q, qd, qdd and tau) to a ``.npz`` file; raises OutputError."""
     with replace_file(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, allow_pickle=False, joints=np.array(signals.joints), **signals.arrays)
-
-
-def _make_motor_set_points(result: Result, period_ms: int) -> SetPoints:
-    """Return set-points, if their joints are those of a robot."""
-    _check_motors(result)
-    return make_set_points(result, period_ms)
 
 
 def _check_motors(result: Result) -> None:

@@ -58,7 +58,10 @@ def describe_planner(
     check_planner(problem)
     if near.guess is None or not near.converged:
         raise InputError(f"{problem.name}: a planner begins from an optimum by IPOPT; it {near.status}")
-    functions = [_rename(function, prefix) for function in (model.row_bounds, model.lift_start)]
+    functions = []
+    for each in (model.row_bounds, model.lift_start):  # with the prefix in their names
+        inputs = each.mx_in()
+        functions.append(ca.Function(f"{prefix}_{each.name()}", inputs, each.call(inputs, True, False)))
     joints: tuple[str, ...] = ()
     if problem.display.at_time is not None:
         functions.append(_make_motion(problem, problem.display.at_time, prefix))
@@ -99,11 +102,6 @@ def describe_planner(
 
 def _write_public(name: str, values: Array) -> str:
     return write_array("double", name, map(derivatives.format_number, values.tolist())).removeprefix("static ")
-
-
-def _rename(function: ca.Function, prefix: str) -> ca.Function:
-    inputs = function.mx_in()
-    return ca.Function(f"{prefix}_{function.name()}", inputs, function.call(inputs, True, False))
 
 
 def _make_motion(

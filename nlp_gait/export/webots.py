@@ -38,14 +38,14 @@ def format_motion(points: SetPoints) -> str:
     lines = [",".join((HEADER, VERSION, *points.joints))]
     for number, (time, row) in enumerate(zip(points.times_ms, points.angles.tolist(), strict=True), start=1):
         values = (UNTOUCHED if math.isnan(value) else f"{value:.9f}" for value in row)
-        lines.append(",".join((_format_time(time), f"Pose{number}", *values)))
+        seconds, milliseconds = divmod(time, 1000)
+        lines.append(f"{seconds // 60:02d}:{seconds % 60:02d}:{milliseconds:03d},Pose{number},{','.join(values)}")
     return "\n".join(lines) + "\n"
 
 
 def read_motion(path: Path, motors: Collection[str] | None = None) -> SetPoints:
     """Read the set-points of a `.motion` file for the motors of a robot (None: any); raises InputError with the line."""
-    text = read_text(path, "motion")
-    return parse_motion(text, path.name, motors)
+    return parse_motion(read_text(path, "motion"), path.name, motors)
 
 
 def parse_motion(text: str, name: str, motors: Collection[str] | None = None) -> SetPoints:
@@ -107,9 +107,3 @@ def _parse_angle(text: str, joint: str, where: str) -> float:
     if _NUMBER.fullmatch(text) is None or not math.isfinite(float(text)):
         raise InputError(f"{where}: expected an angle of {joint} in radians or {UNTOUCHED}, got {text!r}")
     return float(text)
-
-
-def _format_time(time_ms: int) -> str:
-    seconds, milliseconds = divmod(time_ms, 1000)
-    minutes, seconds = divmod(seconds, 60)
-    return f"{minutes:02d}:{seconds:02d}:{milliseconds:03d}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -61,18 +61,13 @@ def compute_facts(instance: Any, starts: int) -> Facts:
                     starts=starts * (seed + 1),
                     agreeing=sum(abs(c - best_known) <= SAME * abs(best_known) for c in costs),
                 ),
-                local_optima=count_distinct(costs),
+                # costs that differ from the next lower one by more than 1e-4 of it
+                local_optima=1 + sum(b - a > 1e-4 * abs(a) for a, b in pairwise(sorted(costs))),
                 probes=make_probes(instance, best),
             )
     raise InputError(
         f"{instance.id}: none of {starts * MOST_ROUNDS} starts of IPOPT converged to a feasible point; choose another seed"
     )
-
-
-def count_distinct(costs: Sequence[float]) -> int:
-    """Return the number of costs that differ from the next lower one by more than 1e-4 of it."""
-    order = sorted(costs)
-    return 1 + sum(b - a > 1e-4 * abs(a) for a, b in zip(order, order[1:], strict=False))
 
 
 def evaluate_interpreted(instance: Any, x: Array) -> tuple[float, Array]:

@@ -1,4 +1,4 @@
-"""Robots as bipeds: two legs of six turning joints, all other links one body in a posture, and scales against NAO."""
+"""Robots as bipeds: two legs of six turning joints, all other links one body in a posture; scales and swings against NAO's."""
 
 from __future__ import annotations
 
@@ -41,15 +41,10 @@ class Biped:
         left, right = (self.legs[side].joints for side in SIDES)
         return dict(zip((*left, *right), (*right, *left), strict=True))
 
-    @cached_property
+    @property
     def leg_length_m(self) -> float:
         """Greatest distance of hip and ankle."""
         return self.legs["left"].length_m
-
-    @cached_property
-    def hip_middle_m(self) -> np.ndarray:
-        """(3,) middle between both hips, from the root's origin."""
-        return np.asarray((self.legs["left"].hip_m + self.legs["right"].hip_m) / 2)
 
     @property
     def length_scale(self) -> float:
@@ -139,3 +134,40 @@ def _check_alike(name: str, legs: Mapping[str, Leg]) -> None:
                 f"robot {name!r}: legs must be mirror images to {1e3 * ALIKE_M:g} mm, joint {joint!r} is at {mine.tolist()}, its "
                 f"image at {other.tolist()}"
             )
+
+
+GRAVITY = 9.81  # [m/s^2]
+STEP_M = 0.06  # NAO's, from foot to foot
+NAO_SWING_S = 0.4  # least time of NAO's swings in its papers
+LIKE_NAO = 0.1  # legs whose length differs by at most this share from NAO's have the papers' bounds
+
+
+def compare_swing(biped: Biped) -> float:
+    """Return by how much a robot can swing faster than NAO does in its papers, in proportion; at least 1.
+
+    It is 1 for robots of NAO's size, and where the file has no torque: one that could hold the whole robot on a stretched leg.
+    """
+    largest = biped.full.mass_kg * GRAVITY * biped.leg_length_m
+    if abs(biped.length_scale - 1.0) <= LIKE_NAO or _find_hip(biped)[1] > largest:
+        return 1.0
+    return max(float(f"{NAO_SWING_S * biped.time_scale / find_least_swing_time(biped):.2g}"), 1.0)
+
+
+def find_least_swing_time(biped: Biped) -> float:
+    """Return the least time in which the hip carries a leg over two usual steps [s].
+
+    The angle is a cubic of time from rest to rest, within the joint's speed and torque; the leg is a rod of its mass.
+    """
+    speed, torque = _find_hip(biped)
+    angle = 2 * STEP_M / NAO_LEG_M
+    mass_kg = sum(biped.model.links[biped.model.joint(name).child].mass_kg for name in biped.legs["left"].joints)
+    inertia = mass_kg * biped.leg_length_m**2 / 3
+    return max(1.5 * angle / speed, math.sqrt(6 * angle * inertia / torque))
+
+
+def _find_hip(biped: Biped) -> tuple[float, float]:
+    """Speed and torque of the hip joint that swings the leg forward [rad/s, Nm]."""
+    leg = biped.legs["left"]
+    name, _ = max(zip(leg.joints[:3], leg.axes[:3].tolist(), strict=True), key=lambda pair: abs(pair[1][1]))
+    joint = biped.model.joint(name)
+    return joint.velocity_limit_rad_s, joint.torque_limit_Nm

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -95,7 +96,11 @@ def mesh_points(path: Path) -> Array:
 
 def _read_points(path: Path) -> Array:
     data = read_bytes(path, "mesh", error=RobotDataError)
-    readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_collada}
+    readers: dict[str, Callable[[bytes], Array]] = {
+        ".stl": _read_stl,
+        ".obj": partial(_read_lines, "v", "utf-8"),
+        ".dae": _read_collada,
+    }
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise RobotDataError(f"mesh {str(path)!r}: supported formats are {', '.join(readers)}")
@@ -115,13 +120,13 @@ def _read_stl(data: bytes) -> Array:
             triangles = np.frombuffer(data, np.dtype(("V", STL_TRIANGLE)), count, STL_HEADER)
             floats = triangles.view(np.uint8).reshape(count, STL_TRIANGLE)[:, 12:48].copy().view("<f4")
             return np.unique(floats.reshape(-1, 3).astype(float), axis=0)
-    words = (line.split() for line in data.decode("ascii").splitlines())
-    return np.array([[float(w) for w in line[1:4]] for line in words if line[:1] == ["vertex"]])
+    return _read_lines("vertex", "ascii", data)
 
 
-def _read_obj(data: bytes) -> Array:
-    words = (line.split() for line in data.decode("utf-8").splitlines())
-    return np.array([[float(w) for w in line[1:4]] for line in words if line[:1] == ["v"]])
+def _read_lines(first: str, encoding: str, data: bytes) -> Array:
+    """Return the numbers of the lines of a text that begin with a word."""
+    words = (line.split() for line in data.decode(encoding).splitlines())
+    return np.array([[float(w) for w in line[1:4]] for line in words if line[:1] == [first]])
 
 
 def _read_collada(data: bytes) -> Array:

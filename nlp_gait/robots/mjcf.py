@@ -19,9 +19,8 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
-from nlp_gait.robots.limits import read_in_child
+from nlp_gait.robots.limits import check_counts, read_in_child
 from nlp_gait.robots.meshes import FootShapes, box_points, cylinder_points
-from nlp_gait.robots.mjcf_counts import check_counts
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 from nlp_gait.robots.tree import Array, Mass, combine_masses
 

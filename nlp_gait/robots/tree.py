@@ -204,7 +204,10 @@ def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
         before, angle = turns[joint.parent], angles.get(joint.name, 0.0)
         turns[joint.child] = before @ rotate(np.array(joint.axis), angle) if angle else before
         joints[joint.name] = _turn_joint(joint, before, angle)
-        links[joint.child] = _turn_link(links[joint.child], turns[joint.child])
+        turn, link = turns[joint.child], links[joint.child]
+        if not np.array_equal(turn, np.eye(3)):
+            tensor = inertia_moments(turn @ link.inertia_matrix @ turn.T)
+            links[joint.child] = replace(link, com_m=_vector(turn @ np.array(link.com_m)), inertia_com_kgm2=tensor)
         waiting += [other for other in robot.joints.values() if other.parent == joint.child]
     return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
 
@@ -222,13 +225,6 @@ def _turn_joint(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
         limits_rad=(low - angle, high - angle),
         planning_limits_rad=(plan_low - angle, plan_high - angle),
     )
-
-
-def _turn_link(link: Link, turn: np.ndarray) -> Link:
-    if np.array_equal(turn, np.eye(3)):
-        return link
-    tensor = inertia_moments(turn @ link.inertia_matrix @ turn.T)
-    return replace(link, com_m=_vector(turn @ np.array(link.com_m)), inertia_com_kgm2=tensor)
 
 
 def _vector(values: np.ndarray) -> Vector:

@@ -12,10 +12,10 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
+from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.feedback import BalanceController, Feedback
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.replanning import Replanning, StepPlanner
-from nlp_gait.simulation.sensors import check_period
 
 # Published limits of NAO's joints differ by a factor of four: from the robot's file (the manufacturer's URDF), or from the motor
 # at stall or in continuous service, times the gear ratio.

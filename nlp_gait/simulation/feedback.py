@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.engine import Addresses, load_mujoco
+from nlp_gait.simulation.engine import Addresses, Sensing, SensorValues, TorsoSensor, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.sensors import Sensing, SensorValues, TorsoSensor
 
 STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
 

@@ -20,8 +20,8 @@ from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import tree_from
+from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
-from nlp_gait.simulation.sensors import check_period
 from nlp_gait.symbolic.balance import SOLE_FRICTION, shift_down, shift_up, sole_limits
 from nlp_gait.symbolic.dynamics import newton_euler, tilt_gravity
 

@@ -71,7 +71,12 @@ def make_model(
     root.set("model", robot.name)
     option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(*tilt_gravity(gravity, slope_rad))}
     default[0].set("friction", _numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
-    _add_hulls(assets, shapes)
+    for link, parts in shapes.items():
+        for i, shape in enumerate(parts):
+            if isinstance(shape, Prism):
+                levels = (shape.bottom, shape.bottom + shape.thickness)
+                corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
+                Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
     _add_stairs(world, ground)
     bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if planar else "free")
     _paint(bodies, robot)
@@ -96,15 +101,6 @@ def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
         middle = (tread.edge_m + half[0], 0.0, half[2])
         box = Xml.SubElement(world, "geom", name=f"tread {i}", type="box", size=_numbers(*half), pos=_numbers(*middle))
         box.attrib |= {"contype": "1", "rgba": "0.8 0.78 0.74 1"}
-
-
-def _add_hulls(assets: Xml.Element, shapes: Shapes) -> None:
-    for link, parts in shapes.items():
-        for i, shape in enumerate(parts):
-            if isinstance(shape, Prism):
-                levels = (shape.bottom, shape.bottom + shape.thickness)
-                corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
-                Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
 
 
 def add_bodies(

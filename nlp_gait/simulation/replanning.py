@@ -28,9 +28,9 @@ from nlp_gait.gaits.biped import rest_of_phase as rest
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides
 from nlp_gait.robots import Joint
+from nlp_gait.simulation.engine import Sensing, SensorValues, TorsoSensor
 from nlp_gait.simulation.feedback import to_rotation_vector
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
-from nlp_gait.simulation.sensors import Sensing, SensorValues, TorsoSensor
 from nlp_gait.symbolic.trajectories import cubic
 
 FREE = ("length", "width", "time")

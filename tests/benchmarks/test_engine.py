@@ -11,8 +11,8 @@ from compare.judge import evaluate  # noqa: E402
 from compare.papers.walk12.walk12_paper import find_row  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
 from nlp_gait.formulation import Result  # noqa: E402
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped  # noqa: E402
 from nlp_gait.gaits.walk12.walk12_display import make_rigid_bodies  # noqa: E402
+from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped  # noqa: E402
 
 
 @pytest.mark.slow

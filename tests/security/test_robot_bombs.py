@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots import limits, load_robot, mjcf_counts
+from nlp_gait.robots import limits, load_robot
 from nlp_gait.robots.meshes import mesh_points
 from nlp_gait.robots.mjcf import mjcf_record
 from nlp_gait.robots.urdf import urdf_record
@@ -75,7 +75,7 @@ def test_a_model_that_takes_too_much_is_rejected(
 ) -> None:
     """As if its counts were written in a way that is not counted."""
     for name in ("MOST_ELEMENTS", "MOST_NUMBERS"):
-        monkeypatch.setattr(mjcf_counts, name, 2**62)
+        monkeypatch.setattr(limits, name, 2**62)
     _check_rejected(tmp_path, list(_make_bombs())[number][0], f"{MEMORY}|{TIME}")
 
 

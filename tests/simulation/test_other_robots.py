@@ -12,7 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.stairs.display import compute_ground_force
 from nlp_gait.gaits.stairs.planar_biped import MOVING
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model

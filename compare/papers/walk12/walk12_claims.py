@@ -20,8 +20,7 @@ from compare.papers.walk12.walk12_walks import DRIVES, STEP_TIMES_S, WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
-from nlp_gait.gaits.walk12.walk12_model import Zmp
+from nlp_gait.gaits.walk12.walk12_model import Zmp, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_problem import PRINTED_STEPS, Horizon
 
 CONVERGED_EPOCH = 15

@@ -14,7 +14,7 @@ from compare.papers.walk12.walk12_findings import Walk12Findings, follow
 from compare.papers.walk12.walk12_paper import find_row
 from compare.papers.walk12.walk12_runs import GA, PAPER, PathPoint
 from compare.study.record import RunRecord
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

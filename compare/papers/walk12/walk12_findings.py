@@ -19,8 +19,7 @@ from compare.papers.walk12.walk12_walks import WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
-from nlp_gait.gaits.walk12.walk12_model import Zmp
+from nlp_gait.gaits.walk12.walk12_model import Zmp, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 
 KNEES = ("theta_3", "theta_10")

@@ -29,9 +29,8 @@ from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS, make_rigid_bodies
-from nlp_gait.gaits.walk12.walk12_model import Zmp
+from nlp_gait.gaits.walk12.walk12_model import Zmp, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_problem import Horizon
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS
 from nlp_gait.simulation.drive import Drive

@@ -33,7 +33,8 @@ def _draw(robot: Robot, signals: Signals) -> Skeleton:
         soles.append(make_level_sole(robot, side, arrays[f"{side}_foot"], yaw))
     feet = {link for side in (LEFT, RIGHT) for link in _chain(robot, robot.feet[side].link)[1:]}
     height = -min(float(_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
-    for tip in _tips(robot):
+    parents = {joint.parent for joint in robot.joints.values()}
+    for tip in (link for link in robot.links if link not in parents):
         chain = _chain(robot, tip)
         if feet & set(chain):
             continue
@@ -56,11 +57,6 @@ def make_level_sole(robot: Robot, side: str, centre: Array, yaw: Array | None = 
 
 def _chain(robot: Robot, link: str) -> list[str]:
     return [robot.root, *(joint.child for joint in reversed(robot.path_to_root(link)))]
-
-
-def _tips(robot: Robot) -> list[str]:
-    parents = {joint.parent for joint in robot.joints.values()}
-    return [link for link in robot.links if link not in parents]
 
 
 def _at_zero(robot: Robot, link: str) -> Array:

@@ -20,9 +20,8 @@ from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.gaits.biped.support_phases import make_nearest_edge_margins
-from nlp_gait.gaits.humanoid.swing_time import GRAVITY, NAO_SWING_S, STEP_M, compare_swing
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.biped import Biped, make_biped_model
+from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic import general_leg
 from nlp_gait.symbolic.kinematics import UP, axis_rotation, turn_quaternion
@@ -139,7 +138,8 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
     Torques and speeds may be within the limits of the robot's file; for the motors see ``gaits.biped.motors``.
     """
     biped = make_biped_model(load_robot(robot))
-    left, (middle_x, _, middle_z) = biped.legs["left"], biped.hip_middle_m
+    left, right = biped.legs["left"], biped.legs["right"]
+    middle_x, _, middle_z = (left.hip_m + right.hip_m) / 2
     above = biped.model.feet["left"].ankle_height_m + float(left.ankle_m[2] - left.foot_m[2])
     swing_speed = compare_swing(biped)
     rate = float(f"{LARGEST_LEAN_RATE * swing_speed / biped.time_scale:.4g}")
@@ -168,7 +168,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         ),
         upright=frozenset(foot.link for foot in biped.model.feet.values()),
         gravity=GRAVITY,
-        feet_y=(float(left.foot_m[1]), float(biped.legs["right"].foot_m[1])),
+        feet_y=(float(left.foot_m[1]), float(right.foot_m[1])),
         leg_length_m=biped.leg_length_m,
         hip_height_m=(
             round(above + HEIGHT_SHARES[0] * left.length_m, 3),

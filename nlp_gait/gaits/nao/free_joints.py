@@ -117,7 +117,8 @@ class FreePhase(Phase):
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[limits.REACH_MARGIN], 1, n), table)
         motions = tie_entries(values, ops)
         torque, zmp, along, heights, sides = (tie_entries(part, ops) for part in self.free.instant.map(n)(motions))
-        q, qd, qdd = (name_rows(part) for part in ca.vertsplit(motions, len(CURVES)))
+        rows = (dict(zip(CURVES, ca.vertsplit(part), strict=True)) for part in ca.vertsplit(motions, len(CURVES)))
+        q, qd, qdd = ({n: part[YAW_PITCH if n in YAW_PITCHES else n] for n in MOVING} for part in rows)
         return Samples(
             joints=JOINTS,
             moving=MOVING,
@@ -138,12 +139,6 @@ class FreePhase(Phase):
                 "sides": sides,
             },
         )
-
-
-def name_rows(rows: MX) -> dict[str, MX]:
-    """Return the rows of a matrix (15, N + 1) by joint name."""
-    found = dict(zip(CURVES, ca.vertsplit(rows), strict=True))
-    return {name: found[YAW_PITCH if name in YAW_PITCHES else name] for name in MOVING}
 
 
 class FreeLimits(limits.Limit):

@@ -264,16 +264,8 @@ def nao_dsp_free(
 GAITS = ("nao-ssp", "nao-dsp", "nao-cycle")
 
 
-def of_all_joints(angles: JointAngles) -> Array:
-    """Return (T, 22) columns as ``JOINTS``; joints of the arms that are missing are held [rad]."""
-    columns = dict(zip(angles.joints, angles.q.T, strict=True))
-    return np.column_stack(
-        [columns.get(name, np.full(len(angles.t), RESTING_ARM_ANGLES.get(name, 0.0))) for name in JOINTS]
-    )
-
-
 def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
-    """Return the motion of a robot on its left foot; mirrored if the right one stands. Joints of the arms may be missing.
+    """Return the motion of a robot on its left foot; mirrored if the right one stands. Arms that are missing are held.
 
     Raises InputError if a joint of the legs is missing, or times or angles are missing or out of order.
     """
@@ -289,7 +281,9 @@ def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
     for name in JOINTS:
         if name in columns and not np.isfinite(columns[name]).all():
             raise InputError(f"{angles.owner}: an angle of {name} is missing")
-    motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=of_all_joints(angles), held=tuple(missing))
+    held = (np.full(len(angles.t), RESTING_ARM_ANGLES.get(name, 0.0)) for name in JOINTS)
+    q = np.column_stack([columns.get(name, still) for name, still in zip(JOINTS, held, strict=True)])
+    motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=q, held=tuple(missing))
     heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
     return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
 

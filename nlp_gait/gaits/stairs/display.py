@@ -115,11 +115,6 @@ def joint_torques(model: Array, stance_toe: Array) -> Array:
     return np.stack([found.get(name, stance_toe) for name in JOINTS], axis=1)
 
 
-def torso_lean(q: Array) -> Array:
-    """Return the rotation (T,) of the torso from upright, forward [rad]."""
-    return _forward_turns(q, 1.0)["UH"]
-
-
 def _forward_turns(q: Array, share: float) -> dict[str, Array]:
     """Return the rotation of every link about the axis to the left from the zero pose; ``share`` 0 for rates."""
     upright = share * np.pi / 2
@@ -246,7 +241,7 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
 
 def _signals(step: StepMotion, rise: float) -> Signals:
     hip, ankle, stance_ankle = (np.array(part).T for part in _places().map(len(step.t))(step.q.T))
-    lean = torso_lean(step.q)
+    lean = _forward_turns(step.q, 1.0)["UH"]  # from upright, forward
     still = np.zeros_like(lean)
     rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
 

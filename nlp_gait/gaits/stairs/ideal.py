@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 from math import inf
 
 import casadi as ca
@@ -85,9 +85,6 @@ def stairs_ideal(
     layout = _layout(intervals, sole_off, toe_off)
     model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off, ends=ends)
 
-    def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
-        return _start(layout, intervals, parameters, rng)
-
     def motion(at: NumericPoint) -> Signals:
         values = layout.values(at.x.full().ravel())
         step_time = float(at["step_time_s"])
@@ -145,7 +142,7 @@ def stairs_ideal(
         display=Display(
             motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion, repeats=ends == "rest")
         ),
-        hints=SolverHints(start=start, starts=3, searchable=False),
+        hints=SolverHints(start=partial(_start, layout, intervals), starts=3, searchable=False),
     )
 
 
@@ -172,7 +169,11 @@ def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
 def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.random.Generator) -> Array:
     """Return planned angles with noise, rates and accelerations by differences, and a share of the weight on the rear foot."""
     tread = values["stair_length_m"] / 2
-    angle = _planned_angles(tread, values["rise_run_ratio"] * tread, intervals)
+    ends = np.array([0.0, *stair.PAPER_TIMES])
+    times = np.linspace(0.0, ends[-1], intervals + 1)
+    fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
+    size = np.tile([[tread], [values["rise_run_ratio"] * tread]], intervals + 1)
+    angle = np.array(_angles().map(intervals + 1)(size, fractions))
     angle += NOISE * rng.standard_normal(angle.shape)
     step = values["step_time_s"] / intervals
     rate = np.gradient(angle, step, axis=1)
@@ -186,14 +187,6 @@ def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.
             "sole_force": np.tile([[0.0], [SOLE_LOAD]], blocks["sole_force"].columns),
         }
     )
-
-
-def _planned_angles(tread: float, rise: float, intervals: int) -> Array:
-    """Return link angles (7, intervals + 1) of a plausible step at equidistant times [rad]."""
-    ends = np.array([0.0, *stair.PAPER_TIMES])
-    times = np.linspace(0.0, ends[-1], intervals + 1)
-    fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
-    return np.array(_angles().map(intervals + 1)(np.tile([[tread], [rise]], intervals + 1), fractions))
 
 
 @cache

@@ -190,21 +190,20 @@ def _rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tuple[Con
     lower, upper = (MX(DM([stair.ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
     most = point["acceleration_limit_rad_s2"]
     links = stair.rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper)
+    if step.balance == "feet":
+        balance = stair.stance_zmp(point, samples.stance_pressure)
+    else:  # the ZMP of (49) between the outer contact points
+        rear, front = ca.vertsplit(samples.support)
+        ahead = ca.vertcat(samples.zmp - rear, front - samples.zmp)
+        balance = stair.rows("zmp", ahead, ("rear", "front"), "m", 0.01, lower=point["zmp_margin_m"])
     return (
         stair.rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
         *((links, stair.knee_limits("knee_angle", samples.q)) if step.angle_limits else ()),
         stair.rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
         stair.stance_load(point, samples.stance_force),
         stair.grip("friction", samples.stance_force, point["friction"]),
-        stair.stance_zmp(point, samples.stance_pressure) if step.balance == "feet" else _polygon_zmp(point, samples),
+        balance,
     )
-
-
-def _polygon_zmp(point: Point, samples: PlanSamples) -> Constraint:
-    """Return rows for the ZMP of (49) between the outer contact points, with the margin parameter."""
-    rear, front = ca.vertsplit(samples.support)
-    ahead = ca.vertcat(samples.zmp - rear, front - samples.zmp)
-    return stair.rows("zmp", ahead, ("rear", "front"), "m", 0.01, lower=point["zmp_margin_m"])
 
 
 def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmooth) -> Assembly:

@@ -196,7 +196,11 @@ def _assemble(
     rear, front = support_polygon(point, loop)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
-    balance = _outside(zmp, rear, front, ops) if rule == "penalty" else -_margin(zmp, rear, front, ops)
+    if rule == "penalty":  # the mean distance of the ZMP from the support polygon [m]
+        distances = ca.vertcat(rear - zmp, zmp - front)
+        balance = ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
+    else:
+        balance = -_margin(zmp, rear, front, ops)
     instants, constraints = range(1, quanta + 1), []
     if rule == "limits":  # (Algorithm 3)
         constraints.append(stair.rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
@@ -231,12 +235,6 @@ def support_polygon(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]
     times = DM(np.arange(1, loop.quanta + 1) * closed_loop.QUANTUM)
     behind = 0 if loop.kind == "first" else foot - point["stair_length_m"] / 2
     return (times < point["t2_s"]) * behind, MX(DM([foot] * loop.quanta))
-
-
-def _outside(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
-    """Return the mean distance of the ZMP (m, 1) from the support polygon [m]."""
-    distances = ca.vertcat(rear - zmp, zmp - front)
-    return ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
 
 
 def _margin(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:

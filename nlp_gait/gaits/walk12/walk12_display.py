@@ -26,8 +26,7 @@ from nlp_gait.formulation.display import (
     make_flat_skeleton,
     make_rectangle,
 )
-from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
-from nlp_gait.gaits.walk12.walk12_model import GRAVITY, Zmp
+from nlp_gait.gaits.walk12.walk12_model import GRAVITY, PointMassBiped, Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
 from nlp_gait.robots import Foot, Joint, Link, Robot
 from nlp_gait.robots.robot import Vector
@@ -56,10 +55,12 @@ def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
     def motion(at: NumericPoint, steps: int) -> Signals:
         walked = compute_steps_at(at, robot, intervals=FINE_INTERVALS, zmp=zmp, steps=steps).arrays
         left, heading = _follow_steps(walked, float(at["turn_rad"]))
-        still = np.zeros_like(heading)
+        still, given = np.zeros_like(heading), [walked[name].T for name in ("q", "qd", "qdd")]
+        dynamics = (_make_inverse_dynamics(bodies, side).map(len(left)) for side in ("left", "right"))
+        torques = [np.array(function(*given)).T for function in dynamics]
         arrays = {
             **{name: walked[name] for name in ("t", "q", "qd", "qdd", "zmp")},
-            "tau": _compute_torques(bodies, walked, left),
+            "tau": np.where(left[:, None], *torques),  # with the stance foot still and the other foot free
             "hip": walked["waist"],
             "attitude": np.column_stack([np.cos(heading / 2), still, still, np.sin(heading / 2)]),
             "left_foot": walked["left_ankle"],
@@ -148,13 +149,6 @@ def _follow_steps(walked: Mapping[str, Array], turn: float) -> tuple[Flags, Arra
     """Return (T,) whether the left leg stands, and (T,) the heading [rad], which turns with each exchange of the legs."""
     left = walked["left_stance"] > 0.5
     return left, np.concatenate([[0], np.cumsum(np.diff(left) != 0)]) * turn
-
-
-def _compute_torques(bodies: Robot, walked: Mapping[str, Array], left: Flags) -> Array:
-    """Return (T, 12) torques of the joints with the stance foot still and the other foot free [Nm]."""
-    given = [walked[name].T for name in ("q", "qd", "qdd")]
-    by_side = [np.array(_make_inverse_dynamics(bodies, side).map(len(left))(*given)).T for side in ("left", "right")]
-    return np.where(left[:, None], *by_side)
 
 
 @cache

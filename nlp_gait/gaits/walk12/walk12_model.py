@@ -1,4 +1,4 @@
-"""Motion of the 12-joint walk over one step, and its zero-moment point.
+"""The robot of the 12-joint walk, links without mass and actuators as point masses; its motion over one step, and its ZMP.
 
 The stance ankle is the origin, x forward, y to the left, z up; the swing leg is the right one, at y = -w. The step begins and
 ends in double support, with the swing foot half a step behind and then half a step ahead.
@@ -11,18 +11,67 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import resources
+from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
+from nlp_gait.decoding import read_dataclass
+from nlp_gait.errors import RobotDataError
+from nlp_gait.robots.robot import check_numbers
 from nlp_gait.symbolic.balance import zmp_of_point_masses
 from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, map_motion, stack
 
 GRAVITY = 9.81  # [m/s^2]
+DEFAULT_FILE = resources.files("nlp_gait.gaits.walk12") / "point_mass_biped.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointMassBiped:
+    """Two legs of a thigh and a shank each, with point masses at knees, hips, waist and feet.
+
+    Source:
+        Goswami, Vadakkepat, Phung (2008), section 2.
+    """
+
+    name: str  # of the robot
+    description: str  # one line
+    source: str  # of the numbers
+    knee_mass_kg: float  # m1, at each knee
+    waist_mass_kg: float  # m2, in the middle between the hips
+    foot_mass_kg: float  # m3, at each foot
+    hip_mass_kg: float  # m4, at each hip
+    thigh_m: float  # d1, hip to knee
+    shank_m: float  # d2, knee to ankle
+    hip_distance_m: float  # w, between the hips
+    foot_com_height_m: float  # L, from the ankle up the shank to the foot's mass
+    waist_length_m: float  # Bx
+    waist_width_m: float  # By
+    foot_back_m: float  # Fx1, from the ankle to the rear edge of the sole
+    foot_front_m: float  # Fx2, from the ankle to the front edge
+    foot_width_m: float  # Fy; the ankle is in the middle
+
+    def __post_init__(self) -> None:
+        numbers = [field.name for field in fields(self) if field.name.endswith(("_kg", "_m"))]
+        check_numbers(f"robot {self.name!r}", self, positive=numbers)
+
+    @property
+    def leg_m(self) -> float:
+        """Length of a stretched leg, d1 + d2."""
+        return self.thigh_m + self.shank_m
+
+
+@cache
+def load_point_mass_biped(path: str = "") -> PointMassBiped:
+    """Read a robot from a JSON file with the fields of ``PointMassBiped``, by default the paper's; raises RobotDataError."""
+    return read_dataclass(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)
+
 
 # Definition of the ZMP: (14) with exact forward kinematics; the same with the appendix's approximate positions, misprints
 # corrected or (A1) as printed; or the point about which the moment of gravity and inertia vanishes.
@@ -74,7 +123,9 @@ def compute_legs(
     stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))
     swing_hip = hip._replace(position=hip.position + _across(robot))
     stance = _solve_leg(stance_ankle, hip, margin, robot, ops)
-    return stance, _turn_leg(_solve_leg(swing_ankle, swing_hip, margin, robot, ops), turn)
+    swing, heading = _solve_leg(swing_ankle, swing_hip, margin, robot, ops), axis_rotation((0.0, 0.0, 1.0), turn)
+    ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(swing.hip, swing.ankle, strict=True)))
+    return stance, swing._replace(ankle=ankle, heading=heading)
 
 
 def compute_knee_cosines(x: SX, phase: SX, robot: PointMassBiped) -> SX:
@@ -155,12 +206,6 @@ def _solve_leg(ankle: Motion, hip: Motion, margin: SX, robot: PointMassBiped, op
     # From hip roll, hip pitch, knee, ankle pitch, ankle roll, turning about x and y of the upper link's axes.
     signs = DM([1, -1, 1, -1, 1])
     return Walk12Leg(ankle, hip, Motion(*((signs * part)[::-1] for part in angles)), SX.eye(3))
-
-
-def _turn_leg(leg: Walk12Leg, turn: SX) -> Walk12Leg:
-    heading = axis_rotation((0.0, 0.0, 1.0), turn)
-    ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(leg.hip, leg.ankle, strict=True)))
-    return leg._replace(ankle=ankle, heading=heading)
 
 
 def _shift_to_ankle(leg: Walk12Leg, points: Motion) -> Motion:

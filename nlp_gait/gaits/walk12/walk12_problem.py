@@ -13,9 +13,8 @@ from casadi import DM, MX, SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Objective, Point, SolverHints, maker
 from nlp_gait.formulation.assembly import RowsOverTime, Variable, parameters
-from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
+from nlp_gait.gaits.walk12 import walk12_model
 from nlp_gait.gaits.walk12.walk12_display import make_simulation_model, make_skeleton
-from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_knee_cosines, compute_legs, compute_zmp
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -58,7 +57,7 @@ PARAMETERS = parameters(
 
 @maker
 def walk12(
-    *, intervals: int = 20, horizon: Horizon = "step", zmp: Zmp = "exact", quadrature: Quadrature = "gauss"
+    *, intervals: int = 20, horizon: Horizon = "step", zmp: walk12_model.Zmp = "exact", quadrature: Quadrature = "gauss"
 ) -> GaitProblem:
     """Return the gait problem of the 12-joint biped: maximise lambda f1 / f1max + (1 - lambda) s / f2max.
 
@@ -73,7 +72,7 @@ def walk12(
     """
     if intervals < 2 or intervals % 2:
         raise InputError(f"intervals must be an even whole number >= 2 (panels of two), got {intervals!r}")
-    robot = load_point_mass_biped()
+    robot = walk12_model.load_point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         T, s, zmp_at = point["step_time_s"], point["step_length_m"], _make_zmp_function(robot, ops, zmp)
@@ -142,10 +141,10 @@ def make_rule(quadrature: Quadrature, intervals: int) -> tuple[DM, DM]:
     return DM(np.linspace(0.0, 1.0, count + 1)).T, DM(weights / (3 * count))
 
 
-def _limit_reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:
+def _limit_reach(point: Point, robot: walk12_model.PointMassBiped, phases: MX | DM, names: list[str]) -> Constraint:
     """Bend the knees by at least kappa at the given phases: nearly straight legs make the ZMP spike."""
     x, phase = SX.sym("x", len(VARIABLES)), SX.sym("phase")
-    cosines = ca.Function("reach", [x, phase], ca.cse([compute_knee_cosines(x, phase, robot)]))
+    cosines = ca.Function("reach", [x, phase], ca.cse([walk12_model.compute_knee_cosines(x, phase, robot)]))
     n = len(names)
     limit = ca.cos(point["reach_margin_rad"])
     return Constraint(
@@ -160,7 +159,7 @@ def _limit_reach(point: Point, robot: PointMassBiped, phases: MX | DM, names: li
     )
 
 
-def _measure_stability(zmp: MX, robot: PointMassBiped) -> dict[str, MX]:
+def _measure_stability(zmp: MX, robot: walk12_model.PointMassBiped) -> dict[str, MX]:
     """Return margins of the ZMP (2, N + 1) on the sole of the stance foot (eq. 8); the stable share is of the step's time."""
     x, y = zmp[0, :], zmp[1, :]
     half = robot.foot_width_m / 2
@@ -178,12 +177,12 @@ def _measure_stability(zmp: MX, robot: PointMassBiped) -> dict[str, MX]:
     }
 
 
-def _make_zmp_function(robot: PointMassBiped, ops: Nonsmooth, reading: Zmp) -> ca.Function:
+def _make_zmp_function(robot: walk12_model.PointMassBiped, ops: Nonsmooth, reading: walk12_model.Zmp) -> ca.Function:
     """Return the function of one sample: (x, T, K, reach margin of a cosine, phase) to the ZMP (2,) from the stance ankle [m]."""
     x = SX.sym("x", len(VARIABLES))
     T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
-    stance, swing = compute_legs(x, phase, T, turn, margin, robot, ops)
-    point = compute_zmp(stance, swing, robot, reading)
+    stance, swing = walk12_model.compute_legs(x, phase, T, turn, margin, robot, ops)
+    point = walk12_model.compute_zmp(stance, swing, robot, reading)
     return ca.Function("zmp", [x, T, turn, margin, phase], ca.cse([point]))
 
 

@@ -17,8 +17,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, vector_columns
-from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped
-from nlp_gait.gaits.walk12.walk12_model import Zmp, compute_legs, compute_mass_motion, compute_zmp, list_masses
+from nlp_gait.gaits.walk12 import walk12_model
 from nlp_gait.symbolic.nonsmooth import Exact
 
 JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
@@ -34,7 +33,7 @@ MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])
 
 
 def compute_steps(
-    robot: PointMassBiped,
+    robot: walk12_model.PointMassBiped,
     x: Array,
     *,
     step_time_s: float = 1.0,
@@ -42,7 +41,7 @@ def compute_steps(
     reach_margin_rad: float = 0.05,
     steps: int = 2,
     intervals: int = 20,
-    zmp: Zmp = "exact",
+    zmp: walk12_model.Zmp = "exact",
 ) -> Signals:
     """Compute time histories over some steps, with x (4,), T, K and kappa as in the problem.
 
@@ -76,7 +75,9 @@ def compute_steps(
     return Signals(joints=JOINTS, arrays=arrays, columns=COLUMNS_OF)
 
 
-def compute_steps_at(at: NumericPoint, robot: PointMassBiped, *, intervals: int, zmp: Zmp, steps: int = 2) -> Signals:
+def compute_steps_at(
+    at: NumericPoint, robot: walk12_model.PointMassBiped, *, intervals: int, zmp: walk12_model.Zmp, steps: int = 2
+) -> Signals:
     """Compute time histories at a point of the problem, see ``compute_steps``."""
     settings = {name: float(at[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")}
     return compute_steps(robot, at.x.full().ravel(), **settings, steps=steps, intervals=intervals, zmp=zmp)
@@ -118,17 +119,17 @@ def _place_in_world(local: dict[str, Array], side: float, ankle: Array, heading:
 
 
 @cache
-def _make_sample_function(robot: PointMassBiped, reading: Zmp) -> ca.Function:
+def _make_sample_function(robot: walk12_model.PointMassBiped, reading: walk12_model.Zmp) -> ca.Function:
     """Return the function of one sample with the left leg standing: (x, T, K, reach margin of a cosine, phase)."""
     x = SX.sym("x", 4)
     T, turn, margin, phase = (SX.sym(name) for name in ("T", "K", "margin", "phase"))
-    stance, swing = compute_legs(x, phase, T, turn, margin, robot, Exact())
-    m = list_masses(robot)
+    stance, swing = walk12_model.compute_legs(x, phase, T, turn, margin, robot, Exact())
+    m = walk12_model.list_masses(robot)
     outputs = {
         **dict(zip(("stance_q", "stance_qd", "stance_qdd"), stance.joints, strict=True)),
         **dict(zip(("swing_q", "swing_qd", "swing_qdd"), swing.joints, strict=True)),
-        "zmp": compute_zmp(stance, swing, robot, reading),
-        "com": compute_mass_motion(stance, swing, robot).position @ m / float(ca.sum1(m)),  # (eq. 12)
+        "zmp": walk12_model.compute_zmp(stance, swing, robot, reading),
+        "com": walk12_model.compute_mass_motion(stance, swing, robot).position @ m / float(ca.sum1(m)),  # (eq. 12)
         "waist": (stance.hip.position + swing.hip.position) / 2,
         "swing_ankle": swing.ankle.position,
     }

@@ -1,14 +1,18 @@
-"""Recordings of simulations: the robot's state and the numbers at every picture of a film."""
+"""Simulations recorded for films, the robot's state and the numbers at every picture, or shown in MuJoCo's own window."""
 
 from __future__ import annotations
 
+import time
+import warnings
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Array
+from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import Plan
@@ -92,3 +96,44 @@ def _steps(window_s: float) -> int:
 
 def _smooth(values: Array, window_s: float) -> Array:
     return np.asarray(uniform_filter1d(values, _steps(window_s), axis=0, mode="nearest"))
+
+
+AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.6, (0.06, 0.0, 0.24)  # it follows the torso
+
+
+def show_in_window(simulate: Simulator) -> Simulation:
+    """Simulate a gait in real time in MuJoCo's window; raises OutputError without a display."""
+    load_mujoco()
+    _require_display()
+    from mujoco import viewer
+
+    window: Any = None
+    began = 0.0
+
+    def follow(model: Any, data: Any) -> None:
+        nonlocal window, began
+        if window is None:
+            window, began = viewer.launch_passive(model, data), time.monotonic()
+            window.cam.azimuth, window.cam.elevation, window.cam.distance = AZIMUTH, ELEVATION, DISTANCE
+            window.cam.lookat[:] = LOOK_AT
+        if window.is_running():  # if the user closes it, the simulation continues
+            window.cam.lookat[0] = data.qpos[0]
+            window.sync()
+            time.sleep(max(0.0, data.time - (time.monotonic() - began)))
+
+    try:
+        return simulate(on_step=follow)
+    finally:
+        if window is not None:
+            window.close()
+
+
+def _require_display() -> None:
+    """Raise OutputError without a display: MuJoCo's viewer would end the whole process."""
+    import glfw
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)
+        ready = glfw.init()
+    if not ready:
+        raise OutputError("cannot open a window: no display; use --video FILE.gif instead of --viewer")

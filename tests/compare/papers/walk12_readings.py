@@ -17,9 +17,15 @@ from compare.papers.walk12.walk12_runs import CORNER_M, compute_f1, load_walk12
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.walk12.point_mass_biped import PointMassBiped, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS
-from nlp_gait.gaits.walk12.walk12_model import GRAVITY, compute_legs, compute_mass_motion, list_masses
+from nlp_gait.gaits.walk12.walk12_model import (
+    GRAVITY,
+    PointMassBiped,
+    compute_legs,
+    compute_mass_motion,
+    list_masses,
+    load_point_mass_biped,
+)
 from nlp_gait.gaits.walk12.walk12_problem import make_rule
 from nlp_gait.symbolic.nonsmooth import Exact
 

@@ -10,7 +10,7 @@ import pytest
 from nlp_gait.backends.plan_walk import describe_own_bounds
 from nlp_gait.formulation import load
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
-from nlp_gait.gaits.humanoid.swing_time import compare_swing, find_least_swing_time
+from nlp_gait.robots.biped import compare_swing, find_least_swing_time
 from tests.robots.crooked import crooked
 
 pytest.importorskip("urdf_parser_py")

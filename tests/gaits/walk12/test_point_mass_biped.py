@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 
 
 def test_table_1() -> None:

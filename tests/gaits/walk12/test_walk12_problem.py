@@ -14,7 +14,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from tests.gaits.walk12 import walk12_oracle as oracle
 

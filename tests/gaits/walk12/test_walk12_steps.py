@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlp_gait.gaits.walk12.point_mass_biped import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps
 
 X = np.array([0.13, 0.109, 0.014, 0.020])

@@ -210,7 +210,13 @@ def single_support_instants(robot: Robot, stance: Stance, arm_swing: Mapping[str
 
     x, y = stance.support_xy
     sides = ((x - foot.back_m, x + foot.front_m), (y - foot.right_m, y + foot.left_m))
-    return PowerPhase(instant, sides, {"x": _ankle_side_margin(x, *sides[0]), "y": _nearer_margin(*sides[1])})
+
+    def margin_x(at: SX) -> SX:
+        """Return the distance to the side beyond the ankle, see ``NaoBody.make_sole_margins``."""
+        low, high = sides[0]
+        return (high - at) - ca.if_else(at - x < 0, (high - at) - (at - low), 0)
+
+    return PowerPhase(instant, sides, {"x": margin_x, "y": _nearer_margin(*sides[1])})
 
 
 def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
@@ -222,11 +228,6 @@ def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
 def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
     """Return the distance to the nearer of two sides."""
     return lambda at: (high - low) / 2 - ca.fabs(at - (low + high) / 2)
-
-
-def _ankle_side_margin(ankle: float, low: float, high: float) -> Callable[[SX], SX]:
-    """Return the distance to the side beyond the ankle, see ``NaoBody.make_sole_margins``."""
-    return lambda at: (high - at) - ca.if_else(at - ankle < 0, (high - at) - (at - low), 0)
 
 
 def _tilt(ground: Wrench, height: float) -> SX:
