@@ -86,14 +86,6 @@ class Rollout(NamedTuple):
     place: MX  # (2, m) of the base [m]
 
 
-class QuantumInputs(NamedTuple):
-    """What a rollout needs besides gains and torso pitch; columns are quanta."""
-
-    desired: MX  # (18, m + 1) link angles and rates at the ends of all quanta
-    given: MX  # (n, m), see GIVEN
-    place: MX  # (2, m) of the base at the end of each quantum [m]
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedLoop:
     """Closed loop over whole quanta of time."""
@@ -117,8 +109,8 @@ class ClosedLoop:
         """The hip; or of the stance foot the ankle, or the tip of the toe where the foot turns about it."""
         return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
 
-    def inputs(self, point: Point, ops: Nonsmooth) -> QuantumInputs:
-        """Return the desired motion and the other inputs of all quanta."""
+    def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX, MX]:
+        """Return desired angles and rates (18, m + 1) of the links at the ends of all quanta, ``GIVEN``, and the base's places."""
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
@@ -152,7 +144,7 @@ class ClosedLoop:
             ca.repmat(point["spin_in_zmp"], 1, self.quanta),
             DM(N, self.quanta),
         )
-        return QuantumInputs(desired, given, place[:, 1:])
+        return desired, given, place[:, 1:]
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
         """Return states, torques and ZMP for tuned K_p (gains,), K_d (gains,) >= 0 and desired torso pitch."""

@@ -23,8 +23,7 @@ from nlp_gait.gaits.stairs.planar_biped import (
     LINKS,
     MOVING,
     PlanarLink,
-    link_angles,
-    loads,
+    make_loads,
     points,
     rod,
     toe_foot_biped,
@@ -210,13 +209,13 @@ def make_standing_step(
 
     Angles q (T, 7) of the moving links are absolute [rad]; the ground's forces act on the rear toe and sole joint, (T, 2) [N].
     """
-    torque, stance, pressure, toe_x, sole_x = (
-        np.array(part).T for part in _loads().map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
-    )
-    carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * toe_x[:, 0] + sole[:, 1] * sole_x[:, 0]
-    whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
+    found = make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
+    torque, stance, pressure = (np.array(part).T for part in found)
     flat = np.zeros((len(t), len(LINKS) - len(MOVING)))
     q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
+    *_, toe_x, sole_x = (np.array(part)[0] for part in _places().map(len(t))(q.T))
+    carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * toe_x + sole[:, 1] * sole_x
+    whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
     tau = joint_torques(torque, _stance_toe_torque(stance[:, 1], pressure[:, 0]))
     return StepMotion(t, q, qd, qdd, tau, carried / whole, double_support_s)
 
@@ -224,7 +223,7 @@ def make_standing_step(
 def compute_ground_force(q: Array, qd: Array, qdd: Array) -> Array:
     """Return the ground force (T, 2) on the whole robot [N] from the motion of the moving links (T, 7)."""
     nothing = np.zeros((2, len(q)))
-    return np.array(_loads().map(len(q))(q.T, qd.T, qdd.T, nothing, nothing)[1]).T
+    return np.array(make_loads("T", "S").map(len(q))(q.T, qd.T, qdd.T, nothing, nothing)[1]).T
 
 
 def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, double_support_s: float) -> StepMotion:
@@ -240,7 +239,7 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
 
 
 def _signals(step: StepMotion, rise: float) -> Signals:
-    hip, ankle, stance_ankle = (np.array(part).T for part in _places().map(len(step.t))(step.q.T))
+    hip, ankle, stance_ankle, *_ = (np.array(part).T for part in _places().map(len(step.t))(step.q.T))
     lean = _forward_turns(step.q, 1.0)["UH"]  # from upright, forward
     still = np.zeros_like(lean)
     rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
@@ -283,17 +282,7 @@ def _stair(at: NumericPoint) -> tuple[float, float]:
 
 
 @cache
-def _loads() -> ca.Function:
-    """Function of one instant: ``loads``, and the x positions of the rear foot's points."""
-    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
-    rear = {"T": SX.sym("toe", 2), "S": SX.sym("sole", 2)}
-    found = points(link_angles(q), SX(2, 1))
-    outputs = [*loads(q, qd, qdd, rear), found["T"][0], found["S"][0]]
-    return ca.Function("loads", [q, qd, qdd, *rear.values()], ca.cse(outputs))
-
-
-@cache
 def _places() -> ca.Function:
     q = SX.sym("q", len(LINKS))
     found = points(q, SX(2, 1))
-    return ca.Function("places", [q], [found["H"], found["A"], found["A'"]])
+    return ca.Function("places", [q], [found["H"], found["A"], found["A'"], found["T"][0], found["S"][0]])

@@ -18,7 +18,7 @@ from nlp_gait.gaits.stairs.planar_biped import (
     MOVING,
     StanceLoads,
     link_angles,
-    loads,
+    make_loads,
     points,
     toe_foot_biped,
 )
@@ -76,14 +76,8 @@ class IdealModel:
     def _loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
         n = self.intervals
         toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
-        return StanceLoads(*self._interval.map(n)(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
-
-    @cached_property
-    def _interval(self) -> ca.Function:
-        q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
-        toe, sole = SX.sym("toe", 2), SX.sym("sole", 2)
-        found = loads(q, qd, qdd, {"T": toe, "S": sole})
-        return ca.Function("loads", [q, qd, qdd, toe, sole], ca.cse(list(found)))
+        at_intervals = make_loads("T", "S").map(n)
+        return StanceLoads(*at_intervals(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
 
     @cached_property
     def _instant(self) -> ca.Function:

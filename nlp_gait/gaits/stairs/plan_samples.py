@@ -11,7 +11,7 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Point
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, link_angles, loads, points
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, link_angles, make_loads, points
 from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind, posture, stair_height
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.gaits.stairs.support import compute_balance
@@ -129,15 +129,6 @@ def phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
     return ca.horzcat(*s), np.hstack(passing)
 
 
-@cache
-def _dynamics() -> ca.Function:
-    """Function of (q, qd, qdd, force on the rear toe) to ``loads``; the same in every interpretation."""
-    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
-    toe = SX.sym("toe", 2)
-    found = loads(q, qd, qdd, {"T": toe})
-    return ca.Function("loads", [q, qd, qdd, toe], list(found))
-
-
 def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample to the fields of ``PlanSamples``.
 
@@ -148,7 +139,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     inputs, plan, stair, step = _make_symbols(ops, kind)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
-    dynamics = _dynamics()
+    dynamics = make_loads("T")
     support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))

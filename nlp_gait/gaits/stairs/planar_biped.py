@@ -224,3 +224,11 @@ def loads(q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
     foot = sum((rod(link).mass_kg * GRAVITY * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
     load = ca.fmax(stance[1], LEAST_LOAD * weight)
     return StanceLoads(torque, stance, (foot - torque[0]) / load)
+
+
+@cache
+def make_loads(*rear: str) -> ca.Function:
+    """Return the function of q, qd, qdd (7,) and forces (2,) on points of the rear foot, T or S, to ``loads``."""
+    q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
+    forces = {point: SX.sym({"T": "toe", "S": "sole"}[point], 2) for point in rear}
+    return ca.Function("loads", [q, qd, qdd, *forces.values()], ca.cse([*loads(q, qd, qdd, forces)]))
