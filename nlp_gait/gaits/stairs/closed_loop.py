@@ -110,7 +110,7 @@ class ClosedLoop:
         return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
 
     def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX, MX]:
-        """Return desired angles and rates (18, m + 1) of the links at the ends of all quanta, ``GIVEN``, and the base's places."""
+        """Return desired angles and rates (18, m + 1) of the links at the ends of quanta, ``GIVEN``, and the base's places."""
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
