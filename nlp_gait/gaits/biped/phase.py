@@ -14,6 +14,7 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Array, Assembly, Grid, InstantPoint, NumericPoint, Parameter, Signals, vector_columns
 from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
+from nlp_gait.formulation.gait_problem import Start
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
@@ -54,6 +55,7 @@ class Phase:
     goal: Goal = Goal()  # what it minimises
     state: tuple[Parameter, ...] = ()  # at the start, if it is measured
     kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
+    start: Start | None = None  # start points; None for any within the bounds
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -22,6 +22,7 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
+SINGLE, DOUBLE = "single support: least mean power", "double support: least mean power"
 DRAWS = 50  # of a start point, at most
 
 
@@ -57,14 +58,12 @@ def make_phase_limits(body: Body, balance: limits.BalanceMargins, *, solved: boo
     )
 
 
-def make_phase_problem(
-    name: str, title: str, phase: Phase, *, start: Start | None = None, searchable: bool = True
-) -> GaitProblem:
+def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool = True) -> GaitProblem:
     """Return the problem of one phase; its name is without the robot's family, its title without the robot.
 
-    Without ``start`` any point within the bounds is a start point; only gradient methods solve a problem that is not searchable.
+    Only gradient methods solve a problem that is not searchable.
     """
-    body = phase.body
+    body, start = phase.body, phase.start
     if not body.closed_form:
         usual = [body.narrow(variable) for variable in phase.variables]
         start = make_start_within_reach(usual, phase.known[1:], lambda at: phase.sample(at, Exact()).reach, start)

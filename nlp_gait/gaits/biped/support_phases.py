@@ -11,27 +11,19 @@ from typing import Generic, NamedTuple, TypeAlias, TypeVar
 import casadi as ca
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import GaitProblem, Grid, InstantPoint
+from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
-from nlp_gait.gaits.biped.curves import PhaseTrajectory, Splines, hip_on_spline
+from nlp_gait.gaits.biped.curves import Splines, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Limit, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
-from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import make_phase_limits
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Foot, Robot
+from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.trajectories import (
-    Motion,
-    add_motions,
-    constant_motion,
-    cubic,
-    parabola_lift,
-    resting_point,
-    stack,
-)
 
 # Least mean margins: 0.05 m and 0.02 m on NAO's sole of 0.15 m by 0.08 m (section 4.1); 0.08 m in the box of 0.21 m by 0.18 m
 # around both soles (section 4.2).
@@ -129,36 +121,6 @@ def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
     return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)
 
 
-def plan_single_support(
-    body: Body,
-    step_m: float,
-    grid: Grid,
-    trajectory: PhaseTrajectory,
-    goal: Goal,
-    derivatives: Derivatives = "analytic",
-) -> GaitProblem:
-    """Return the problem of single support; for the options see ``gaits.nao``."""
-    splines = body.make_splines("ssp", trajectory)
-    phase = make_single_support_phase(body, step_m, splines, grid, goal, derivatives)
-    return make_phase_problem("ssp", "single support: least mean power", phase, start=splines.start_of(phase.names))
-
-
-def plan_double_support(
-    body: Body,
-    step_m: float,
-    grid: Grid,
-    trajectory: PhaseTrajectory,
-    goal: Goal,
-    sharing: LoadSharing,
-    derivatives: Derivatives = "analytic",
-) -> GaitProblem:
-    """Return the problem of double support; for the options see ``gaits.nao``."""
-    splines = body.make_splines("dsp", trajectory)
-    phase = make_double_support_phase(body, step_m, splines, sharing, grid, goal, derivatives)
-    start = sharing.start(phase.names, splines.start_of(phase.names))
-    return make_phase_problem("dsp", "double support: least mean power", phase, start=start)
-
-
 def make_single_support_phase(
     body: Body, step_m: float, splines: Splines, grid: Grid, goal: Goal, derivatives: Derivatives = "analytic"
 ) -> Phase:
@@ -166,11 +128,13 @@ def make_single_support_phase(
     stance = place_stance(body, step_m)
     left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
 
-    def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
+    def swing(at: InstantPoint, more: Mapping[str, trajectories.Motion], height: float, s: SX) -> trajectories.Motion:
         """The paper's motion of the right foot at a height, and what its curves add."""
         time, (begin, end) = read_duration(at, "ssp"), stance.swing_x
         paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
-        return add_motions(paper, stack(more["foot_x"], constant_motion(0.0), more["foot_z"]))
+        return trajectories.add_motions(
+            paper, trajectories.stack(more["foot_x"], trajectories.constant_motion(0.0), more["foot_z"])
+        )
 
     def sole(at: InstantPoint, s: SX) -> SX:
         return swing(at, splines.motions(at, read_duration(at, "ssp"), s), 0.0, s).position
@@ -201,7 +165,7 @@ def make_double_support_phase(
 ) -> Phase:
     """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
     soles = place_soles(body, step_m)
-    ankles = {side: resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
+    ankles = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
     balance, ends = limit_to_box(make_support_box(body.robot, soles)), hip_ends(body, soles)
     return _make_support_phase(
         body, "dsp", splines, ends, lambda at, more, s: ankles, balance, (), sharing, grid, goal, derivatives
@@ -213,7 +177,7 @@ def _make_support_phase(
     name: PhaseName,
     splines: Splines,
     hip_places: tuple[Point2, Point2],
-    ankles: Callable[[InstantPoint, Mapping[str, Motion], SX], Mapping[str, Motion]],
+    ankles: Callable[[InstantPoint, Mapping[str, trajectories.Motion], SX], Mapping[str, trajectories.Motion]],
     balance: BalanceMargins,
     clearance: tuple[Limit, ...],
     sharing: LoadSharing,
@@ -235,10 +199,11 @@ def _make_support_phase(
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
 
     own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
-    curve_limits = body.make_curve_limits(name, splines.count, state)
+    variables, curve_limits = (*hip, *body.angle_variables, *own), body.make_curve_limits(name, splines.count, state)
+    names = [variable.name for variable in variables]
     return Phase(
         body=body,
-        variables=(*hip, *body.angle_variables, *own),
+        variables=variables,
         duration=TIMES[name],
         plan=sharing.add_to(plan),
         loads=sharing.loads,
@@ -248,14 +213,19 @@ def _make_support_phase(
         goal=goal,
         state=measured,
         kinks=splines.kinks,
+        start=sharing.start(names, splines.start_of(names)),
     )
 
 
-def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
+def swing_foot(
+    start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX
+) -> trajectories.Motion:
     """Return the motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
-    forward = cubic(start_x, end_x, SX(0), SX(0), duration, phase)
-    rise = parabola_lift(forward, start_x, end_x, lift)
-    return stack(forward, constant_motion(y), rise._replace(position=rise.position + ankle_height))
+    forward = trajectories.cubic(start_x, end_x, SX(0), SX(0), duration, phase)
+    rise = trajectories.parabola_lift(forward, start_x, end_x, lift)
+    return trajectories.stack(
+        forward, trajectories.constant_motion(y), rise._replace(position=rise.position + ankle_height)
+    )
 
 
 def make_single_support_loads(body: Body) -> Loader:

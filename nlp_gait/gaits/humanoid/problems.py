@@ -12,9 +12,9 @@ from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
-from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal
+from nlp_gait.gaits.biped.phase_problem import DOUBLE, SINGLE, Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
-from nlp_gait.gaits.biped.support_phases import plan_double_support, plan_single_support
+from nlp_gait.gaits.biped.support_phases import make_double_support_phase, make_single_support_phase
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.humanoid.turning import check_turns
@@ -42,7 +42,8 @@ def humanoid_ssp(
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
     step_m = body.check_step_length(step_length_m)
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
-    return plan_single_support(body, step_m, grid, trajectory, goal)
+    phase = make_single_support_phase(body, step_m, body.make_splines("ssp", trajectory), grid, goal)
+    return make_phase_problem("ssp", SINGLE, phase)
 
 
 @maker
@@ -68,7 +69,8 @@ def humanoid_dsp(
     step_m = body.check_step_length(step_length_m)
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
-    return plan_double_support(body, step_m, grid, trajectory, goal, sharing)
+    phase = make_double_support_phase(body, step_m, body.make_splines("dsp", trajectory), sharing, grid, goal)
+    return make_phase_problem("dsp", DOUBLE, phase)
 
 
 @maker

@@ -17,17 +17,7 @@ from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
-from nlp_gait.gaits.nao.joints import (
-    ARM_JOINTS,
-    HELD_ARM_ANGLES,
-    JOINTS,
-    KNEES,
-    LEG_JOINTS,
-    PLANNED_JOINTS,
-    RESTING_ARM_ANGLES,
-    YAW_PITCHES,
-    measure_leg,
-)
+from nlp_gait.gaits.nao import joints as nao_joints
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import partner, point_masses, weld
 from nlp_gait.symbolic.kinematics import leg_angles
@@ -81,13 +71,13 @@ def load_nao(robot: str) -> Robot:
     """
     loaded = load_robot(robot)
     try:
-        for joint in JOINTS:
+        for joint in nao_joints.JOINTS:
             loaded.joint(joint)
     except UnknownNameError as error:
         raise InputError(f"robot {loaded.name!r} does not suit the NAO problems: {error}") from error
-    welded = weld(loaded, [joint for joint in loaded.joints if joint not in JOINTS])
+    welded = weld(loaded, [joint for joint in loaded.joints if joint not in nao_joints.JOINTS])
     for side in "LR":
-        measure_leg(welded, side)
+        nao_joints.measure_leg(welded, side)
     return welded
 
 
@@ -104,14 +94,14 @@ def upright_plan(
     joints: dict[str, Motion] = {}
     reach = []
     for side, ankle in ankles.items():
-        geometry = measure_leg(robot, side)
+        geometry = nao_joints.measure_leg(robot, side)
         (at, *rates), (hip_at, *hip_rates) = ankle, hip
         moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
         hip_to_ankle = Motion(at - hip_at - DM(geometry.hip_m), *moving)
         leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
-        rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(LEG_JOINTS)))
+        rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
         joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
-        joints |= {f"{side}{name}": row for name, row in zip(LEG_JOINTS, rows, strict=True)}
+        joints |= {f"{side}{name}": row for name, row in zip(nao_joints.LEG_JOINTS, rows, strict=True)}
         reach.append(leg.reach)
     places = {side: ankle.position for side, ankle in ankles.items()}
     return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=vertcat(*reach))
@@ -121,13 +111,15 @@ def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX
     """Return the joint motions of both arms: those in ``swing`` as cubics from rest to rest [rad], the others held."""
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
-    return {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | moved
+    return {name: constant_motion(angle) for name, angle in nao_joints.HELD_ARM_ANGLES.items()} | moved
 
 
 def parse_nao_motors(text: str, robot: Robot) -> Motors:
     """Return the features of NAO's motors that an option's text lists."""
     features, coupling = parse_features(text), AnkleCoupling()
-    return Motors(features=features, robot=robot, joints=JOINTS, shared=YAW_PITCHES, coupling=coupling)
+    return Motors(
+        features=features, robot=robot, joints=nao_joints.JOINTS, shared=nao_joints.YAW_PITCHES, coupling=coupling
+    )
 
 
 class AnkleCoupling(Limit):
@@ -195,11 +187,11 @@ class NaoBody(Body):
         }
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
-        arms = {**{name: constant_motion(angle) for name, angle in RESTING_ARM_ANGLES.items()}, **angles}
+        arms = {**{name: constant_motion(angle) for name, angle in nao_joints.RESTING_ARM_ANGLES.items()}, **angles}
         return upright_plan(self.robot, hip, ankles, arms, margin, ops)
 
     def compute_cosines(self, q: MX) -> MX:
-        return cos(q[[JOINTS.index(knee) for knee in KNEES], :])
+        return cos(q[[nao_joints.JOINTS.index(knee) for knee in nao_joints.KNEES], :])
 
     def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
         """Return the balance margins in x and y on the left sole.
@@ -245,7 +237,7 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
     ``gaits.biped.motors``.
     """
     simulated = load_nao(robot)
-    left, right = (measure_leg(simulated, side) for side in "LR")
+    left, right = (nao_joints.measure_leg(simulated, side) for side in "LR")
     leg_length = left.thigh_m + left.tibia_m
     ground = left.ankle_height_m - left.hip_m[2]
     return NaoBody(
@@ -254,17 +246,19 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
         full=load_robot(robot),
         simulated=simulated,
         motors=parse_nao_motors(motors, simulated if rotational_inertia else point_masses(simulated)),
-        joints=JOINTS,
-        planned=PLANNED_JOINTS,
-        images=tuple(map(partner, JOINTS)),
-        leg_joints={side: tuple(joint for joint in JOINTS if joint.startswith(side)) for side in "LR"},
+        joints=nao_joints.JOINTS,
+        planned=nao_joints.PLANNED_JOINTS,
+        images=tuple(map(partner, nao_joints.JOINTS)),
+        leg_joints={side: tuple(joint for joint in nao_joints.JOINTS if joint.startswith(side)) for side in "LR"},
         coordinates=(ARM_COORDINATE,),
         upright=find_upright_links(simulated),
         gravity=GRAVITY,
         feet_y=(left.hip_m[1], right.hip_m[1]),
         leg_length_m=leg_length,
         arms=arms,
-        separate_joints=tuple(side + joint for side in "LR" for joint in ARM_JOINTS) if arms == "separate" else (),
+        separate_joints=tuple(side + joint for side in "LR" for joint in nao_joints.ARM_JOINTS)
+        if arms == "separate"
+        else (),
         hip_height_m=(
             round(ground + LEAST_HEIGHT_SHARE * leg_length, 3),
             round(ground + GREATEST_HEIGHT_SHARE * leg_length, 3),

@@ -20,7 +20,7 @@ from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.phase_problem import Criterion, make_goal, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import DOUBLE, SINGLE, Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.recorded_cycle import (
     RecordedCycles,
     RecordedGait,
@@ -31,10 +31,9 @@ from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, Recor
 from nlp_gait.gaits.biped.support_phases import (
     hip_ends,
     make_double_support_phase,
+    make_single_support_phase,
     place_soles,
     place_stance,
-    plan_double_support,
-    plan_single_support,
 )
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
@@ -71,8 +70,9 @@ def nao_ssp(
         places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
         power_form = power_form_maker(body.robot, partial(single_support_instants, *places))
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
-    problem = plan_single_support(body, step_length_m, grid, trajectory, goal, derivatives)
-    return replace(problem, power_form=power_form)
+    splines = body.make_splines("ssp", trajectory)
+    phase = make_single_support_phase(body, step_length_m, splines, grid, goal, derivatives)
+    return replace(make_phase_problem("ssp", SINGLE, phase), power_form=power_form)
 
 
 @maker
@@ -113,8 +113,9 @@ def nao_dsp(
         power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
-    problem = plan_double_support(body, step_length_m, grid, trajectory, goal, sharing, derivatives)
-    return replace(problem, power_form=power_form)
+    splines = body.make_splines("dsp", trajectory)
+    phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, goal, derivatives)
+    return replace(make_phase_problem("dsp", DOUBLE, phase), power_form=power_form)
 
 
 @maker
@@ -229,7 +230,7 @@ def nao_ssp_free(
         return fit_joints(trajectory, make_planned(), draw_uniform(phase.free.paper.names, parameters, rng))
 
     title = "single support with free joints: least mean power"
-    return make_phase_problem("ssp-free", title, phase, start=start, searchable=False)
+    return make_phase_problem("ssp-free", title, replace(phase, start=start), searchable=False)
 
 
 @maker
@@ -257,8 +258,9 @@ def nao_dsp_free(
     splines, sharing = body.make_splines("dsp", trajectory), share_load(body, torso_share, load_degree)
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
     phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, Goal())
-    title, start = "double support with a leaning torso: least mean power", splines.start_of(phase.names)
-    return make_phase_problem("dsp-free", title, phase, start=sharing.start(phase.names, start), searchable=False)
+    return make_phase_problem(
+        "dsp-free", "double support with a leaning torso: least mean power", phase, searchable=False
+    )
 
 
 GAITS = ("nao-ssp", "nao-dsp", "nao-cycle")

@@ -12,17 +12,8 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Point
+from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED, solve_legs_by_network
-from nlp_gait.gaits.stairs.planar_biped import (
-    GRAVITY,
-    LEAST_LOAD,
-    LINKS,
-    biped_dynamics,
-    centres,
-    points,
-    rod,
-    toe_foot_biped,
-)
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, posture, stair_height
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic import quantised
@@ -37,14 +28,14 @@ Base = Literal["stance-foot", "hip"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 CONTACTS = ("T", "S", "A", "S'", "T'", "A'")  # points that may touch the ground, all but the base
-N = len(LINKS)
+N = len(biped.LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
 # k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
 # slope and the share of the links' spin in the ZMP, torques besides the controller's. Nothing is ever differentiated with
 # respect to it.
 GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
 GIVEN |= {"base": 6, "slope": 1, "spin": 1, "torque": N}
-TORSO = LINKS.index("UH")
+TORSO = biped.LINKS.index("UH")
 # Controlled angles as sums of link angles, in the order of LINKS. Joint angles are between links; the ninth is that of the stance
 # sole, whose torque the ground gives. As printed, knees are relative to thighs (27), (28), other angles from the forward axis.
 _KNEES = {"knee": {"KA": 1, "HK": -1}, "knee'": {"K'A'": 1, "HK'": -1}}
@@ -65,15 +56,15 @@ ANGLES: Mapping[Coordinates, Mapping[str, Mapping[str, int]]] = {
         "knee": _KNEES["knee"],
         "HK'": {"HK'": 1},
         "knee'": _KNEES["knee'"],
-        **{link: {link: 1} for link in LINKS[4:]},
+        **{link: {link: 1} for link in biped.LINKS[4:]},
     },
-    "link": {link: {link: 1} for link in LINKS},
+    "link": {link: {link: 1} for link in biped.LINKS},
 }
 
 
 def measure_joints(coordinates: Coordinates) -> DM:
     """Return the matrix (9, 9) from link angles to the controlled angles."""
-    return DM([[parts.get(link, 0) for link in LINKS] for parts in ANGLES[coordinates].values()])
+    return DM([[parts.get(link, 0) for link in biped.LINKS] for parts in ANGLES[coordinates].values()])
 
 
 class Rollout(NamedTuple):
@@ -131,7 +122,7 @@ class ClosedLoop:
         )
         acted = slice(1, None) if self.scheme == "implicit" else slice(None, -1)
         if self.base == "stance-foot":
-            ahead = toe_foot_biped().foot_m * (self.base_point == "T'")
+            ahead = biped.toe_foot_biped().foot_m * (self.base_point == "T'")
             place, speed = MX(DM([[ahead] * (self.quanta + 1), [0] * (self.quanta + 1)])), MX(2, self.quanta + 1)
         base = ca.vertcat(place[:, :-1], speed[:, acted], (speed[:, 1:] - speed[:, :-1]) / QUANTUM)
         on_slope = ca.fmax(DM(times[None, 1:]) < point["t2_s"], point["slope_in_single_support"])
@@ -158,7 +149,7 @@ class ClosedLoop:
     def find_stance_ankle(self, rollout: Rollout) -> MX:
         """Return its place (2, m) in a rollout [m]."""
         q, place = SX.sym("q", N), SX.sym("place", 2)
-        found = points(q, place, self.base_point)["A'"]
+        found = biped.points(q, place, self.base_point)["A'"]
         return ca.Function("ankle", [q, place], [found]).map(self.quanta)(rollout.state[:N, :], rollout.place)
 
     @cached_property
@@ -174,9 +165,9 @@ class ClosedLoop:
         """Return the equations of the acceleration within one quantum."""
         q, v = state
         place, speed, push = ca.vertsplit(parts["base"], [0, 2, 4, 6])
-        found = points(q, place, self.base_point)
-        motion = biped_dynamics(q, v, q, self.base_point)
-        momentum = sum((rod(link).mass_kg * middle for link, middle in centres(found).items()), SX(2, 1))
+        found = biped.points(q, place, self.base_point)
+        motion = biped.biped_dynamics(q, v, q, self.base_point)
+        momentum = sum((biped.rod(link).mass_kg * middle for link, middle in biped.centres(found).items()), SX(2, 1))
         stair = Stair(parts["size"][0], parts["size"][1])
         contacts = [
             Contact(
@@ -200,22 +191,24 @@ class ClosedLoop:
         """Function of (state, next state, given, tuned) to torques (9,) and ZMP, with a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
-        G = biped_dynamics(state.q, state.v, state.q, self.base_point).G
+        G = biped.biped_dynamics(state.q, state.v, state.q, self.base_point).G
         acted = following if self.scheme == "implicit" else state
         torque = quantised.controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
         place, push = parts["base"][:2], parts["base"][4:]
-        for link, middle in centres(points(state.q, place, self.base_point)).items():
-            mass = rod(link).mass_kg
+        for link, middle in biped.centres(biped.points(state.q, place, self.base_point)).items():
+            mass = biped.rod(link).mass_kg
             velocity = ca.jtimes(middle, state.q, state.v)
             a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
-            spin = parts["spin"] * acceleration[LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
-            weight += mass * (a[1] + GRAVITY)
+            spin = parts["spin"] * acceleration[biped.LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
+            weight += mass * (a[1] + biped.GRAVITY)
             pull += mass * a[0]
-            moment += mass * (middle[0] * (a[1] + GRAVITY) - middle[1] * a[0]) - rod(link).inertia_kgm2 * spin
-        least = LEAST_LOAD * toe_foot_biped().mass_kg * GRAVITY
+            moment += (
+                mass * (middle[0] * (a[1] + biped.GRAVITY) - middle[1] * a[0]) - biped.rod(link).inertia_kgm2 * spin
+            )
+        least = biped.LEAST_LOAD * biped.toe_foot_biped().mass_kg * biped.GRAVITY
         zmp = moment / ca.fmax(weight - parts["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
             "outcome",

@@ -17,18 +17,7 @@ from casadi import SX
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
 from nlp_gait.formulation.display import LEFT, RIGHT, SIMULATED, TRUNK, Limb, Skeleton, Tread
 from nlp_gait.gaits.several_steps import repeat_steps
-from nlp_gait.gaits.stairs.planar_biped import (
-    GRAVITY,
-    JOINT_RATES,
-    LINKS,
-    MOVING,
-    PlanarLink,
-    make_loads,
-    points,
-    rod,
-    toe_foot_biped,
-)
-from nlp_gait.gaits.stairs.planar_biped import JOINTS as MODEL_JOINTS
+from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.stair import SETBACK
 from nlp_gait.robots import Foot, Joint, Link, Robot
 from nlp_gait.robots.robot import Vector
@@ -59,15 +48,15 @@ MODEL_JOINT = {
 @cache
 def rigid_bodies() -> Robot:
     """Return the tree from the torso, whose frame is at the hip; in the zero pose it stands upright with straight legs."""
-    biped = toe_foot_biped()
-    levers = {"Hip": rod("HK").length_m + rod("KA").length_m, "Knee": rod("KA").length_m}
-    levers |= {"Ankle": biped.foot_m, "Toe": biped.toe_m}
-    links = {TORSO: _link(TORSO, rod("UH"), (0.0, 0.0, 1.0))}
+    paper = biped.toe_foot_biped()
+    levers = {"Hip": biped.rod("HK").length_m + biped.rod("KA").length_m, "Knee": biped.rod("KA").length_m}
+    levers |= {"Ankle": paper.foot_m, "Toe": paper.toe_m}
+    links = {TORSO: _link(TORSO, biped.rod("UH"), (0.0, 0.0, 1.0))}
     joints, feet, toes = {}, {}, {}
     for letter, (side, _) in SIDES.items():
         parent, origin = TORSO, (0.0, 0.0, 0.0)
         for joint, (part, paper_name) in LEG.items():
-            link, name = rod(paper_name), f"{side} {part}"
+            link, name = biped.rod(paper_name), f"{side} {part}"
             along: Vector = (0.0, 0.0, -1.0) if joint in ("Hip", "Knee") else (1.0, 0.0, 0.0)
             links[name] = _link(name, link, along)
             joints[f"{letter}{joint}"] = Joint(
@@ -79,14 +68,16 @@ def rigid_bodies() -> Robot:
                 limits_rad=RANGE,
                 planning_limits_rad=RANGE,
                 velocity_limit_rad_s=RATE_LIMIT,
-                torque_limit_Nm=biped.mass_kg * GRAVITY * levers[joint],
+                torque_limit_Nm=paper.mass_kg * biped.GRAVITY * levers[joint],
             )
             parent, origin = name, (link.length_m * along[0], link.length_m * along[1], link.length_m * along[2])
-        feet[side], toes[side] = (_plate(f"{side} {part}", rod(of).length_m) for part, of in (LEG["Ankle"], LEG["Toe"]))
+        feet[side], toes[side] = (
+            _plate(f"{side} {part}", biped.rod(of).length_m) for part, of in (LEG["Ankle"], LEG["Toe"])
+        )
     return Robot(
-        name=biped.name,
+        name=paper.name,
         description="Planar biped of nine rods with toes",
-        sources={"masses and lengths": biped.source, "inertias": biped.inertia},
+        sources={"masses and lengths": paper.source, "inertias": paper.inertia},
         root=TORSO,
         links=links,
         joints=joints,
@@ -110,7 +101,7 @@ def joint_angles(q: Array, *, rates: bool = False) -> Array:
 
 def joint_torques(model: Array, stance_toe: Array) -> Array:
     """Return joint torques (T, 8) from ``loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
-    found = {name: sense * model[:, MODEL_JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
+    found = {name: sense * model[:, biped.JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
     return np.stack([found.get(name, stance_toe) for name in JOINTS], axis=1)
 
 
@@ -119,13 +110,13 @@ def _forward_turns(q: Array, share: float) -> dict[str, Array]:
     upright = share * np.pi / 2
     zero = {"UH": -upright, "AS": 0.0, "ST": 0.0}
     turns = {}
-    for i, link in enumerate(LINKS):
+    for i, link in enumerate(biped.LINKS):
         sense = -1.0 if link == "UH" else 1.0
         turns[link] = sense * q[:, i] - zero.get(link.replace("'", ""), upright)
     return turns
 
 
-def _link(name: str, rod: PlanarLink, along: Vector) -> Link:
+def _link(name: str, rod: biped.PlanarLink, along: Vector) -> Link:
     """Return a rod from its frame's origin along an axis; equal inertia about all axes, as it turns about one only."""
     x, y, z = (rod.length_m / 2 * part for part in along)
     moment = rod.inertia_kgm2
@@ -142,10 +133,10 @@ def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     """Return the skeleton of the robot on its stair."""
     history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
     samples = len(signals.arrays["t"])
-    if history.shape[1] == len(MOVING):
+    if history.shape[1] == len(biped.MOVING):
         history = np.hstack([history, signals.arrays.get("stance_foot", np.zeros((samples, 2)))])
-    q, ankle = SX.sym("q", len(LINKS)), SX.sym("ankle", 2)
-    found = points(q, ankle)
+    q, ankle = SX.sym("q", len(biped.LINKS)), SX.sym("ankle", 2)
+    found = biped.points(q, ankle)
     function = ca.Function("points", [q, ankle], list(found.values()))
     base = signals.arrays.get("stance_ankle", np.zeros((samples, 2)))
     values = dict(zip(found, function.map(samples)(history.T, base.T), strict=True))
@@ -198,7 +189,7 @@ def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repea
         return tuple(Tread(edge_m=k * tread - SETBACK, height_m=(k + 1) * rise) for k in range(steps + 1))
 
     return SimulationModel(
-        robot=rigid_bodies(), gravity=GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True
+        robot=rigid_bodies(), gravity=biped.GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True
     )
 
 
@@ -209,9 +200,9 @@ def make_standing_step(
 
     Angles q (T, 7) of the moving links are absolute [rad]; the ground's forces act on the rear toe and sole joint, (T, 2) [N].
     """
-    found = make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
+    found = biped.make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
     torque, stance, pressure = (np.array(part).T for part in found)
-    flat = np.zeros((len(t), len(LINKS) - len(MOVING)))
+    flat = np.zeros((len(t), len(biped.LINKS) - len(biped.MOVING)))
     q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
     *_, toe_x, sole_x = (np.array(part)[0] for part in _places().map(len(t))(q.T))
     carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * toe_x + sole[:, 1] * sole_x
@@ -223,7 +214,7 @@ def make_standing_step(
 def compute_ground_force(q: Array, qd: Array, qdd: Array) -> Array:
     """Return the ground force (T, 2) on the whole robot [N] from the motion of the moving links (T, 7)."""
     nothing = np.zeros((2, len(q)))
-    return np.array(make_loads("T", "S").map(len(q))(q.T, qd.T, qdd.T, nothing, nothing)[1]).T
+    return np.array(biped.make_loads("T", "S").map(len(q))(q.T, qd.T, qdd.T, nothing, nothing)[1]).T
 
 
 def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, double_support_s: float) -> StepMotion:
@@ -233,8 +224,8 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
     moment on the stance foot, which the ground takes. The state (T, 18) has the links' angles and rates.
     """
     q, qd = np.split(state, 2, axis=1)
-    between = torque[:, : len(MOVING)] @ np.linalg.inv(JOINT_RATES)
-    tau = joint_torques(between, torque[:, LINKS.index("S'T'")])
+    between = torque[:, : len(biped.MOVING)] @ np.linalg.inv(biped.JOINT_RATES)
+    tau = joint_torques(between, torque[:, biped.LINKS.index("S'T'")])
     return StepMotion(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure, double_support_s - t[0])
 
 
@@ -270,9 +261,9 @@ def _stance_toe_torque(load: Array, pressure: Array) -> Array:
 
     With the pressure ahead of the joint the toe carries the load; behind it, the toe needs no torque.
     """
-    biped = toe_foot_biped()
-    weight = biped.link("ST").mass_kg * GRAVITY * biped.toe_m / 2
-    return np.maximum(load * (pressure - biped.sole_m) - weight, 0.0)
+    paper = biped.toe_foot_biped()
+    weight = paper.link("ST").mass_kg * biped.GRAVITY * paper.toe_m / 2
+    return np.maximum(load * (pressure - paper.sole_m) - weight, 0.0)
 
 
 def _stair(at: NumericPoint) -> tuple[float, float]:
@@ -283,6 +274,6 @@ def _stair(at: NumericPoint) -> tuple[float, float]:
 
 @cache
 def _places() -> ca.Function:
-    q = SX.sym("q", len(LINKS))
-    found = points(q, SX(2, 1))
+    q = SX.sym("q", len(biped.LINKS))
+    found = biped.points(q, SX(2, 1))
     return ca.Function("places", [q], [found["H"], found["A"], found["A'"], found["T"][0], found["S"][0]])

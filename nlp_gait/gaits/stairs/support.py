@@ -7,16 +7,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import (
-    GRAVITY,
-    LEAST_LOAD,
-    LINKS,
-    centres,
-    direction,
-    rod,
-    sum_along_links,
-    toe_foot_biped,
-)
+from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.planned_motion import Posture, StairPlan, StepKind, landing_share
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -54,11 +45,13 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     """
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
     place, middles = _move_points(Motion(q, v, a), step.stance_ankle)
-    push = {link: rod(link).mass_kg * (middles[link][1] + ca.vertcat(0, GRAVITY)) for link in LINKS}
-    turn = {link: rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(LINKS)}
+    push = {link: biped.rod(link).mass_kg * (middles[link][1] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS}
+    turn = {
+        link: biped.rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(biped.LINKS)
+    }
     force = sum(push.values(), SX(2, 1))
-    load = ca.fmax(force[1], LEAST_LOAD * GRAVITY * toe_foot_biped().mass_kg)
-    points = sum((_moment(middles[link][0], push[link]) for link in LINKS), SX(0))
+    load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.toe_foot_biped().mass_kg)
+    points = sum((_moment(middles[link][0], push[link]) for link in biped.LINKS), SX(0))
     moment = points + sum(turn.values(), SX(0))
 
     sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
@@ -78,14 +71,14 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
         total = sum((_moment(middles[link][0] - place[joint], push[link]) + turn[link] for link in links), SX(0))
         torque.append(-sense * (total - share * _moment(back - place[joint], force)))
         rate.append(_joint_rate(name, v))
-    pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, LEAST_LOAD * load)
+    pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, biped.LEAST_LOAD * load)
     behind = heel if kind == "first" else double * rear
     return Balance(
         ca.vertcat(*torque),
         ca.vertcat(*torque) * ca.vertcat(*rate),
         (1 - share) * force,
         pressure,
-        points / ca.fmax(force[1] - slope * force[0], LEAST_LOAD * load),  # (eq. 49)
+        points / ca.fmax(force[1] - slope * force[0], biped.LEAST_LOAD * load),  # (eq. 49)
         ca.vertcat(behind, toe[0]),
     )
 
@@ -94,23 +87,23 @@ def _move_points(q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tup
     """Return places of all points, and places and accelerations of the links' centres."""
 
     def position(link: str) -> SX:
-        return rod(link).length_m * direction(link, q.position[LINKS.index(link)])
+        return biped.rod(link).length_m * biped.direction(link, q.position[biped.LINKS.index(link)])
 
     def acceleration(link: str) -> SX:
-        angle, rate, change = (part[LINKS.index(link)] for part in q)
-        normal = direction(link, angle + ca.pi / 2)
-        return rod(link).length_m * (change * normal - rate**2 * direction(link, angle))
+        angle, rate, change = (part[biped.LINKS.index(link)] for part in q)
+        normal = biped.direction(link, angle + ca.pi / 2)
+        return biped.rod(link).length_m * (change * normal - rate**2 * biped.direction(link, angle))
 
-    place = sum_along_links("A'", ankle.position, position)
-    pushed = centres(sum_along_links("A'", ankle.acceleration, acceleration))
-    return place, {link: (at, pushed[link]) for link, at in centres(place).items()}
+    place = biped.sum_along_links("A'", ankle.position, position)
+    pushed = biped.centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
+    return place, {link: (at, pushed[link]) for link, at in biped.centres(place).items()}
 
 
 def _joint_rate(name: str, v: SX) -> SX:
     """Return the rate of a joint from nine link rates: of the links on both its sides, torso counter-clockwise."""
     pairs = {"ankle'": ("K'A'", "A'S'"), "knee'": ("HK'", "K'A'"), "hip'": ("HK'", "UH"), "hip": ("HK", "UH")}
     pairs |= {"knee": ("KA", "HK"), "ankle": ("AS", "KA"), "toe": ("ST", "AS"), "toe'": ("A'S'", "S'T'")}
-    first, second = (v[LINKS.index(link)] for link in pairs[name])
+    first, second = (v[biped.LINKS.index(link)] for link in pairs[name])
     return first + second if "UH" in pairs[name] else first - second
 
 

@@ -15,17 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel
-from nlp_gait.formulation.display import (
-    LEFT,
-    RIGHT,
-    SIMULATED,
-    Limb,
-    Skeleton,
-    Sole,
-    make_flat_skeleton,
-    make_rectangle,
-)
+from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel, display
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, PointMassBiped, Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
 from nlp_gait.robots import Foot, Joint, Link, Robot
@@ -66,7 +56,7 @@ def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
             "left_foot": walked["left_ankle"],
             "right_foot": walked["right_ankle"],
         }
-        return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED)
+        return Signals(joints=JOINTS, arrays=arrays, columns=display.SIMULATED)
 
     return SimulationModel(robot=bodies, gravity=GRAVITY, repeats=True, motion=motion)
 
@@ -159,21 +149,23 @@ def _make_inverse_dynamics(bodies: Robot, side: str) -> ca.Function:
     return ca.Function("torques", motion, [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS)))])
 
 
-def make_skeleton(robot: PointMassBiped, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+def make_skeleton(robot: PointMassBiped, signals: Signals, parameters: Mapping[str, float]) -> display.Skeleton:
     """Return the stick figure of a motion; the robot turns to the left by ``turn_rad`` after each step."""
     arrays = signals.arrays
     waist, (left_stands, heading) = arrays["waist"], _follow_steps(arrays, parameters["turn_rad"])
     forward = np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
     across = np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=1)
-    outline = make_rectangle(-robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2)
+    outline = display.make_rectangle(
+        -robot.foot_back_m, robot.foot_front_m, -robot.foot_width_m / 2, robot.foot_width_m / 2
+    )
     limbs, soles = [], []
-    for side, sign, stands in ((LEFT, 0.5, left_stands), (RIGHT, -0.5, ~left_stands)):
+    for side, sign, stands in ((display.LEFT, 0.5, left_stands), (display.RIGHT, -0.5, ~left_stands)):
         hip, ankle = waist + sign * robot.hip_distance_m * across, arrays[f"{side}_ankle"]
         knee = _place_knee(hip, ankle, forward, robot.thigh_m, robot.shank_m)
-        limbs.append(Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
+        limbs.append(display.Limb(side=side, points=np.stack([waist, hip, knee, ankle], axis=1)))
         corners = ankle[:, None, :] + outline[:, :1] * forward[:, None, :] + outline[:, 1:2] * across[:, None, :]
-        soles.append(Sole(side=side, corners=corners, supports=stands))
-    return make_flat_skeleton(signals, limbs, soles)
+        soles.append(display.Sole(side=side, corners=corners, supports=stands))
+    return display.make_flat_skeleton(signals, limbs, soles)
 
 
 def _place_knee(hip: Array, ankle: Array, forward: Array, thigh: float, shank: float) -> Array:
