@@ -9,16 +9,23 @@ problem = gaitbench.load_front("ssp-power-time")  # two objectives; gaitbench.fr
 problem = gaitbench.generate("ssp", seed=3)  # the same as load("gb2:ssp:3"); gaitbench.families() has the others
 """
 
-from nlp_gait.gaitbench.facts import Definition as Definition
-from nlp_gait.gaitbench.facts import Evidence as Evidence
-from nlp_gait.gaitbench.facts import Features as Features
-from nlp_gait.gaitbench.facts import names as names
-from nlp_gait.gaitbench.fronts import FrontInstance as FrontInstance
-from nlp_gait.gaitbench.fronts import FrontQuality as FrontQuality
-from nlp_gait.gaitbench.fronts import fronts as fronts
-from nlp_gait.gaitbench.fronts import load_front as load_front
-from nlp_gait.gaitbench.generated import families as families
-from nlp_gait.gaitbench.generated import list_test_seeds as list_test_seeds
-from nlp_gait.gaitbench.instance import Instance as Instance
-from nlp_gait.gaitbench.instance import generate as generate
-from nlp_gait.gaitbench.instance import load as load
+from nlp_gait.gaitbench.facts import Definition, Evidence, Features, names
+from nlp_gait.gaitbench.fronts import FrontInstance, FrontQuality, fronts, load_front
+from nlp_gait.gaitbench.generated import families, list_test_seeds
+from nlp_gait.gaitbench.instance import Instance, generate, load
+
+__all__ = [
+    "Definition",
+    "Evidence",
+    "Features",
+    "FrontInstance",
+    "FrontQuality",
+    "Instance",
+    "families",
+    "fronts",
+    "generate",
+    "list_test_seeds",
+    "load",
+    "load_front",
+    "names",
+]
