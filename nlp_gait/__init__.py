@@ -51,16 +51,23 @@ _PUBLIC = {
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
 __all__ = sorted(_PLACES)
 # What lower packages use of higher ones, by name.
-_MAKERS = {
-    "nlp_gait.gaits.nao.problems": "nao-ssp nao-dsp nao-walk nao-ssp-free nao-dsp-free nao-cycle",
-    "nlp_gait.gaits.humanoid.problems": "humanoid-ssp humanoid-dsp humanoid-cycle humanoid-walk",
-    "nlp_gait.gaits.walk12.walk12_problem": "walk12",
-    "nlp_gait.gaits.stairs.plan": "stairs-plan",
-    "nlp_gait.gaits.stairs.track": "stairs-track",
-    "nlp_gait.gaits.stairs.ideal": "stairs-ideal",
-    "nlp_gait.gaitbench.suite_problem": "gaitbench",
+PROBLEMS |= {
+    "nao-ssp": "nlp_gait.gaits.nao.problems:nao_ssp",
+    "nao-dsp": "nlp_gait.gaits.nao.problems:nao_dsp",
+    "nao-walk": "nlp_gait.gaits.nao.problems:nao_walk",
+    "nao-ssp-free": "nlp_gait.gaits.nao.problems:nao_ssp_free",
+    "nao-dsp-free": "nlp_gait.gaits.nao.problems:nao_dsp_free",
+    "nao-cycle": "nlp_gait.gaits.nao.problems:nao_cycle",
+    "humanoid-ssp": "nlp_gait.gaits.humanoid.problems:humanoid_ssp",
+    "humanoid-dsp": "nlp_gait.gaits.humanoid.problems:humanoid_dsp",
+    "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:humanoid_cycle",
+    "humanoid-walk": "nlp_gait.gaits.humanoid.problems:humanoid_walk",
+    "walk12": "nlp_gait.gaits.walk12.walk12_problem:walk12",
+    "stairs-plan": "nlp_gait.gaits.stairs.plan:stairs_plan",
+    "stairs-track": "nlp_gait.gaits.stairs.track:stairs_track",
+    "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
+    "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
 }
-PROBLEMS |= {name: f"{module}:{name.replace('-', '_')}" for module, names in _MAKERS.items() for name in names.split()}
 FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
 FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
 FUNCTIONS["load_generated"] = "nlp_gait.gaitbench.instance:load_generated"

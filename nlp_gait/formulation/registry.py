@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 from casadi import MX, Function, vertcat
 
-from nlp_gait import user_code
+import nlp_gait.user_code as user_code
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
 from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
