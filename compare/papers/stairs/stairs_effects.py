@@ -29,15 +29,13 @@ LEARNED = ("closed-form cost", "network cost", "largest_angle_error_rad")
 def compute_effects(findings: StairsFindings) -> dict[str, Any]:
     """Return numbers for the table of differences, as text; those of plans by plan, in the order of the cases or as above."""
     cases = findings.cases
-    motions = {what: move(findings, what, DRAWN_CASE) for what in PLANS}
-    moments = {what: [_change_inertia(motions[what][0].arrays, share) for share in INERTIAS] for what in PLANS}
+    arrays = {what: move(findings, what, DRAWN_CASE)[0].arrays for what in PLANS}
+    moments = {what: [_change_inertia(arrays[what], share) for share in INERTIAS] for what in PLANS}
     planned = {name or OURS: _describe_plans(findings, name) for name in ("", *PLAN_CHOICES)}
     return {
         "inertia_J": {what: Series(energy for energy, _ in rows) for what, rows in moments.items()},
         "inertia_mm": {what: Series(margin for _, margin in rows) for what, rows in moments.items()},
-        "edge_mm": {
-            what: Series(measure_depth(findings, what, DRAWN_CASE, setback) for setback in SETBACKS) for what in PLANS
-        },
+        "edge_mm": {what: Series(measure_depth(findings, what, DRAWN_CASE, x) for x in SETBACKS) for what in PLANS},
         "zmp_gap_mm": {what: Series(measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
         "start_m_s": Series(measure_hip_speeds(findings, "jerk", case)[0] for case in cases),
         "centre_mm": {what: Series(_measure_centre(findings, what, case) for case in cases) for what in PLANS},

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STICKS = 29  # poses of a drawn step
+LIGHT, DARK = np.array([[0.75, 0.85, 0.95], [0.0, 0.45, 0.7]])  # blue, of the first and the last pose
 TRACKED_LINKS = LINKS[:7]  # q1 to q7
 # From joint angles to those of the paper, of which knees are relative (27), (28); of rows.
 PRINTED_ANGLES = (measure_joints("printed") @ ca.inv(measure_joints("joint"))).full().T
@@ -52,12 +53,9 @@ def draw_figures(findings: StairsFindings) -> dict[str, Figure]:
 def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
     """Treads from the rear ankle's on; an edge is a setback behind the ankle on its step."""
     tread, rise = step
-    corners = [(-0.25, 0.0)]
-    for k in range(1, count):
-        edge = k * tread - SETBACK
-        corners += [(edge, (k - 1) * rise), (edge, k * rise)]
-    corners.append(((count - 1) * tread + 0.35, (count - 1) * rise))
-    x, z = zip(*corners, strict=True)
+    edges = np.arange(1, count) * tread - SETBACK
+    x = np.concatenate([[-0.25], np.repeat(edges, 2), [(count - 1) * tread + 0.35]])
+    z = np.repeat(np.arange(count) * rise, 2)
     axes.plot(x, z, color="0.4", linewidth=1.0)
     axes.fill_between(x, z, min(z) - 0.05, color="0.92", linewidth=0)
     axes.set_aspect("equal")
@@ -88,17 +86,12 @@ def _draw_sticks(motion: tuple[Signals, dict[str, Array]], step: tuple[float, fl
         _draw_stair(axes, step, 2 if first else 3)
         lines = legs[side] + (np.zeros(2) if first else np.array(step))
         for k, pose in enumerate(poses):
-            axes.plot(*lines[pose].T, color=_shade(k / (STICKS - 1)), linewidth=0.8)
-        axes.plot(*lines[:, 0].T, color="#D55E00", linewidth=1.0)
-        axes.plot(*lines[:, -1].T, color="#009E73", linewidth=1.0)
+            axes.plot(*lines[pose].T, color=LIGHT + (DARK - LIGHT) * k / (STICKS - 1), linewidth=0.8)
+        for end, colour in ((0, "#D55E00"), (-1, "#009E73")):
+            axes.plot(*lines[:, end].T, color=colour, linewidth=1.0)
         axes.set_title(f"{leg} leg, {name}")
     figure.axes[0].set_ylabel("z [m]")
     return figure
-
-
-def _shade(share: float) -> tuple[float, float, float]:
-    """From light to dark blue."""
-    return 0.75 * (1 - share), 0.85 - 0.4 * share, 0.95 - 0.25 * share
 
 
 def _draw_ankle(arrays: Mapping[str, Array]) -> Figure:
@@ -108,15 +101,11 @@ def _draw_ankle(arrays: Mapping[str, Array]) -> Figure:
     t, place = t[keep], place[keep]
     velocity = np.gradient(place, t, axis=0)
     acceleration = np.gradient(velocity, t, axis=0)
-    for axes, values, unit in zip(
-        figure.subplots(2, 1, sharex=True),
-        (velocity, acceleration),
-        ("velocity [m/s]", "acceleration [m/s\u00b2]"),
-        strict=True,
-    ):
+    shown = {"velocity [m/s]": velocity, "acceleration [m/s\u00b2]": acceleration}
+    for axes, (label, values) in zip(figure.subplots(2, 1, sharex=True), shown.items(), strict=True):
         for column, axis in enumerate("xz"):
             axes.plot(t, values[:, column], label=axis)
-        axes.set_ylabel(unit)
+        axes.set_ylabel(label)
     figure.axes[0].set_title(f"Figs. 10, 11: swing ankle, case {DRAWN_CASE}")
     figure.axes[1].set_xlabel("time [s]")
     add_legend_below(figure)
@@ -184,13 +173,11 @@ def _draw_zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, M
 
 def _draw_torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
     figure = new_figure(height_in=2.9)
-    for axes, (case, arrays) in zip(
-        figure.subplots(1, len(followed), sharey=True, squeeze=False)[0], followed.items(), strict=True
-    ):
+    panels = figure.subplots(1, len(followed), sharey=True, squeeze=False)[0]
+    for axes, (case, arrays) in zip(panels, followed.items(), strict=True):
         for i, joint in enumerate(ANGLES["joint"]):
-            axes.plot(
-                arrays["t"], arrays["tau"][:, i], "--" if joint.endswith("'") else "-", label=joint, linewidth=1.0
-            )
+            line = "--" if joint.endswith("'") else "-"
+            axes.plot(arrays["t"], arrays["tau"][:, i], line, label=joint, linewidth=1.0)
         axes.set(title=f"Fig. 29{'abc'[case - 1]}: case {case}", xlabel="time [s]")
     figure.axes[0].set_ylabel("joint torque [N m]")
     add_legend_below(figure)

@@ -55,9 +55,8 @@ class Quanta:
     def _quantum(self) -> ca.Function:
         state, given, tuned = ca.MX.sym("state", 2 * N), ca.MX.sym("given", sum(GIVEN.values())), ca.MX.sym("tuned", 3)
         following = self.loop.step(state, given, tuned)
-        return ca.Function(
-            "quantum", [state, given, tuned], [following, *self.loop.outcome(state, following, given, tuned)]
-        )
+        outcome = self.loop.outcome(state, following, given, tuned)
+        return ca.Function("quantum", [state, given, tuned], [following, *outcome])
 
     def move(self, k: int, state: Array, X: Array) -> dict[str, Array]:
         """Return what follows in quantum k from a state (18,) at points X (P, n), with P rows each."""
@@ -83,37 +82,28 @@ class Quanta:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
 class Quantum:
     """Objective of one quantum: (53) at its end, with the distance of the ZMP from the support polygon as violation."""
 
-    instants: Quanta
-    k: int
-    state: Array
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
+    def __init__(self, instants: Quanta, k: int, state: Array) -> None:
+        self.lower, self.upper = instants.bounds
+        self.names = tuple(f"x{i}" for i in range(len(self.lower)))
+        self._instants, self._k, self._state = instants, k, state
 
     def __call__(self, X: Array, /) -> tuple[Array, Array]:
         """Return (53) and violations (P,) [m] of points (P, n)."""
-        found = self.instants.move(self.k, self.state, X)
+        found = self._instants.move(self._k, self._state, X)
         return found["cost"], found["outside_m"]
 
 
 def track_by_instants(instants: Quanta, algorithm: Algorithm, evaluations: int) -> dict[str, Any]:
-    """Return what Algorithm 4 finds over a whole step: means and extremes, and percentiles of its decisions.
+    """Return what Algorithm 4 finds over a whole step by a search at each instant k, whose seed is k.
 
-    Args:
-        instants: the step, and what is decided.
-        algorithm: search at each instant k, whose seed is k.
-        evaluations: of each search.
+    These are means and extremes, and percentiles of its decisions.
     """
-    lower, upper = instants.bounds
-    names = tuple(f"x{i}" for i in range(len(lower)))
     state, moments, started = instants.inputs[0][0], list[Mapping[str, Array]](), time.perf_counter()
     for k in range(instants.loop.quanta):
-        objective = Quantum(instants=instants, k=k, state=state, names=names, lower=lower, upper=upper)
-        x = minimize(objective, algorithm, evaluations=evaluations, seed=k).x
+        x = minimize(Quantum(instants, k, state), algorithm, evaluations=evaluations, seed=k).x
         moments.append({"x": x[None], **instants.move(k, state, x[None])})
         state = moments[-1]["state"][0]
         if not np.abs(state).max() < LARGEST_STATE:

@@ -14,10 +14,9 @@ from compare.papers.claims import Check, ClaimVerdict, Series, compare_levels, d
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible
 from compare.papers.stairs import stairs_planning, stairs_runs
 from compare.papers.stairs.stairs_effects import measure_depth
-from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
+from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4, measure_printed_equations, measure_slide
 from compare.papers.stairs.stairs_planning import PLANS, measure_hip_speeds, move
-from compare.papers.stairs.stairs_printed import measure_printed_equations, measure_slide
-from compare.papers.stairs.stairs_runs import DRAWN_CASE, KINDS, RULES, StairsFindings, make_plan_spec
+from compare.papers.stairs.stairs_runs import CLOSED_FORM, DRAWN_CASE, KINDS, RULES, StairsFindings, make_plan_spec
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
@@ -47,7 +46,7 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
         "online": ONLINE,
         **{
             f"network_{name}": f"{found['converged']} of {found['poses']} (knee bent the other way in {found['bent_otherwise']})"
-            for name, found in zip(("adam", "printed", "centimetres", "loop"), _networks(findings), strict=True)
+            for name, found in zip(("adam", "printed", "centimetres", "loop"), _get_networks(findings), strict=True)
         },
         "energy_factor": Series(
             TABLE_4[case].energy / findings.best_track(case).verdict.indexes["energy_J"] for case in findings.cases
@@ -70,7 +69,7 @@ def compute_printed(findings: StairsFindings) -> dict[str, float]:
     return measure_printed_equations(TABLE_4[DRAWN_CASE], arrays["ankle"][arrays["t"] > best.x["t2_s"]])
 
 
-def _networks(findings: StairsFindings) -> list[Mapping[str, Any]]:
+def _get_networks(findings: StairsFindings) -> list[Mapping[str, Any]]:
     """Return what the network learned by Adam, as printed in m and in cm, and at the rate in the loop."""
     network = findings.others["network"]
     printed = [found for rule, found in network.items() if "printed" in rule]
@@ -193,14 +192,12 @@ def _check_easier(findings: StairsFindings) -> Check:
 
 
 def _check_collisions(findings: StairsFindings) -> Check:
-    """By the swing foot, whose equations the paper gives, and by the shanks, each in several plans."""
     feet = {what: Series(measure_depth(findings, what, case, SETBACK) for case in findings.cases) for what in PLANS}
     rows = [*feet.values(), *_measure_shanks(findings).values()]
     return decide([max(row) <= 0 for row in rows], feet=feet)
 
 
 def _check_adaptation(findings: StairsFindings) -> Check:
-    """By the printed (8), (9) on all stairs, by plans for each stair, and by one plan for all, as Table III."""
     effort = findings.effort
     sizes = [*(TABLE_4[case].step_m for case in findings.cases), *effort.other_stairs]
     specs = [stairs_runs.make_other_spec(effort, *size) for size in effort.other_stairs]
@@ -212,15 +209,12 @@ def _check_adaptation(findings: StairsFindings) -> Check:
     kept = [evaluate(spec.load(), x).feasible for spec in problems]
     slides = [measure_slide(*size) for size in sizes]
     common = [size[1] < stairs_runs.IMPOSSIBLE_RISE_M for size in sizes]
-    found = {"tuned": sum(tuned), "kept": sum(kept), "of": len(sizes), "slides": Series(filter(None, slides))}
-    held = [not any(slides), bool(np.all(np.array(tuned)[common])), all(kept)]
-    return decide(
-        held, failed="; ".join(list_infeasible(runs)) or "none", impossible=stairs_runs.IMPOSSIBLE_RISE_M, **found
-    )
+    values = {"tuned": sum(tuned), "kept": sum(kept), "of": len(sizes), "slides": Series(filter(None, slides))}
+    values |= {"failed": "; ".join(list_infeasible(runs)) or "none", "impossible": stairs_runs.IMPOSSIBLE_RISE_M}
+    return decide([not any(slides), bool(np.all(np.array(tuned)[common])), all(kept)], **values)
 
 
 def _check_climb(findings: StairsFindings) -> Check:
-    """Whether the hip keeps its speed where steps follow each other."""
     first, after = (np.array([measure_hip_speeds(findings, what, case) for case in findings.cases]) for what in STEPS)
     jumps = np.abs([first[:, 1] - after[:, 0], after[:, 1] - after[:, 0]])
     texts = {"first": Series(first[:, 1]), "start": Series(after[:, 0]), "end": Series(after[:, 1])}
@@ -228,38 +222,31 @@ def _check_climb(findings: StairsFindings) -> Check:
 
 
 def _check_network(findings: StairsFindings) -> Check:
-    return decide([found["converged"] == found["poses"] for found in _networks(findings)[1:3]])
+    return decide([found["converged"] == found["poses"] for found in _get_networks(findings)[1:3]])
 
 
 def _check_other_methods(findings: StairsFindings) -> Check:
     network = findings.others["network"]
     medians = {rule: 1e3 * float(np.median(found["time_s"][1:])) for rule, found in network.items()}
-    closed = medians.pop(stairs_runs.CLOSED_FORM)
+    closed, error = medians.pop(CLOSED_FORM), network[CLOSED_FORM]["largest_angle_error_rad"]
     texts = "; ".join(f"{rule} {value:.3g}" for rule, value in medians.items())
-    held = [value < closed for value in medians.values()]
     counts = {"bent": network["adam"]["bent_otherwise"], "poses": network["adam"]["poses"]}
-    return decide(
-        held, closed=closed, medians=texts, error=network[stairs_runs.CLOSED_FORM]["largest_angle_error_rad"], **counts
-    )
+    return decide([v < closed for v in medians.values()], closed=closed, medians=texts, error=error, **counts)
 
 
 def _check_poses(findings: StairsFindings, share_of_first: float = math.inf, limit_ms: float = math.inf) -> Check:
-    """Check the time of the median later pose by every rule: in shares of that of the first pose, or in ms."""
     network, texts, verdicts = findings.others["network"], [], []
     for rule in RULES:
-        found = network[rule]
-        first, later = 1e3 * found["time_s"][0], 1e3 * np.median(found["time_s"][1:])
-        steps = found["iterations"][0], np.median(found["iterations"][1:])
+        found, times_ms = network[rule], 1e3 * np.array(network[rule]["time_s"])
+        first, later = times_ms[0], np.median(times_ms[1:])
+        steps = f"{found['iterations'][0]}, {np.median(found['iterations'][1:]):g} iterations"
         verdicts.append(bool(later <= min(share_of_first * first, limit_ms)))
-        texts.append(
-            f"{rule} {first:.3g}, then {later:.3g} ms ({steps[0]}, {steps[1]:g} iterations; {found['poses']} poses)"
-        )
+        texts.append(f"{rule} {first:.3g}, then {later:.3g} ms ({steps}; {found['poses']} poses)")
     enough = network["adam"]["poses"] >= LEAST_POSES
     return decide(verdicts if enough else ClaimVerdict.NOT_SHOWN, found="; ".join(texts), least=LEAST_POSES)
 
 
 def _check_continuity(findings: StairsFindings) -> Check:
-    """As printed, and by our plans of least jerk."""
     eq = compute_printed(findings)
     ends = _differentiate_ankle(findings, "jerk", DRAWN_CASE)[1]
     jumps = np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=1)
@@ -301,6 +288,6 @@ def _check_torso_mass(_: StairsFindings) -> Check:
 
 
 def _check_ratio(_: StairsFindings, exponent: int) -> Check:
-    """Check the printed ratio against that of half a cycloid: run over rise, or rise over run for an exponent of -1."""
+    """Check run over rise of half a cycloid, or rise over run for an exponent of -1."""
     ratio = (math.pi / 2) ** exponent
     return compare_levels(11 / 7, ratio, found=ratio)

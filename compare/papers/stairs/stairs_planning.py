@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from typing import Any
 
@@ -26,6 +26,11 @@ from nlp_gait.gaits.stairs.planar_biped import GRAVITY, toe_foot_biped
 PLANS = {"jerk": "rad/s^3", "plan": "J"}  # of least jerk, of least energy; unit of what is least
 INDEXES = {"jerk": "peak_jerk_rad_s3", "plan": "energy_J"}
 CLIMBS = ("ideal", "plan", "jerk")  # simulated
+STEPS = {
+    "first": "first, from standing",
+    "landing": "next, with reverse double support",
+    "jerk": "next, flat stance foot",
+}
 DENSITY = 5  # samples of a drawn or judged plan, as a multiple of the problem's own
 TORQUE_WEIGHT, ACCELERATION_WEIGHT = 0.01, 1e-3  # of the effort that ``stairs-ideal`` minimises
 
@@ -49,9 +54,8 @@ def make_energy_tasks(findings: StairsFindings) -> Iterator[Task]:
     for name in findings.effort.plan_choices:
         if "plan" in list_choice_plans(name):
             best = choose_best(findings.runs[f"jerk-{DRAWN_CASE}-{name}", IPOPT])
-            yield replace(
-                _make_task(_make_choice_spec(findings, "plan", name), best, findings.effort.plan_settings), run=1
-            )
+            spec = _make_choice_spec(findings, "plan", name)
+            yield replace(_make_task(spec, best, findings.effort.plan_settings), run=1)
 
 
 def _make_choice_spec(findings: StairsFindings, what: str, name: str) -> ProblemSpec:
@@ -92,15 +96,9 @@ def load_spec(findings: StairsFindings, what: str, case: int) -> ProblemSpec:
     return make_first_spec(findings, case) if what == "first" else make_plan_spec(findings.effort, case, what)
 
 
+@lru_cache(maxsize=16)
 def move(findings: StairsFindings, what: str, case: int) -> tuple[Signals, dict[str, Array]]:
     """Return the motion of a plan and its points by leg and sagittal coordinates: hip, knee, ankle, sole, toe (T, 5, 2)."""
-    if (what, case) not in findings.motions:
-        findings.motions[what, case] = _move(findings, what, case)
-    found: tuple[Signals, dict[str, Array]] = findings.motions[what, case]
-    return found
-
-
-def _move(findings: StairsFindings, what: str, case: int) -> tuple[Signals, dict[str, Array]]:
     problem = load_spec(findings, what, case).load().dense(DENSITY)
     if problem is None or problem.display.skeleton is None:
         raise TypeError("the planner has samples and a skeleton")
@@ -142,8 +140,9 @@ def describe_climb(found: Mapping[str, float | None]) -> str:
     """Return the result of a simulation in words."""
     if not found:
         return "not simulated: MuJoCo is not installed"
-    fell = found["fell_at_s"]
-    return f"climbs, {found['engine_J']:.1f} J" if fell is None else f"falls at {fell:.1f} s"
+    return (
+        f"climbs, {found['engine_J']:.1f} J" if found["fell_at_s"] is None else f"falls at {found['fell_at_s']:.1f} s"
+    )
 
 
 def compute_effort(t: Array, torque: Array, acceleration: Array) -> float:
@@ -156,7 +155,7 @@ def make_planning_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name."""
     return {
         "plan-choices": [_list_choice(findings, name) for name in ("", *findings.effort.plan_choices)],
-        "steps": [_list_step(findings, case, what) for case in findings.cases for what in ("first", "landing", "jerk")],
+        "steps": [_list_step(findings, case, what) for case in findings.cases for what in STEPS],
         "ideal": [_list_ideal(findings, case) for case in findings.cases],
     }
 
@@ -181,7 +180,7 @@ def _list_choice(findings: StairsFindings, name: str) -> list[Value]:
 
 
 def list_choice_plans(name: str) -> Iterable[str]:
-    """Return the plans that a choice has."""
+    """Return the plans that a choice has, or ours without a name."""
     return PLAN_CHOICES[name].plans if name else PLANS
 
 
@@ -196,14 +195,9 @@ def describe_plan(findings: StairsFindings, what: str, name: str) -> str:
 def _list_step(findings: StairsFindings, case: int, what: str) -> list[Value]:
     run = findings.best(what, case)
     indexes, verdict = run.verdict.indexes, run.verdict
-    names = {
-        "first": "first, from standing",
-        "landing": "next, with reverse double support",
-        "jerk": "next, flat stance foot",
-    }
     others = [indexes[name] for name in ("energy_J", "peak_jerk_rad_s3", "peak_torque_Nm")]
     margin = 1e3 * indexes["zmp_margin_min_m"]
-    return [case, names[what], verdict.feasible, margin, *others, *measure_hip_speeds(findings, what, case)]
+    return [case, STEPS[what], verdict.feasible, margin, *others, *measure_hip_speeds(findings, what, case)]
 
 
 def _list_ideal(findings: StairsFindings, case: int) -> list[Value]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,15 @@ from compare.papers.stairs.stairs_figures import draw_figures
 from compare.papers.stairs.stairs_paper import EVAPORATION, PAPER, TABLE_3, TABLE_4
 from compare.papers.stairs.stairs_runs import ALGORITHMS, StairsEffort, StairsFindings
 from compare.report.document import Rows, Value
-from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from metaheuristics import AntColony
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES
+
+MATCH = 1e-3  # relative: a start that ends this close to the best has found it
+# Headings and formats of columns for each case, by their places in the text.
+CASE_COLUMNS = {"papers": "paper {}", "jerks": "least jerk {}", "energies": "least energy {}"}
+CASE_COLUMNS |= {"cases_4f": ".4f", "cases_6g": ".6g"}
 
 
 def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
@@ -50,12 +55,7 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
     (end_rate,) = [variable for variable in GOVERNING_VARIABLES if variable.name == "end_rate_rad_s"]
     return {
         "effort": effort,
-        "cases": " | ".join(f"case {case}" for case in effort.cases),
-        "papers": " | ".join(f"paper {case}" for case in effort.cases),
-        "jerks": " | ".join(f"least jerk {case}" for case in effort.cases),
-        "energies": " | ".join(f"least energy {case}" for case in effort.cases),
-        "cases_4f": " | ".join(".4f" for _ in effort.cases),
-        "cases_6g": " | ".join(".6g" for _ in effort.cases),
+        **{name: " | ".join(words.format(case) for case in effort.cases) for name, words in CASE_COLUMNS.items()},
         "evaporation": EVAPORATION,
         "usual_spread": AntColony().spread,
         "quantum_s": QUANTUM,
@@ -67,16 +67,11 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
     }
 
 
-MATCH = 1e-3  # relative: a start that ends this close to the best has found it
-
-
 def make_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name; headings and formats are in the report's template."""
     return {
         "table3": _list_table_3(findings),
-        "plans": [
-            row for case in findings.cases for what in planning.PLANS for row in _list_plans(findings, what, case)
-        ],
+        "plans": [row for case in findings.cases for row in _list_plans(findings, case)],
         "table4": _list_table_4(findings),
         "tracks": [row for case in findings.cases for row in _list_tracks(findings, case)],
         **planning.make_planning_tables(findings),
@@ -96,22 +91,18 @@ def _list_table_3(findings: StairsFindings) -> Rows:
     plans = {f"{what} {case}": findings.plan(case, what) for what in planning.PLANS for case in findings.cases}
     rows: list[Sequence[Value]] = []
     for variable in GOVERNING_VARIABLES:
-        name, ends = variable.name, (variable.lower, variable.upper)
-        values, near = {key: plan[name] for key, plan in plans.items()}, MATCH * (ends[1] - ends[0])
-        at = [
-            key.replace("plan", "energy")
-            for key, value in values.items()
-            if np.abs(np.subtract(ends, value)).min() < near
-        ]
+        name, low, high = variable.name, variable.lower, variable.upper
+        values = {key.replace("plan", "energy"): plan[name] for key, plan in plans.items()}
+        at = [key for key, value in values.items() if min(abs(value - low), abs(value - high)) < MATCH * (high - low)]
         paper = f"{TABLE_3[name]:g}" if name in TABLE_3 else None
-        rows.append([name, paper, *values.values(), "{:g} to {:g}".format(*ends), ", ".join(at)])
+        rows.append([name, paper, *values.values(), f"{low:g} to {high:g}", ", ".join(at)])
     return rows
 
 
-def _list_plans(findings: StairsFindings, what: str, case: int) -> Rows:
+def _list_plans(findings: StairsFindings, case: int) -> Rows:
     """Best plan of each solver, with the ends of all its runs."""
     rows: list[Sequence[Value]] = []
-    for solver in (IPOPT, *ALGORITHMS):
+    for what, solver in product(planning.PLANS, (IPOPT, *ALGORITHMS)):
         found, verdict = findings.runs[f"{what}-{case}", solver], findings.best(what, case, solver).verdict
         every = ", ".join(f"{value:.2f}" for value in list_objectives(found))
         if solver == IPOPT:
@@ -120,14 +111,9 @@ def _list_plans(findings: StairsFindings, what: str, case: int) -> Rows:
             every = f"{hits} of {len(found)} starts, {len(ends)} converged"
         between = "feasible" if verdict.dense_feasible else ", ".join(verdict.violated[:1])
         quantity = f"{'jerk' if what == 'jerk' else 'energy'} [{planning.PLANS[what]}]"
-        rows.append(
-            [case, quantity, solver, verdict.objective, every, verdict.feasible, between, _compute_time_s(found)]
-        )
+        time_s = float(np.mean([run.time_s.solve for run in found]))
+        rows.append([case, quantity, solver, verdict.objective, every, verdict.feasible, between, time_s])
     return rows
-
-
-def _compute_time_s(records: Sequence[RunRecord]) -> float:
-    return float(np.mean([record.time_s.solve for record in records]))
 
 
 def _list_table_4(findings: StairsFindings) -> Rows:

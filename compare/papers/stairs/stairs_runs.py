@@ -41,14 +41,13 @@ ACO = "aco"  # the paper's search
 DRAWN_CASE = 2  # where the paper draws one case only
 TRACK_START = {"kp": 60.0, "kd": 60.0, "torso_pitch_rad": 1.4}
 IMPOSSIBLE_RISE_M = 0.5
-RULES = {  # of the network, and the unit of length
-    "adam": (NetworkSettings(), "m"),
-    "gradient 0.3": (NetworkSettings(rule="gradient", rate=0.3), "m"),
-    "gradient 0.05": (NetworkSettings(rule="gradient", rate=0.05), "m"),
-    "gradient 1e-4, as printed, in m": (PRINTED_NETWORK, "m"),
-    "gradient 1e-4, as printed, in cm": (PRINTED_NETWORK, "cm"),
+RULES = {  # of the network, and units of length in a metre
+    "adam": (NetworkSettings(), 1.0),
+    "gradient 0.3": (NetworkSettings(rule="gradient", rate=0.3), 1.0),
+    "gradient 0.05": (NetworkSettings(rule="gradient", rate=0.05), 1.0),
+    "gradient 1e-4, as printed, in m": (PRINTED_NETWORK, 1.0),
+    "gradient 1e-4, as printed, in cm": (PRINTED_NETWORK, 100.0),
 }
-UNITS = {"m": 1.0, "cm": 100.0}  # in a metre
 CLOSED_FORM, KINDS = "closed form", ("closed-form", "network")  # in the table of the network; of inverse kinematics
 TORSO_INDEXES = ("energy_J", "zmp_margin_min_m")
 PER_CASE = 4  # see ``make_computations``
@@ -77,14 +76,8 @@ class StairsEffort(paper_runs.Effort):
     track_ipopt: bool = True  # whether IPOPT runs on the track
     # IPOPT on the track: lifted, a rollout has 16,000 variables; an iteration takes seconds.
     track_settings: Mapping[str, Any] = field(default_factory=lambda: {"time_limit_s": 1200.0})
-    # Tread and rise of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
-    other_stairs: tuple[tuple[float, float], ...] = (
-        (0.30, 0.10),
-        (0.30, 0.13),
-        (0.28, 0.17),
-        (0.26, 0.20),
-        (0.254, 0.50),
-    )
+    # Treads and rises of one step that the paper did not try [m]; a rise of IMPOSSIBLE_RISE_M is impossible.
+    other_stairs: tuple[tuple[float, float], ...] = ((0.3, 0.1), (0.3, 0.13), (0.28, 0.17), (0.26, 0.2), (0.254, 0.5))
     other_starts: int = 8  # of IPOPT on the plan there
     poses: int = 350  # first ones of the swing leg, every 0.01 s, for which the network is trained
     printed_poses: int = 350  # of these at the printed rate
@@ -110,13 +103,8 @@ class StairsEffort(paper_runs.Effort):
     def steps(self) -> int:
         """Runs, other computations of each case, the network, and the report."""
         gradient = self.plan_starts + self.jerk_starts + self.hip_starts + self.ideal_starts + self.track_ipopt
-        case = (
-            gradient
-            + (3 * len(ALGORITHMS) + len(self.choices)) * self.runs
-            + PER_CASE
-            + len(POWERLESS)
-            + len(self.instant_searches)
-        )
+        searches = (3 * len(ALGORITHMS) + len(self.choices)) * self.runs
+        case = gradient + searches + PER_CASE + len(POWERLESS) + len(self.instant_searches)
         others = sum(self.count_other_starts(rise) for _, rise in self.other_stairs)
         return len(self.cases) * case + others + 2 + self.plan_steps
 
@@ -170,14 +158,13 @@ def get_stair(case: int) -> dict[str, float]:
     return {"stair_length_m": row.stair_length_m, "rise_run_ratio": row.rise_run_ratio}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StairsFindings:
     """All results of the reproduction: runs by title of the problem and solver, other results by name."""
 
     effort: StairsEffort
     runs: paper_runs.Runs
     others: Mapping[str, Any] = field(default_factory=dict)
-    motions: dict[tuple[str, int], Any] = field(default_factory=dict)  # of plans, kept by ``move``
 
     @property
     def cases(self) -> Sequence[int]:
@@ -246,10 +233,10 @@ def make_computations(findings: StairsFindings) -> Iterator[Computation]:
         plan, x = plans["plan"], get_point(findings.best_track(case))
         track = make_track_spec(case, plan)
         yield make_computation(f"printed-{case}", track, run_printed_gains, case=case, plans=plans, x=x)
+        yield make_computation(f"learned-{case}", track, track_with_network, case=case, plan=plan, x=x)
         for what in ("plan", "jerk"):
             spec = make_track_spec(case, plans[what])
             yield make_computation(f"differences-{what}-{case}", spec, difference_angles, case=case, plan=plans[what])
-        yield make_computation(f"learned-{case}", track, track_with_network, case=case, plan=plan, x=x)
 
 
 def train_network(case: int, plan: Mapping[str, float], poses: int, printed_poses: int) -> dict[str, Any]:
@@ -262,8 +249,7 @@ def train_network(case: int, plan: Mapping[str, float], poses: int, printed_pose
     found = {CLOSED_FORM: _describe_path(_solve_legs(legs, *lengths), all_poses, NetworkSettings())}
     for name, (settings, unit) in RULES.items():
         count = printed_poses if "printed" in name else poses
-        thigh, shank = UNITS[unit] * lengths
-        path = network_angles(UNITS[unit] * legs[:count], thigh, shank, settings)
+        path = network_angles(unit * legs[:count], unit * lengths[0], unit * lengths[1], settings)
         found[name] = _describe_path(path, all_poses[:count], settings)
     return found
 
@@ -304,27 +290,21 @@ def run_printed_gains(case: int, plans: Mapping[str, Mapping[str, float]], x: Se
     They are the quanta that the explicit scheme survives, also without contacts or gains; the largest errors and ZMP margins in
     the implicit one, also with the controller as printed on the plan of least jerk; and energies and ZMP margins upright.
     """
-    row, plan = TABLE_4[case], plans["plan"]
+    row, plan, printed = TABLE_4[case], plans["plan"], CHOICES[PRINTED]
     gains, none = [row.kp, row.kd, row.torso_pitch_rad], [0.0, 0.0, row.torso_pitch_rad]
     compensated = make_track_spec(case, plan).load()
     implicit = compensated.with_values(gravity_compensation=0.0)
     explicit = make_track_spec(case, plan, scheme="explicit").load().with_values(gravity_compensation=0.0)
     floating = explicit.with_values(ground_stiffness_N_m=0.0, ground_damping_N_s_m=0.0)
-    printed = CHOICES[PRINTED]
     as_printed = make_track_spec(case, plans["jerk"], **printed.options).load().with_values(**printed.values)
-    scheme = {
-        "printed": (explicit, gains),
-        "floating": (floating, gains),
-        "slack": (explicit, none),
-        "free": (floating, none),
-    }
+    scheme = {"printed": (explicit, gains), "floating": (floating, gains)}
+    scheme |= {"slack": (explicit, none), "free": (floating, none)}
     tracked = {"implicit": implicit, "compensated": compensated, "hip": as_printed}
     found = {f"explicit_{name}": evaluate(*how).indexes["quanta_before_divergence"] for name, how in scheme.items()}
     indexes = {name: evaluate(how, gains).indexes for name, how in tracked.items()}
     found |= {f"{name}_error_rad": own["largest_error_rad"] for name, own in indexes.items()}
-    indexes |= {
-        what: evaluate(make_track_spec(case, plans[what]).load(), [*x[:2], np.pi / 2]).indexes for what in plans
-    }
+    upright = {what: make_track_spec(case, plan).load() for what, plan in plans.items()}
+    indexes |= {what: evaluate(problem, [*x[:2], np.pi / 2]).indexes for what, problem in upright.items()}
     return found | {f"{name}_{index}": own[index] for name, own in indexes.items() for index in TORSO_INDEXES}
 
 
@@ -343,8 +323,7 @@ def track_without_power(spec: ProblemSpec, evaluations: int) -> dict[str, float]
 
 def track_with_network(case: int, plan: Mapping[str, float], x: list[float]) -> dict[str, float]:
     """Compare a tracked step whose desired leg angles come from the network with the closed form: cost and angles."""
-    found: dict[str, float] = {}
-    angles = []
+    found, angles = dict[str, float](), []
     for kind in KINDS:
         problem = make_track_spec(case, plan, inverse_kinematics=kind).load()
         found[f"{kind} cost"] = evaluate(problem, x).objective["value"]
@@ -358,8 +337,6 @@ def difference_angles(case: int, plan: Mapping[str, float]) -> dict[str, dict[st
     found = {}
     for kind in KINDS:
         angles = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]], kind)["q_desired"]
-        parts = {
-            name: np.diff(angles, order, axis=0) / 0.01**order for name, order in (("acceleration", 2), ("jerk", 3))
-        }
-        found[kind] = {name: float(np.abs(part).max()) for name, part in parts.items()}
+        second, third = (float(np.abs(np.diff(angles, n, axis=0) / 0.01**n).max()) for n in (2, 3))
+        found[kind] = {"acceleration": second, "jerk": third}
     return found

@@ -15,7 +15,7 @@ from compare.papers.paper_runs import choose_best, get_point, list_infeasible, m
 from compare.papers.stairs import stairs_runs
 from compare.papers.stairs.stairs_instants import Decides, Quanta, track_by_instants
 from compare.papers.stairs.stairs_paper import ANTS, CHOICES, ITERATIONS, OURS, PAPER, PRINTED, TABLE_3, TABLE_4
-from compare.papers.stairs.stairs_runs import ACO, ALGORITHMS, StairsFindings, make_track_spec
+from compare.papers.stairs.stairs_runs import ACO, ALGORITHMS, POWERLESS, StairsFindings, make_track_spec
 from compare.report.document import Rows, Value
 from compare.study.record import RunRecord
 from compare.study.store import Computation
@@ -28,11 +28,8 @@ FOLLOWED_RAD = 0.1
 READINGS = (OURS, "jerk", PRINTED, "printed-b10000")  # that claims compare
 NEXT = tuple(name for name in CHOICES if name != "first")  # readings of the next step
 UNLIMITED = ("unlimited", "jerk-unlimited", PRINTED, "printed-b10000")  # whose searches do not limit the errors
-LEAST_ROWS = {
-    "cost": "controller_cost",
-    "energy": "energy_J",
-    "peak_torque_Nm": "peak_torque_Nm",
-}  # of Table IV and ours
+# Quantities of Table IV whose least values the paper tells, and ours.
+LEAST_ROWS = {"cost": "controller_cost", "energy": "energy_J", "peak_torque_Nm": "peak_torque_Nm"}
 TABLE_4_ROWS = {"torso_pitch_rad": "torso_pitch_rad", "kp": "kp", "kd": "kd", **LEAST_ROWS}  # that a rollout has
 READ: Mapping[str, Sequence[str]] = {  # what claims tell of readings
     **dict.fromkeys(TABLE_4_ROWS.values(), READINGS),
@@ -48,8 +45,8 @@ def make_choice_spec(findings: StairsFindings, case: int, name: str) -> ProblemS
     """Return the tracked step of a case, as read by a choice."""
     choice = CHOICES[name]
     spec = make_track_spec(case, findings.plan(case, choice.plan))
-    values = {**spec.values, **choice.values}
-    return replace(spec, options=choice.options, values=values, label=f"track-{case}-{name}")
+    values, label = {**spec.values, **choice.values}, f"track-{case}-{name}"
+    return replace(spec, options=choice.options, values=values, label=label)
 
 
 def make_tracking_tasks(findings: StairsFindings) -> Iterator[Task]:
@@ -65,7 +62,7 @@ def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation
     """Yield in each case gains without the power, and Algorithm 4, which decides gains or torques."""
     effort = findings.effort
     for case in effort.cases:
-        for name in stairs_runs.POWERLESS:
+        for name in POWERLESS:
             spec = make_choice_spec(findings, case, name)
             function = partial(stairs_runs.track_without_power, spec)
             yield make_computation(f"powerless-{name}-{case}", spec, function, evaluations=effort.track_evaluations)
@@ -103,11 +100,10 @@ def measure_spread(findings: StairsFindings, name: str) -> float:
 
 def make_tracking_tables(findings: StairsFindings) -> dict[str, Rows]:
     """Return rows by name."""
+    cases, choices, searches = findings.cases, findings.effort.choices, findings.effort.instant_searches
     return {
-        "choices": [_list_choice(findings, case, name) for case in findings.cases for name in findings.effort.choices],
-        "instants": [
-            _list_instants(findings, case, *how) for case in findings.cases for how in findings.effort.instant_searches
-        ],
+        "choices": [_list_choice(findings, case, name) for case in cases for name in choices],
+        "instants": [_list_instants(findings, case, *how) for case in cases for how in searches],
     }
 
 
@@ -136,9 +132,7 @@ def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
         "gains": {name: findings.collect("printed", name) for name in findings.others[f"printed-{findings.cases[0]}"]},
         "over": {index: _describe_range(findings, index) for index in LEAST_ROWS.values()},
         "instant_ms": _describe_instant_times(findings),
-        "powerless": _describe(
-            {name: findings.collect(f"powerless-{name}", "energy_J") for name in stairs_runs.POWERLESS}
-        ),
+        "powerless": _describe({name: findings.collect(f"powerless-{name}", "energy_J") for name in POWERLESS}),
         "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()})),
     }
 
@@ -203,7 +197,6 @@ def _check_ratios(findings: StairsFindings, quantity: str, least: bool = False) 
 
 
 def _check_balance(findings: StairsFindings) -> Check:
-    """By constant gains, whose searches demand it, by a colony at every instant, and by the printed gains."""
     ours = _collect(findings, "zmp_margin_min_m", READ["zmp_margin_min_m"])
     held = [min(row) >= 0 for row in ours.values()]
     held += [not any(part["outside_quanta"] for part in parts) for parts in _get_instants(findings, "gains").values()]
@@ -233,7 +226,6 @@ def _describe_instants(findings: StairsFindings, decides: Decides) -> str:
 
 
 def _check_instants(findings: StairsFindings, decides: Decides) -> Check:
-    """Check whether Algorithm 4 finishes the step with the ZMP in the polygon."""
     found = _get_instants(findings, decides).values()
     held = [all(part["finite"] and not part["outside_quanta"] for part in parts) for parts in found]
     enough = findings.effort.instant_evaluations >= ANTS * ITERATIONS or all(held)
@@ -242,11 +234,8 @@ def _check_instants(findings: StairsFindings, decides: Decides) -> Check:
 
 def _describe_instant_times(findings: StairsFindings) -> str:
     """Return the mean time of an instant's search for gains [ms], by reading."""
-    times = {
-        name: Series(1e3 * part["time_s"] / part["quanta"] for part in parts)
-        for name, parts in _get_instants(findings, "gains").items()
-    }
-    return _describe(times)
+    found = _get_instants(findings, "gains").items()
+    return _describe({name: Series(1e3 * part["time_s"] / part["quanta"] for part in parts) for name, parts in found})
 
 
 def _check_dynamics(findings: StairsFindings) -> Check:
@@ -264,8 +253,8 @@ def _check_cost_against_energy(_: StairsFindings) -> Check:
 
 
 def _check_power(findings: StairsFindings) -> Check:
-    with_power = [sum(row) for row in _collect(findings, "energy_J", stairs_runs.POWERLESS).values()]
-    without = [sum(findings.collect(f"powerless-{name}", "energy_J")) for name in stairs_runs.POWERLESS]
+    with_power = [sum(row) for row in _collect(findings, "energy_J", POWERLESS).values()]
+    without = [sum(findings.collect(f"powerless-{name}", "energy_J")) for name in POWERLESS]
     return require_change(100 * (np.divide(without, with_power) - 1)[:, None])
 
 
@@ -289,8 +278,5 @@ def _check_torso(findings: StairsFindings, index: str) -> Check:
 
 def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, float]]:
     """Return the indexes of the best gains of a reading with an upright torso, in all cases."""
-    found = []
-    for case in findings.cases:
-        gains = get_point(get_best(findings, case, name))[:2]
-        found.append(evaluate(make_choice_spec(findings, case, name).load(), [*gains, np.pi / 2]).indexes)
-    return found
+    pairs = [(make_choice_spec(findings, case, name), get_best(findings, case, name)) for case in findings.cases]
+    return [evaluate(spec.load(), [*get_point(best)[:2], np.pi / 2]).indexes for spec, best in pairs]

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from compare.papers.stairs.stairs_paper import TABLE_4
-from compare.papers.stairs.stairs_printed import measure_printed_equations, measure_slide
+from compare.papers.stairs.stairs_paper import TABLE_4, measure_printed_equations, measure_slide
 
 
 def test_misses_of_the_printed_equations() -> None:
