@@ -21,9 +21,7 @@ from metaheuristics import ParticleSwarm, minimize
 from metaheuristics.algorithms import particle_swarm
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, move, reflect
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from nlp_gait.gaits.biped.limits import BalanceMargins
 
 RUNS, EVALUATIONS = 11, 10_000

@@ -10,9 +10,19 @@ from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
 from metaheuristics.algorithms.genetic import Flip, GeneticAlgorithm, Polynomial, SimulatedBinary, SinglePoint
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm
 from metaheuristics.algorithms.random_search import RandomSearch
-from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, Rule, StaticPenalty
+from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, BatchObjective, History, Interrupted, Result, Search, Start
+from metaheuristics.interface import (
+    Algorithm,
+    BatchObjective,
+    ConstraintHandling,
+    History,
+    Interrupted,
+    Result,
+    Rule,
+    Search,
+    Start,
+)
 from metaheuristics.minimize import minimize
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, installed_algorithms

@@ -1,77 +1,14 @@
-"""Constraint handling: how two points with objective f and violation v compare.
-
-Every rule here orders points lexicographically by two keys computed from f and v: the violation and the objective as the
-rule sees them. That makes it a total preorder, gives pairwise comparison and sorting from one definition, reduces a new
-rule to a key function, and lets packages that put feasible points first by themselves follow any rule.
-
-A failed evaluation has f = v = infinity (see `mark_failed`) and so comes last under every rule.
-"""
+"""Constraint handling: how two points with objective f and violation v compare, see `Rule`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from metaheuristics.array import Array
+from metaheuristics.interface import FEASIBILITY, Array, Rule
 from metaheuristics.settings import check_number
-
-
-def mark_failed(f: Array, violation: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return copies of f and violation (P,) with infinity where either is NaN or infinite, and the (P,) mask of these."""
-    failed = ~(np.isfinite(f) & np.isfinite(violation))
-    return np.where(failed, np.inf, f), np.where(failed, np.inf, violation), failed
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
-class Rule:
-    """A total preorder of points; smaller keys are better, the first key decides before the second.
-
-    Attributes:
-        keys: Maps f and violation, any equal shape and free of NaN, to the two keys of the same shape: effective violation,
-            >= 0, and effective objective.
-    """
-
-    keys: Callable[[Array, Array], tuple[Array, Array]]
-
-    def better(self, f1: Array, violation1: Array, f2: Array, violation2: Array) -> NDArray[np.bool_]:
-        """Compare pairs by objectives and violations (P,) each; return (P,) True where the first is strictly better."""
-        major1, minor1 = self.keys(f1, violation1)
-        major2, minor2 = self.keys(f2, violation2)
-        better: NDArray[np.bool_] = (major1 < major2) | ((major1 == major2) & (minor1 < minor2))
-        return better
-
-    def order(self, f: Array, violation: Array) -> NDArray[np.intp]:
-        """Return the (P,) indices that sort points, best first; equals keep their order."""
-        major, minor = self.keys(f, violation)
-        return np.lexsort((minor, major))
-
-    def best(self, f: Array, violation: Array) -> int:
-        """Return the index of the best point, the first of equals."""
-        return int(self.order(f, violation)[0])
-
-
-class ConstraintHandling(Protocol):
-    """Settings of a constraint handling, immutable, SearchError where not allowed; gives the rule for each moment of a run."""
-
-    @property
-    def name(self) -> str:
-        """Name in reports."""
-
-    def rule(self, progress: float, initial_violation: Array) -> Rule:
-        """Return the current rule.
-
-        Args:
-            progress: Share of the evaluation budget used, 0 to 1.
-            initial_violation: (P,) violations of the first generation; infinity where failed.
-        """
-
-
-FEASIBILITY = Rule(keys=lambda f, violation: (violation, f))
-"""Feasible points by objective, before infeasible ones by violation: also how every run picks its reported best."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

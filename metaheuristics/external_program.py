@@ -16,9 +16,8 @@ from typing import IO, Any
 
 import numpy as np
 
-from metaheuristics.array import Array, real_array
 from metaheuristics.errors import SearchError, abbreviate
-from metaheuristics.interface import CallingSearch, Ended, Evaluate, Start
+from metaheuristics.interface import Array, CallingSearch, Ended, Evaluate, Start, real_array
 from metaheuristics.preparation import check_points
 from metaheuristics.settings import check_number
 from metaheuristics.user_algorithm import combine

@@ -10,15 +10,26 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import ConstraintHandling, Rule
-
+Array: TypeAlias = NDArray[np.float64]
 Settings = TypeVar("Settings")
+
+
+def real_array(values: object) -> Array:
+    """Return values as doubles, copied only if they are not that already.
+
+    Raises:
+        TypeError: They are complex, masked, texts or dates, of which NumPy would make doubles in silence.
+        ValueError: They have no one shape.
+    """
+    array = np.asarray(values)
+    if np.ma.is_masked(values) or array.dtype.kind not in "biufO":
+        raise TypeError(f"they must be real numbers, got {type(values).__name__} of {array.dtype}")
+    return array.astype(np.float64, copy=False)
 
 
 class Bounded(Protocol):
@@ -102,6 +113,58 @@ class Start:
         return np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN)[:, None]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class Rule:
+    """A total preorder of points; smaller keys are better, the first key decides before the second.
+
+    The keys are the violation and the objective as the rule sees them. So pairwise comparison and sorting have one definition,
+    and packages that put feasible points first by themselves can follow any rule. A failed evaluation, both values of which are
+    infinite, comes last under every rule.
+
+    Attributes:
+        keys: Maps f and violation, any equal shape and free of NaN, to the two keys of the same shape: effective violation,
+            >= 0, and effective objective.
+    """
+
+    keys: Callable[[Array, Array], tuple[Array, Array]]
+
+    def better(self, f1: Array, violation1: Array, f2: Array, violation2: Array) -> NDArray[np.bool_]:
+        """Compare pairs by objectives and violations (P,) each; return (P,) True where the first is strictly better."""
+        major1, minor1 = self.keys(f1, violation1)
+        major2, minor2 = self.keys(f2, violation2)
+        better: NDArray[np.bool_] = (major1 < major2) | ((major1 == major2) & (minor1 < minor2))
+        return better
+
+    def order(self, f: Array, violation: Array) -> NDArray[np.intp]:
+        """Return the (P,) indices that sort points, best first; equals keep their order."""
+        major, minor = self.keys(f, violation)
+        return np.lexsort((minor, major))
+
+    def best(self, f: Array, violation: Array) -> int:
+        """Return the index of the best point, the first of equals."""
+        return int(self.order(f, violation)[0])
+
+
+FEASIBILITY = Rule(keys=lambda f, violation: (violation, f))
+"""Feasible points by objective, before infeasible ones by violation: also how every run picks its reported best."""
+
+
+class ConstraintHandling(Protocol):
+    """Settings of a constraint handling, immutable, SearchError where not allowed; gives the rule for each moment of a run."""
+
+    @property
+    def name(self) -> str:
+        """Name in reports."""
+
+    def rule(self, progress: float, initial_violation: Array) -> Rule:
+        """Return the current rule.
+
+        Args:
+            progress: Share of the evaluation budget used, 0 to 1.
+            initial_violation: (P,) violations of the first generation; infinity where failed.
+        """
+
+
 class Search(Protocol):
     """A run in progress: `ask`, evaluate, `tell`, `stop`, and again."""
 
@@ -157,7 +220,7 @@ class Algorithm(Protocol):
     def population(self) -> int:
         """Number of starting points."""
 
-    def start(self, start: Start, /) -> Search:
+    def start(self, start: Start, /) -> Search | CallingSearch:
         """Begin a run with bounds, starting points, budget and generator."""
 
 

@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from functools import cache
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import ThreadpoolController
 
-from metaheuristics.array import Array, real_array
-from metaheuristics.constraint_handling import FEASIBILITY, ConstraintHandling, Deb, Rule, mark_failed
+from metaheuristics.constraint_handling import Deb
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, BatchObjective, CallingSearch, Ended, History, Interrupted, Result
+from metaheuristics.interface import (
+    FEASIBILITY,
+    Algorithm,
+    Array,
+    BatchObjective,
+    CallingSearch,
+    ConstraintHandling,
+    Ended,
+    History,
+    Interrupted,
+    Result,
+    Rule,
+    real_array,
+)
 from metaheuristics.preparation import (
     check_helpers,
     check_limits,
@@ -47,6 +59,12 @@ def _find_libraries(with_scipy: bool) -> ThreadpoolController:
 
 Callback = Callable[[Array, Array, Array], object]
 """Receives X (P, n), f (P,) and violation (P,) of a generation; f and violation are infinite where failed."""
+
+
+def mark_failed(f: Array, violation: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return copies of f and violation (P,) with infinity where either is NaN or infinite, and the (P,) mask of these."""
+    failed = ~(np.isfinite(f) & np.isfinite(violation))
+    return np.where(failed, np.inf, f), np.where(failed, np.inf, violation), failed
 
 
 class Evaluator:
@@ -193,43 +211,43 @@ def minimize(
     search = algorithm.start(start)
     if not isinstance(search, CallingSearch):
         check_search(search, algorithm)
-    evaluate = Evaluator(
-        objective, callback, thinned=isinstance(search, CallingSearch)
-    )  # which evaluates point by point
+    # A search that calls the objective evaluates point by point.
+    record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
+    reasons: list[str] = []
     initial_violation: Array | None = None
 
-    def generation(X: Array) -> tuple[Array, Array, Array, Rule]:
-        """Evaluate the part of a generation that fits the budget; return points, objectives, violations and the rule."""
+    def evaluate(points: Array) -> tuple[Array, Array, Rule]:
+        """Evaluate the part of a generation that fits the budget; raise `Ended` once a limit is reached."""
         nonlocal initial_violation
-        X = X[: evaluations - evaluate.evaluations]
-        f, violation = evaluate(X)
+        if reasons:  # a function ignored the first `Ended`
+            raise Ended
+        f, violation = record(points[: evaluations - record.evaluations])
         initial_violation = violation if initial_violation is None else initial_violation
-        return X, f, violation, handling.rule(evaluate.evaluations / evaluations, initial_violation)
-
-    def limits_reached() -> list[str]:
-        violation, f = evaluate.best
         reached = {
-            "evaluation budget used": evaluate.evaluations >= evaluations,
-            "target reached": target is not None and violation == 0.0 and f <= target,
-            f"no better point in {stagnation} generations": evaluate.stagnation >= (stagnation or np.inf),
-            "time limit reached": evaluate.elapsed_s >= (time_limit_s or np.inf),
+            "evaluation budget used": record.evaluations >= evaluations,
+            "target reached": target is not None and record.best[0] == 0.0 and record.best[1] <= target,
+            f"no better point in {stagnation} generations": record.stagnation >= (stagnation or np.inf),
+            "time limit reached": record.elapsed_s >= (time_limit_s or np.inf),
         }
-        return [reason for reason, is_reached in reached.items() if is_reached]
+        reasons.extend(reason for reason, is_reached in reached.items() if is_reached)
+        if reasons:
+            raise Ended
+        return f, violation, handling.rule(record.evaluations / evaluations, initial_violation)
 
     def result(reasons: list[str]) -> Result:
-        all_failed = evaluate.failed == evaluate.evaluations
-        evaluate.best_x.setflags(write=False)
+        all_failed = record.failed == record.evaluations
+        record.best_x.setflags(write=False)
         return Result(
-            x=evaluate.best_x,
-            objective=evaluate.best[1],
-            violation=evaluate.best[0],
-            evaluations=evaluate.evaluations,
-            failed_evaluations=evaluate.failed,
-            generations=evaluate.generations,
-            history=evaluate.history(),
+            x=record.best_x,
+            objective=record.best[1],
+            violation=record.best[0],
+            evaluations=record.evaluations,
+            failed_evaluations=record.failed,
+            generations=record.generations,
+            history=record.history(),
             reasons=tuple(reasons + ["every evaluation failed"] * all_failed),
-            time_s=evaluate.elapsed_s,
-            objective_time_s=evaluate.objective_time_s,
+            time_s=record.elapsed_s,
+            objective_time_s=record.objective_time_s,
             algorithm=algorithm,
             handling=handling,
             seed_entropy=plain_entropy(sequence),
@@ -237,51 +255,19 @@ def minimize(
         )
 
     try:
-        with limit_blas_threads(algorithm, objective):
+        with limit_blas_threads(algorithm, objective), suppress(Ended):
             if isinstance(search, CallingSearch):
-                return result(_run_calling(search, generation, limits_reached))
+                reason = search.run(evaluate)
+                if not record.generations:
+                    raise SearchError("the function returned without any call of f")
+                return result(reasons or [reason])
             while True:
-                X, f, violation, rule = generation(check_points(search.ask(), start.lower, start.upper))
-                reasons = limits_reached()
-                if not reasons:
-                    search.tell(X, f, violation, rule)
-                    reasons = check_reasons(search.stop())
-                if reasons:
-                    return result(reasons)
+                X = check_points(search.ask(), start.lower, start.upper)
+                search.tell(X, *evaluate(X))
+                if ended := check_reasons(search.stop()):
+                    return result(ended)
+        return result(reasons)
     except KeyboardInterrupt as interrupt:
-        if not evaluate.generations:
+        if not record.generations:
             raise
         raise Interrupted(result(["interrupted"])) from interrupt
-
-
-def _run_calling(
-    search: CallingSearch,
-    generation: Callable[[Array], tuple[Array, Array, Array, Rule]],
-    limits_reached: Callable[[], list[str]],
-) -> list[str]:
-    """Let a function call the objective until it returns or a limit is reached; return the reasons for ending.
-
-    Raises:
-        SearchError: it returned without any evaluation.
-    """
-    reasons: list[str] = []
-    called = False
-
-    def evaluate(points: Array) -> tuple[Array, Array, Rule]:
-        nonlocal called
-        if reasons:  # the function ignored the first `Ended`
-            raise Ended
-        X, f, violation, rule = generation(points)
-        called = True
-        reasons.extend(limits_reached())
-        if reasons:
-            raise Ended
-        return f, violation, rule
-
-    try:
-        ended = search.run(evaluate)
-    except Ended:
-        return reasons
-    if not called:
-        raise SearchError("the function returned without any call of f")
-    return reasons or [ended]

@@ -8,9 +8,8 @@ from numbers import Integral, Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metaheuristics.array import Array, real_array
 from metaheuristics.errors import SearchError, abbreviate
-from metaheuristics.interface import Algorithm, Bounded, Constraints, Start
+from metaheuristics.interface import Algorithm, Array, Bounded, Constraints, Start, real_array
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
 

@@ -4,76 +4,49 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from importlib import import_module
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-from metaheuristics.adapters.pymoo import FRONT_MODULES, MODULES
-from metaheuristics.constraint_handling import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
+from metaheuristics.adapters.cma import CmaEs, CmaLagrangian
+from metaheuristics.adapters.egobox import BayesianOptimisation
+from metaheuristics.adapters.many_starts import CobyqaStarts, SlsqpStarts
+from metaheuristics.adapters.pymoo import MODULES, Pymoo
+from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
+from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
+from metaheuristics.algorithms.genetic import GeneticAlgorithm
+from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
+from metaheuristics.algorithms.random_search import RandomSearch, SobolPoints
+from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError, abbreviate
-from metaheuristics.interface import Algorithm
+from metaheuristics.interface import Algorithm, ConstraintHandling
 from metaheuristics.settings import check_installed, is_installed
 
-if TYPE_CHECKING:
-    from metaheuristics.multi_objective.minimize_many import FrontAlgorithm
-
-T = TypeVar("T", covariant=True)
+T = TypeVar("T")
 
 
-class _Factories(Mapping[str, Callable[..., T]]):
-    """Classes of settings by name; each module is imported when its class is first used."""
-
-    def __init__(self, paths: Mapping[str, str]) -> None:
-        self._paths = paths
-
-    def __getitem__(self, name: str) -> Callable[..., T]:
-        module, _, kind = self._paths[name].partition(":")
-        factory: Callable[..., T] = getattr(import_module(f"metaheuristics.{module}"), kind)
-        return partial(factory, algorithm=name.removeprefix("pymoo:")) if module.endswith("pymoo") else factory
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._paths)
-
-    def __len__(self) -> int:
-        return len(self._paths)
-
-
-ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = _Factories(
-    {
-        "pso": "algorithms.particle_swarm:ParticleSwarm",
-        "pso-constant": "algorithms.particle_swarm:ConstantInertiaSwarm",
-        "ga": "algorithms.genetic:GeneticAlgorithm",
-        "aco": "algorithms.ant_colony:AntColony",
-        "aco-grid": "algorithms.ant_colony:AntColonyGrid",
-        "de": "algorithms.differential_evolution:DifferentialEvolution",
-        "lshade": "algorithms.differential_evolution:LShade",
-        "random": "algorithms.random_search:RandomSearch",
-        "sobol": "algorithms.random_search:SobolPoints",
-    }
-)
+ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = {
+    "pso": ParticleSwarm,
+    "pso-constant": ConstantInertiaSwarm,
+    "ga": GeneticAlgorithm,
+    "aco": AntColony,
+    "aco-grid": AntColonyGrid,
+    "de": DifferentialEvolution,
+    "lshade": LShade,
+    "random": RandomSearch,
+    "sobol": SobolPoints,
+}
 """This package's own algorithms."""
 
-ADAPTERS: Mapping[str, Callable[..., Algorithm]] = _Factories(
-    {
-        "cma": "adapters.cma:CmaEs",
-        "cma-al": "adapters.cma:CmaLagrangian",
-        "bayes": "adapters.egobox:BayesianOptimisation",
-        "scipy:SLSQP": "adapters.many_starts:SlsqpStarts",
-        "scipy:COBYQA": "adapters.many_starts:CobyqaStarts",
-        **{f"pymoo:{name}": "adapters.pymoo:Pymoo" for name in MODULES},
-    }
-)
+ADAPTERS: Mapping[str, Callable[..., Algorithm]] = {
+    "cma": CmaEs,
+    "cma-al": CmaLagrangian,
+    "bayes": BayesianOptimisation,
+    "scipy:SLSQP": SlsqpStarts,
+    "scipy:COBYQA": CobyqaStarts,
+    **{f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES},
+}
 """Those of other packages: `pip install 'nlp-gait[algorithms]'` installs them, and `'nlp-gait[bayes]'` that of `bayes`."""
-
-FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = _Factories(
-    {
-        **{name: "multi_objective.pymoo:MultiObjective" for name in FRONT_MODULES},
-        "CMOEAD": "multi_objective.constrained_moead:ConstrainedMoead",
-        "DCNSGA3": "multi_objective.dynamic_nsga3:DynamicConstrainedNsga3",
-    }
-)
-"""Those for several objectives; all use operators of pymoo, which `pip install 'nlp-gait[algorithms]'` installs."""
 
 PACKAGES = {"cma-al": "cma", "bayes": "egobox"}  # of adapters whose names do not begin with the package's
 
@@ -131,11 +104,6 @@ def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]]
         if parameter.default is parameter.empty and setting not in settings:
             raise SearchError(f"{kind} {name!r} needs a value for {setting!r}")
     return factory(**settings)
-
-
-def front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
-    """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `algorithm` does."""
-    return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
 
 def _suggest(word: str, known: Iterable[str]) -> str:

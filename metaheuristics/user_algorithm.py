@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from metaheuristics.array import Array, real_array
-from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, CallingSearch, Evaluate, Start
+from metaheuristics.interface import Algorithm, Array, CallingSearch, Evaluate, Rule, Start, real_array
 from metaheuristics.preparation import check_population
 
 ARGUMENTS = ("f", "lower", "upper", "evaluations", "seed")

@@ -22,8 +22,7 @@ from compare.judge import evaluate
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
 from metaheuristics import registry as algorithms
-from metaheuristics.array import Array
-from metaheuristics.interface import Start
+from metaheuristics.interface import Array, Start
 from nlp_gait.formulation import (
     Assembly,
     Constraint,

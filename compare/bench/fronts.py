@@ -15,8 +15,8 @@ import numpy as np
 from compare.drawing.figures import assign_looks, new_figure, style
 from compare.report.document import Document, Figure, Section, text_table
 from compare.study.store import Computation, Store
+from metaheuristics.multi_objective import FRONT_ALGORITHMS, front_algorithm
 from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, check_budgets, minimize_many
-from metaheuristics.registry import FRONT_ALGORITHMS, front_algorithm
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.fronts import FrontQuality, get_front_definition, load_front

@@ -10,7 +10,8 @@ from functools import partial
 from typing import Any
 
 from compare.study.task import list_solvers
-from metaheuristics.registry import ADAPTERS, ALGORITHMS, FRONT_ALGORITHMS
+from metaheuristics.multi_objective import FRONT_ALGORITHMS
+from metaheuristics.registry import ADAPTERS, ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
 SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")

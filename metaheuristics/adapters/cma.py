@@ -8,9 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count, check_number, tunable
 

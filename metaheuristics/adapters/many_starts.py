@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from metaheuristics.array import Array
-from metaheuristics.interface import UNKNOWN, CallingSearch, Evaluate, Start
+from metaheuristics.interface import UNKNOWN, Array, CallingSearch, Evaluate, Start
 from metaheuristics.preparation import UnitCube
 from metaheuristics.settings import check_count, check_number
 

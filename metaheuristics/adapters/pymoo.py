@@ -10,10 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.preparation import fill_fixed
 from metaheuristics.settings import bad_setting, check_count, check_installed, tunable
 

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.settings import check_count, check_number, tunable
 
 

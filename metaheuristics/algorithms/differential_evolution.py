@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.settings import bad_setting, check_count, check_number, tunable
 
 # Mutants (P, n) of the members x (P, n), the best member (n,), others drawn for each member r (5, P, n), and the weight F.

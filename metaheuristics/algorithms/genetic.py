@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metaheuristics.algorithms.points import Points
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.settings import bad_setting, check_count, check_number, tunable
 
 _CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code

@@ -8,9 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from metaheuristics.algorithms.points import Points
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
-from metaheuristics.interface import PopulationSearch, Start
+from metaheuristics.interface import Array, PopulationSearch, Rule, Start
 from metaheuristics.settings import check_count, check_number, tunable
 
 

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import Rule
+from metaheuristics.interface import Array, Rule
 
 
 class Points(NamedTuple):

@@ -3,6 +3,12 @@
 snapshots = minimize_many(objectives, front_algorithm("NSGA2"), evaluations=(1_000, 10_000), seed=1)
 """
 
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from metaheuristics.adapters.pymoo import FRONT_MODULES
+from metaheuristics.multi_objective.constrained_moead import ConstrainedMoead
+from metaheuristics.multi_objective.dynamic_nsga3 import DynamicConstrainedNsga3
 from metaheuristics.multi_objective.minimize_many import (
     FrontAlgorithm,
     ManyObjectives,
@@ -10,7 +16,21 @@ from metaheuristics.multi_objective.minimize_many import (
     check_budgets,
     minimize_many,
 )
-from metaheuristics.registry import FRONT_ALGORITHMS, front_algorithm
+from metaheuristics.multi_objective.pymoo import MultiObjective
+from metaheuristics.registry import make_by_name
+
+FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = {
+    **{name: partial(MultiObjective, algorithm=name) for name in FRONT_MODULES},
+    "CMOEAD": ConstrainedMoead,
+    "DCNSGA3": DynamicConstrainedNsga3,
+}
+"""Algorithms by name; all use operators of pymoo, which `pip install 'nlp-gait[algorithms]'` installs."""
+
+
+def front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
+    """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `algorithm` does."""
+    return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
+
 
 __all__ = [
     "FRONT_ALGORITHMS",

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from metaheuristics.array import Array
-from metaheuristics.interface import Start
+from metaheuristics.interface import Array, Start
 from metaheuristics.multi_objective.variation import Variation, directions, feasible_front
 from metaheuristics.settings import check_count, check_installed, check_number
 

@@ -9,9 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import UNKNOWN, Bounded, Start
+from metaheuristics.interface import UNKNOWN, Array, Bounded, Start
 from metaheuristics.preparation import prepare_start, seed_sequence
 
 

@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from metaheuristics.adapters.pymoo import FRONT_MODULES, PymooSettings
-from metaheuristics.array import Array
-from metaheuristics.interface import Start
+from metaheuristics.interface import Array, Start
 from metaheuristics.preparation import fill_fixed
 
 

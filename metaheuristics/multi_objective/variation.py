@@ -7,9 +7,8 @@ from math import comb
 
 import numpy as np
 
-from metaheuristics.array import Array
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Start
+from metaheuristics.interface import Array, Start
 from metaheuristics.preparation import fill_fixed
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from metaheuristics import ADAPTERS, ALGORITHMS, Deb, EpsilonLevel, StaticPenalty, algorithm, minimize
 from metaheuristics.adapters.pymoo import MODULES
-from metaheuristics.array import Array
+from metaheuristics.interface import Array
 from tests.metaheuristics.problems import Function
 
 OTHERS = ("cma", "cma-al", "de", "scipy:SLSQP", "scipy:COBYQA", "bayes")

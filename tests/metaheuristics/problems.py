@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from metaheuristics.array import Array
+from metaheuristics.interface import Array
 
 
 class Function:

@@ -7,9 +7,7 @@ import pytest
 
 from metaheuristics import SearchError, algorithm, installed_algorithms, minimize
 from metaheuristics.algorithms.differential_evolution import gains, lehmer_mean
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import FEASIBILITY
-from metaheuristics.interface import Start
+from metaheuristics.interface import FEASIBILITY, Array, Start
 from tests.metaheuristics.problems import Function, disc, sphere
 
 BY_THEMSELVES = ("scipy:SLSQP", "scipy:COBYQA", "bayes")

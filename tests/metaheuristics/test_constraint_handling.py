@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from metaheuristics import ConstraintHandling, Deb, EpsilonLevel, SearchError, StaticPenalty
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import mark_failed
+from metaheuristics.interface import Array
+from metaheuristics.minimize import mark_failed
 
 HANDLINGS: list[ConstraintHandling] = [Deb(), StaticPenalty(weight=2.0), EpsilonLevel()]
 every_rule = pytest.mark.parametrize("handling", HANDLINGS, ids=lambda handling: handling.name)

@@ -12,8 +12,7 @@ import pytest
 
 from metaheuristics import ALGORITHMS, Deb, EpsilonLevel, GeneticAlgorithm, Result, StaticPenalty, minimize
 from metaheuristics import algorithm as make_algorithm
-from metaheuristics.array import Array
-from metaheuristics.interface import Algorithm
+from metaheuristics.interface import Algorithm, Array
 from tests.metaheuristics.problems import Function, disc, infeasible, rosenbrock, sphere
 
 ALL: dict[str, Callable[[], Algorithm]] = {

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from metaheuristics import AntColony, GeneticAlgorithm, Interrupted, ParticleSwarm, SearchError, minimize
-from metaheuristics.array import Array
-from metaheuristics.interface import Algorithm
+from metaheuristics.interface import Algorithm, Array
 from tests.metaheuristics.problems import Function, disc, infeasible, sphere
 
 SWARM = ParticleSwarm(population=10)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from metaheuristics import SearchError
-from metaheuristics.array import Array
-from metaheuristics.interface import Constraints
+from metaheuristics.interface import Array, Constraints
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, front_algorithm, minimize_many
 from metaheuristics.multi_objective.constrained_moead import places_to_take
 from metaheuristics.multi_objective.dynamic_nsga3 import compute_boundary

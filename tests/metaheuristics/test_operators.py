@@ -20,8 +20,7 @@ from metaheuristics.algorithms.genetic import (
 )
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm, move, reflect
 from metaheuristics.algorithms.points import Points
-from metaheuristics.constraint_handling import FEASIBILITY
-from metaheuristics.interface import Start
+from metaheuristics.interface import FEASIBILITY, Start
 
 WIDE = 1e9  # bounds so far away that they do not bend a distribution
 repeatable = settings(derandomize=True, deadline=None)

@@ -11,7 +11,7 @@ from scipy.optimize import dual_annealing
 from scipy.optimize import minimize as scipy_minimize
 
 from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, as_algorithm, minimize
-from metaheuristics.array import Array
+from metaheuristics.interface import Array
 from metaheuristics.user_algorithm import FAILED, INFEASIBLE
 
 

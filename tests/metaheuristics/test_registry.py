@@ -24,9 +24,7 @@ from metaheuristics import (
 from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
 from metaheuristics.algorithms.differential_evolution import STRATEGIES, DifferentialEvolution
-from metaheuristics.array import Array
-from metaheuristics.constraint_handling import FEASIBILITY
-from metaheuristics.interface import Start
+from metaheuristics.interface import FEASIBILITY, Array, Start
 from tests.metaheuristics.problems import disc, sphere
 
 

@@ -16,7 +16,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
 from compare.questions.pareto.pareto_front import SEARCH_NAMES
 from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
-from metaheuristics.array import Array
+from metaheuristics.interface import Array
 from metaheuristics.multi_objective import Snapshot
 from nlp_gait.formulation import GaitProblem
 

@@ -30,8 +30,8 @@ from compare.questions.question import Answer, Question, Work, make_csv_table, m
 from compare.report.document import Figure, Part, Table
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
+from metaheuristics.multi_objective import front_algorithm
 from metaheuristics.multi_objective.minimize_many import check_budgets
-from metaheuristics.registry import front_algorithm
 from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError

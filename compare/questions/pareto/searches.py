@@ -12,9 +12,9 @@ import numpy as np
 from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, select_front, solve_point
 from compare.questions.question import Work
-from metaheuristics.array import Array
+from metaheuristics.interface import Array
+from metaheuristics.multi_objective import front_algorithm
 from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, minimize_many
-from metaheuristics.registry import front_algorithm
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective

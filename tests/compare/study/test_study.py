@@ -25,8 +25,7 @@ from compare.study.run_task import try_task
 from compare.study.settings import SolverSpec, StudySettings, parse_settings, read_settings
 from compare.study.task import Handling, ProblemSpec, Stop, Task
 from metaheuristics import ParticleSwarm, SearchError
-from metaheuristics.array import Array
-from metaheuristics.interface import Start
+from metaheuristics.interface import Array, Start
 from nlp_gait.errors import GaitError, InputError
 
 SSP = ProblemSpec(name="nao-ssp")
