@@ -77,23 +77,18 @@ class ProgramSearch(CallingSearch):
         """
         start, settings = self._start, self._settings
         with tempfile.TemporaryFile() as messages:
+            pipe = subprocess.PIPE
             try:
-                program = subprocess.Popen(
-                    settings.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=messages
-                )
+                program = subprocess.Popen(settings.command, stdin=pipe, stdout=pipe, stderr=messages)
             except OSError as error:
                 raise SearchError(f"{settings.command[0]!r} cannot be started: {error.strerror or error}") from error
             reader = threading.Thread(target=self._forward, args=(program.stdout,), daemon=True)
             reader.start()
             try:
+                problem = {"names": list(start.names), "lower": start.lower.tolist(), "upper": start.upper.tolist()}
+                seed = int(start.rng.integers(2**31))
                 self._send(
-                    program,
-                    names=list(start.names),
-                    lower=start.lower.tolist(),
-                    upper=start.upper.tolist(),
-                    evaluations=start.evaluations,
-                    seed=int(start.rng.integers(2**31)),
-                    settings=dict(settings.settings),
+                    program, **problem, evaluations=start.evaluations, seed=seed, settings=dict(settings.settings)
                 )
                 while (line := self._read(program)) is not None:
                     proposal = self._parse(line)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from numbers import Integral, Real
+from numbers import Integral
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from metaheuristics.errors import SearchError, abbreviate
 from metaheuristics.interface import Algorithm, Array, Bounded, Constraints, Start, real_array
+from metaheuristics.settings import is_number
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
 
@@ -24,12 +26,15 @@ def prepare_start(
     """Return the inputs of an algorithm; raises SearchError for bounds or starting points (R, n) that are not allowed."""
     lower, upper = read_bounds(objective)
     values, groups = getattr(objective, "inequalities", None), getattr(objective, "groups", ())
+    # The children that a first `spawn` would give, without counting them in the parent.
+    keys, size = [(*seed.spawn_key, index) for index in (0, 1)], seed.pool_size
+    first, second = (np.random.SeedSequence(seed.entropy, spawn_key=key, pool_size=size) for key in keys)
     return Start(
         lower=lower,
         upper=upper,
-        initial=starting_points(lower, upper, population, initial, spawn_child(seed, 0)),
+        initial=starting_points(lower, upper, population, initial, first),
         evaluations=evaluations,
-        rng=np.random.default_rng(spawn_child(seed, 1)),
+        rng=np.random.default_rng(second),
         constraints=Constraints(inequalities=values, groups=tuple(groups)) if callable(values) and groups else None,
         names=tuple(objective.names),
     )
@@ -102,25 +107,25 @@ def check_limits(
     ):
         raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {abbreviate(algorithm)}")
     check_population(algorithm)
-    if not _whole(evaluations) or evaluations < algorithm.population:
+    if not is_number(evaluations, Integral) or evaluations < algorithm.population:
         raise SearchError(
             f"evaluations must be a whole number >= the population of {name_of(algorithm)!r}, {algorithm.population}, got "
             f"{abbreviate(evaluations)}: raise the budget or take a smaller population"
         )
-    if target is not None and (not _number(target) or math.isnan(target)):
+    if target is not None and (not is_number(target) or math.isnan(target)):
         raise SearchError(f"target must be a number or None, got {abbreviate(target)}")
-    if stagnation is not None and (not _whole(stagnation) or stagnation < 1):
+    if stagnation is not None and (not is_number(stagnation, Integral) or stagnation < 1):
         raise SearchError(
             f"stagnation must be a whole number of generations >= 1, or None for never, got {abbreviate(stagnation)}"
         )
-    if time_limit_s is not None and not (_number(time_limit_s) and time_limit_s > 0.0):
+    if time_limit_s is not None and not (is_number(time_limit_s) and time_limit_s > 0.0):
         raise SearchError(f"time_limit_s must be > 0, or None for no limit, got {abbreviate(time_limit_s)}")
 
 
 def check_population(algorithm: Algorithm, name: str = "") -> None:
     """Raise SearchError unless an algorithm has at least one point."""
-    population = getattr(algorithm, "population", None)
-    if not isinstance(population, Integral) or isinstance(population, bool) or population < 1:
+    population: Any = getattr(algorithm, "population", None)
+    if not is_number(population, Integral) or population < 1:
         raise SearchError(
             f"algorithm {name or name_of(algorithm)!r}: population must be a whole number >= 1, got {abbreviate(population)}"
         )
@@ -150,14 +155,6 @@ def check_helpers(handling: object, callback: object) -> None:
         raise SearchError(f"callback must be a function of X, f and violation, got {abbreviate(callback)}")
 
 
-def _whole(value: object) -> bool:
-    return isinstance(value, Integral) and not isinstance(value, bool)
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
 def name_of(algorithm: Algorithm) -> str:
     """Return the name of an algorithm; a user's class may have none."""
     return str(getattr(algorithm, "name", type(algorithm).__name__))
@@ -175,8 +172,7 @@ def check_points(asked: object, lower: Array, upper: Array, source: str = "ask")
         raise SearchError(
             f"{source} must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}"
         )
-    outside = _find_outside(points, lower, upper)
-    if outside is not None:
+    if (outside := _find_outside(points, lower, upper)) is not None:
         row, column = outside
         raise SearchError(
             f"{source} returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
@@ -187,26 +183,17 @@ def check_points(asked: object, lower: Array, upper: Array, source: str = "ask")
 
 def _find_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int] | None:
     """Return row and column of the first value of points (P, n) outside the bounds (n,), or None."""
-    outside = ~((points >= lower) & (points <= upper))  # NaN is outside too
-    if not outside.any():
-        return None
-    row, column = np.argwhere(outside)[0].tolist()
-    return row, column
+    outside = np.argwhere(~((points >= lower) & (points <= upper)))  # NaN is outside too
+    return (int(outside[0, 0]), int(outside[0, 1])) if len(outside) else None
 
 
 def seed_sequence(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
     """Return a seed as a SeedSequence; SearchError unless it is one or a whole number >= 0."""
     if isinstance(seed, np.random.SeedSequence):
         return seed
-    if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:
+    if not is_number(seed, Integral) or seed < 0:
         raise SearchError(f"seed must be a whole number >= 0 or a numpy SeedSequence, got {abbreviate(seed)}")
     return np.random.SeedSequence(int(seed))
-
-
-def spawn_child(parent: np.random.SeedSequence, index: int) -> np.random.SeedSequence:
-    """Return the child that a first `spawn` would give, without counting it in the parent."""
-    spawn_key = (*parent.spawn_key, index)
-    return np.random.SeedSequence(parent.entropy, spawn_key=spawn_key, pool_size=parent.pool_size)
 
 
 def plain_entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
@@ -237,8 +224,7 @@ def starting_points(
                 f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "
                 f"algorithm; got {rows.shape}"
             )
-        outside = _find_outside(rows, lower, upper)
-        if outside is not None:
+        if (outside := _find_outside(rows, lower, upper)) is not None:
             row, column = outside
             raise SearchError(
                 f"initial row {row}, variable {column}: {rows[row, column]} is outside the bounds "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import MISSING, field, fields, is_dataclass
+from functools import partial
 from importlib.util import find_spec
 from numbers import Integral, Real
 from operator import ge, gt, le
@@ -52,32 +53,30 @@ def list_ranges(settings: object) -> dict[str, Range]:
     return found
 
 
+def is_number(value: object, kind: type = Real) -> bool:
+    """Whether a value is a real number, or one of another kind; True and False are none."""
+    return isinstance(value, kind) and not isinstance(value, bool)
+
+
 def check_number(
     settings: DataclassInstance,
     *names: str,
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    whole: bool = False,
 ) -> None:
-    """Raise SearchError unless fields are finite numbers within the limits; ``above`` is exclusive."""
-    limits = {">": above, ">=": at_least, "<=": at_most}
-    given = " and ".join(f"{sign} {limit}" for sign, limit in limits.items() if limit is not None)
+    """Raise SearchError unless fields are finite or whole numbers within the limits; ``above`` is exclusive."""
+    limits = {sign: end for sign, end in ((">", above), (">=", at_least), ("<=", at_most)) if end is not None}
+    allowed = f"a {'whole' if whole else 'finite'} number {' and '.join(f'{sign} {limits[sign]}' for sign in limits)}"
     for name in names:
         value: Any = getattr(settings, name)
-        number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-        if not number or any(
-            limit is not None and not COMPARISONS[sign](value, limit) for sign, limit in limits.items()
-        ):
-            raise bad_setting(settings, name, f"a finite number {given}".strip())
+        number = is_number(value, Integral if whole else Real) and (whole or math.isfinite(value))
+        if not number or not all(COMPARISONS[sign](value, limit) for sign, limit in limits.items()):
+            raise bad_setting(settings, name, allowed.strip())
 
 
-def check_count(settings: DataclassInstance, name: str, *, at_least: int, at_most: int | None = None) -> None:
-    """Raise SearchError unless a field is a whole number within the inclusive limits."""
-    value = getattr(settings, name)
-    whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not whole or value < at_least or (at_most is not None and value > at_most):
-        upper = "" if at_most is None else f" and <= {at_most}"
-        raise bad_setting(settings, name, f"a whole number >= {at_least}{upper}")
+check_count = partial(check_number, whole=True)
 
 
 def is_installed(package: str) -> bool:

@@ -78,13 +78,8 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
 
     def _criteria(self) -> dict[str, float]:
         """Pycma's criteria on objective values, which it does not see, are switched off; those on the distribution remain."""
-        return {
-            "tolfun": -1.0,
-            "tolfunhist": -1.0,
-            "tolfunrel": -1.0,
-            "tolflatfitness": np.inf,
-            "tolstagnation": np.inf,
-        }
+        off = dict.fromkeys(("tolfun", "tolfunhist", "tolfunrel"), -1.0)
+        return {**off, "tolflatfitness": np.inf, "tolstagnation": np.inf}
 
     def _begin(self, centre: Array) -> Any:
         from cma import CMAEvolutionStrategy
@@ -149,14 +144,8 @@ class CmaLagrangianSearch(CmaEsSearch):
     def _begin(self, centre: Array) -> Any:
         from cma import ConstrainedFitnessAL
 
-        self._fitness = ConstrainedFitnessAL(
-            lambda x: self._current[0],
-            lambda x: self._current[1],
-            dimension=len(centre),
-            which="best",
-            logging=0,
-            archives=False,
-        )
+        functions, off = (lambda x: self._current[0], lambda x: self._current[1]), {"logging": 0, "archives": False}
+        self._fitness = ConstrainedFitnessAL(*functions, dimension=len(centre), which="best", **off)
         return super()._begin(centre)
 
     def _criteria(self) -> dict[str, float]:

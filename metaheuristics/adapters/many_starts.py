@@ -126,13 +126,9 @@ class ScipyStartsSearch(CallingSearch):
             return "all variables are fixed"
         how: dict[str, Any]
         if isinstance(self._settings, SlsqpStarts):
-            inequalities = {
-                "type": "ineq",
-                "fun": lambda z: -functions.at(z)[1],
-                "jac": lambda z: -functions.slope(z)[1],
-            }
-            options = {"maxiter": iterations, "ftol": 1e-10}
-            how = {"jac": lambda z: functions.slope(z)[0], "constraints": inequalities, "options": options}
+            rows = {"fun": lambda z: -functions.at(z)[1], "jac": lambda z: -functions.slope(z)[1]}
+            how = {"jac": lambda z: functions.slope(z)[0], "constraints": {"type": "ineq", **rows}}
+            how["options"] = {"maxiter": iterations, "ftol": 1e-10}
         else:
             inequalities = NonlinearConstraint(lambda z: functions.at(z)[1], -np.inf, 0.0)
             how = {"constraints": inequalities, "options": {"maxiter": iterations}}

@@ -213,12 +213,8 @@ class GeneticAlgorithm:
         Source:
             Goswami, Vadakkepat, Phung (2008), Table II and section 5.4.
         """
-        return cls(
-            population=30,
-            crossover=SinglePoint(probability=0.8),
-            mutation=Flip(probability=0.1),
-            survival="generational",
-        )
+        crossover, mutation = SinglePoint(probability=0.8), Flip(probability=0.1)
+        return cls(population=30, crossover=crossover, mutation=mutation, survival="generational")
 
     def start(self, start: Start) -> GeneticSearch:
         return GeneticSearch(self, start)

@@ -75,9 +75,8 @@ class DynamicNsga3Search:
         self._last = max(1, start.evaluations // settings.population - 1)
         self._generation = 0
         self._next = start.initial
-        self._X = np.empty((0, start.initial.shape[1]))
-        self._F = np.empty((0, objectives))
-        self._violation, self._violations = np.empty(0), np.empty((0, 0))
+        # X, objectives, total violations and violations of each constraint of the members
+        self._members: tuple[Array, ...] = ()
         self._first = np.empty(0)
 
     def ask(self) -> Array:
@@ -85,49 +84,43 @@ class DynamicNsga3Search:
 
     def tell(self, X: Array, F: Array, violation: Array) -> None:
         violations = np.maximum(0.0, self._start.inequalities(X, violation))
-        if not len(self._X):
-            self._X, self._F, self._violation, self._violations = (
-                np.array(X),
-                np.array(F),
-                np.array(violation),
-                violations,
-            )
+        told = (np.array(X), np.array(F), np.array(violation), violations)
+        if not self._members:
+            self._members = told
             largest = np.where(violations < UNKNOWN, violations, 0.0).max(axis=0)
             self._first = np.where(largest > 0.0, largest, 1.0)
         else:
-            self._X = np.concatenate([self._X, X])
-            self._F = np.concatenate([self._F, F])
-            self._violation = np.concatenate([self._violation, violation])
-            self._violations = np.concatenate([self._violations, violations])
-            self._keep(self._select(self._epsilon()))
+            self._members = tuple(np.concatenate(pair) for pair in zip(self._members, told, strict=True))
+            chosen = self._select(self._epsilon())
+            self._members = tuple(part[chosen] for part in self._members)
         self._generation += 1
         self._next = self._make_children()
 
     def front(self) -> tuple[Array, Array]:
-        return feasible_front(self._X, self._F, self._violation)
+        return feasible_front(*self._members[:3])
 
     def _epsilon(self) -> Array:
         return compute_boundary(self._first, self._generation, self._last, self._settings.decrease)
 
     def _make_children(self) -> Array:
         """Return children of winners of binary tournaments on the violation beyond the boundary."""
-        count, rng = self._settings.population, self._start.rng
-        beyond_boundary = np.maximum(0.0, self._violations - self._epsilon()).sum(axis=1)
-        drawn = rng.integers(len(self._X), size=(2 * -(-count // 2), 2))
+        count, rng, (X, *_, violations) = self._settings.population, self._start.rng, self._members
+        beyond_boundary = np.maximum(0.0, violations - self._epsilon()).sum(axis=1)
+        drawn = rng.integers(len(X), size=(2 * -(-count // 2), 2))
         pool = np.where(beyond_boundary[drawn[:, 0]] <= beyond_boundary[drawn[:, 1]], drawn[:, 0], drawn[:, 1])
         half = len(pool) // 2
-        return self._vary(self._X[pool[:half]], self._X[pool[half:]])[:count]
+        return self._vary(X[pool[:half]], X[pool[half:]])[:count]
 
     def _select(self, epsilon: Array) -> NDArray[np.intp]:
         """Return the positions of the members that survive."""
-        size = self._settings.population
-        mean = (self._violations / self._first).mean(axis=1)
-        within = np.flatnonzero((self._violations <= epsilon).all(axis=1))
+        size, (_, F, _, violations) = self._settings.population, self._members
+        mean = (violations / self._first).mean(axis=1)
+        within = np.flatnonzero((violations <= epsilon).all(axis=1))
         if len(within) <= size:
             return np.argsort(mean, kind="stable")[:size]
         from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-        F = self._F[within]
+        F = F[within]
         fronts = NonDominatedSorting().do(np.column_stack([F, mean[within]]), n_stop_if_ranked=size)
         sure = np.concatenate([*fronts[:-1], np.empty(0, dtype=int)]).astype(int)
         last = np.asarray(fronts[-1], dtype=int)
@@ -153,7 +146,3 @@ class DynamicNsga3Search:
         crowd = calc_niche_count(len(self._directions), niche[: len(sure)])
         of_last = slice(len(sure), None)
         return list(niching(last, count, crowd, niche[of_last], distance[of_last], random_state=self._start.rng))
-
-    def _keep(self, chosen: NDArray[np.intp]) -> None:
-        self._X, self._F = self._X[chosen], self._F[chosen]
-        self._violation, self._violations = self._violation[chosen], self._violations[chosen]

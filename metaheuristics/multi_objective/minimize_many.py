@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import process_time
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -128,17 +128,9 @@ def minimize_many(
         X = search.ask()
         while budgets and used + len(X) > budgets[0]:
             points, values = search.front()
-            snapshots.append(
-                Snapshot(
-                    evaluations=used,
-                    feasible=feasible,
-                    first_feasible=first,
-                    time_s=process_time() - began,
-                    objective_time_s=in_objectives,
-                    X=points,
-                    F=values,
-                )
-            )
+            counts: dict[str, Any] = {"evaluations": used, "feasible": feasible, "first_feasible": first}
+            counts |= {"time_s": process_time() - began, "objective_time_s": in_objectives}
+            snapshots.append(Snapshot(**counts, X=points, F=values))
             budgets.pop(0)
         if not budgets:
             return tuple(snapshots)
