@@ -12,32 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import ThreadpoolController
 
+from metaheuristics import interface, preparation
 from metaheuristics.constraint_handling import Deb
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import (
-    FEASIBILITY,
-    Algorithm,
-    Array,
-    BatchObjective,
-    CallingSearch,
-    ConstraintHandling,
-    Ended,
-    History,
-    Interrupted,
-    Result,
-    Rule,
-    real_array,
-)
-from metaheuristics.preparation import (
-    check_helpers,
-    check_limits,
-    check_points,
-    check_reasons,
-    check_search,
-    plain_entropy,
-    prepare_start,
-    seed_sequence,
-)
+from metaheuristics.interface import Algorithm, Array, BatchObjective, CallingSearch, ConstraintHandling, Ended, Rule
 
 # Packages whose searches and objectives use NumPy's BLAS and LAPACK alone.
 WITHOUT_SCIPY = ("metaheuristics.algorithms", "nlp_gait", "compare")
@@ -118,7 +96,7 @@ class Evaluator:
 
         self.evaluations += len(X)
         self.failed += int(np.count_nonzero(failed))
-        leader = FEASIBILITY.best(f, violation)
+        leader = interface.FEASIBILITY.best(f, violation)
         found = (float(violation[leader]), float(f[leader]))
         self.stagnation += 1
         if found < self.best or not self._history:
@@ -131,13 +109,13 @@ class Evaluator:
             self._callback(shown, f, violation)
         return f, violation
 
-    def history(self) -> History:
+    def history(self) -> interface.History:
         """Return the history so far as arrays."""
         columns = [np.array(column) for column in zip(*self._history, strict=True)]
         for column in columns:
             column.setflags(write=False)
         evaluations, objective, violation, elapsed_s = columns
-        return History(evaluations=evaluations, objective=objective, violation=violation, elapsed_s=elapsed_s)
+        return interface.History(evaluations=evaluations, objective=objective, violation=violation, elapsed_s=elapsed_s)
 
 
 def _read_answer(answer: object, count: int) -> tuple[Array, Array]:
@@ -146,7 +124,7 @@ def _read_answer(answer: object, count: int) -> tuple[Array, Array]:
     if not isinstance(answer, tuple) or len(answer) != 2:
         raise SearchError(f"{wanted}; it returned {type(answer).__name__}: return a tuple of two arrays")
     try:
-        f, violation = real_array(answer[0]), real_array(answer[1])
+        f, violation = interface.real_array(answer[0]), interface.real_array(answer[1])
     except (TypeError, ValueError) as error:
         raise SearchError(f"{wanted}; it returned something other than real numbers: {error}") from error
     if f.shape != (count,) or violation.shape != (count,):
@@ -176,7 +154,7 @@ def minimize(
     time_limit_s: float | None = None,
     initial: ArrayLike | None = None,
     callback: Callback | None = None,
-) -> Result:
+) -> interface.Result:
     """Minimise an objective within bounds and constraints.
 
     The starting points are uniform within the bounds and depend on the seed alone: runs of different algorithms with
@@ -204,13 +182,13 @@ def minimize(
         SearchError: An argument is not allowed, or the objective answers with wrong shapes.
         Interrupted: Ctrl-C after at least one generation; carries the partial result.
     """
-    check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
-    check_helpers(handling, callback)
-    sequence = seed_sequence(seed)
-    start = prepare_start(objective, algorithm.population, evaluations, sequence, initial)
+    preparation.check_limits(algorithm, evaluations, target, stagnation, time_limit_s)
+    preparation.check_helpers(handling, callback)
+    sequence = preparation.seed_sequence(seed)
+    start = preparation.prepare_start(objective, algorithm.population, evaluations, sequence, initial)
     search = algorithm.start(start)
     if not isinstance(search, CallingSearch):
-        check_search(search, algorithm)
+        preparation.check_search(search, algorithm)
     # A search that calls the objective evaluates point by point.
     record = Evaluator(objective, callback, thinned=isinstance(search, CallingSearch))
     reasons: list[str] = []
@@ -234,10 +212,10 @@ def minimize(
             raise Ended
         return f, violation, handling.rule(record.evaluations / evaluations, initial_violation)
 
-    def result(reasons: list[str]) -> Result:
+    def result(reasons: list[str]) -> interface.Result:
         all_failed = record.failed == record.evaluations
         record.best_x.setflags(write=False)
-        return Result(
+        return interface.Result(
             x=record.best_x,
             objective=record.best[1],
             violation=record.best[0],
@@ -250,7 +228,7 @@ def minimize(
             objective_time_s=record.objective_time_s,
             algorithm=algorithm,
             handling=handling,
-            seed_entropy=plain_entropy(sequence),
+            seed_entropy=preparation.plain_entropy(sequence),
             seed_spawn_key=tuple(sequence.spawn_key),
         )
 
@@ -262,12 +240,12 @@ def minimize(
                     raise SearchError("the function returned without any call of f")
                 return result(reasons or [reason])
             while True:
-                X = check_points(search.ask(), start.lower, start.upper)
+                X = preparation.check_points(search.ask(), start.lower, start.upper)
                 search.tell(X, *evaluate(X))
-                if ended := check_reasons(search.stop()):
+                if ended := preparation.check_reasons(search.stop()):
                     return result(ended)
         return result(reasons)
     except KeyboardInterrupt as interrupt:
         if not record.generations:
             raise
-        raise Interrupted(result(["interrupted"])) from interrupt
+        raise interface.Interrupted(result(["interrupted"])) from interrupt
