@@ -1,5 +1,6 @@
 """Entry point of the console script, which handles Ctrl-C before it imports the command line."""
 
+import gc
 import os
 import sys
 
@@ -44,8 +45,11 @@ def main() -> None:
     fix_environment()
     check_memory()
     try:
+        gc.disable()  # while modules are imported, every collection would find nothing
         from compare.cli import main as run
 
+        gc.freeze()  # what was imported stays to the end
+        gc.enable()
         run()
     except Exception as error:
         shortage = describe_shortage(error)
