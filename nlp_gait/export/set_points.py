@@ -13,8 +13,7 @@ from nlp_gait.formulation.result import count_periods
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
-# Both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name.
-COUPLED = ("RHipYawPitch",)
+COUPLED = ("RHipYawPitch",)  # both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -59,8 +59,7 @@ def get_definition(id: str) -> Definition:
     return BY_ID[id]
 
 
-# A proof with at most this relative gap has six digits: 1e-6, and what rounding adds.
-SIX_DIGITS = 1.01e-6
+SIX_DIGITS = 1.01e-6  # a proof with at most this relative gap has six digits: 1e-6, and what rounding adds
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,9 +64,8 @@ class FrontDefinition:
 class FrontQuality:
     """How near points come to a true front, with both of its ranges as 1."""
 
-    hypervolume: (
-        float  #: share of that of the true front, whose points are joined by straight lines; reference (1.1, 1.1)
-    )
+    #: share of that of the true front, whose points are joined by straight lines; reference (1.1, 1.1)
+    hypervolume: float
     igd_plus: float  #: IGD+: mean over the true front of the distance by which the points are worse
     epsilon: float  #: least number that has to be subtracted from all objectives so that no point of the true front is better
 

@@ -21,8 +21,7 @@ from nlp_gait.gaitbench.generated import define, is_generated, make_id
 from nlp_gait.gaitbench.suite_problem import gaitbench
 
 FEATURE_POINTS = 20_000
-# Compiled functions are shared by all threads, and built by one of them.
-_BUILDING = threading.RLock()
+_BUILDING = threading.RLock()  # compiled functions are shared by all threads, and built by one of them
 
 
 class OneSidedRows:

@@ -17,8 +17,7 @@ from nlp_gait.robots.tree import pose_robot, weld
 
 # NAO V5: a leg from hip to ankle [m], the mass [kg], and the heat constant K of the paper [W/(Nm)^2].
 NAO_LEG_M, NAO_MASS_KG, NAO_HEAT_W_PER_NM2 = 0.2029, 5.30535, 0.025
-# Both legs are mirror images to this [m].
-ALIKE_M = 2e-3
+ALIKE_M = 2e-3  # both legs are mirror images to this [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,20 +17,15 @@ from nlp_gait.robots.tree import Array, are_mirror_images
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
-# Shapes that move with a link.
-ReadShapes = Callable[[str], FootShapes]
+ReadShapes = Callable[[str], FootShapes]  # shapes that move with a link
 
 # Keys of a foot in a robot file, except its link.
 EXTENTS = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
 FORWARD_ANGLES = {"x": 0.0, "y": -math.pi / 2, "-x": math.pi, "-y": math.pi / 2}  # about z, of the turn to x
-# Points of a foot this close to its lowest one are on the ground.
-SOLE_THICKNESS_M = 0.004
-# The joints of the feet are lower than those of any other mirrored pair by this.
-CLEARLY_LOWER_M = 0.1
-# Soles whose parts in front of and behind the ankle differ by this show the forward direction.
-CLEAR_LEAD_M = 0.03
-# A narrower sole is a line or a point.
-LEAST_WIDTH_M = 0.01
+SOLE_THICKNESS_M = 0.004  # points of a foot this close to its lowest one are on the ground
+CLEARLY_LOWER_M = 0.1  # the joints of the feet are lower than those of any other mirrored pair by this
+CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ by this show the forward direction
+LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
 
 
 class JointPlace(NamedTuple):

@@ -13,13 +13,10 @@ from nlp_gait.robots.robot import Robot
 from nlp_gait.robots.tree import Array
 
 LEG_JOINT_COUNT = 6
-# Axes this close to a point pass through it; smaller than the rounding of published origins.
-MEETING_M = 1e-9
-# Least sine of the angle between axes that must not be parallel.
-LEAST_SINE = 0.1
+MEETING_M = 1e-9  # axes this close to a point pass through it; smaller than the rounding of published origins
+LEAST_SINE = 0.1  # least sine of the angle between axes that must not be parallel
 SHORTEST_M = 1e-3
-# A knee bends to the side on which its range is this many times the other side's.
-CLEAR_RANGE = 1.5
+CLEAR_RANGE = 1.5  # a knee bends to the side on which its range is this many times the other side's
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

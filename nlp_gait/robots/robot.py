@@ -16,8 +16,7 @@ Vector = tuple[float, float, float]
 
 LONGEST_NAME = 100
 LARGEST_NUMBER = 1e9  # in the unit of its field: above those of any robot, and its squares stay finite
-# Published tensors carry six digits: a rod's triangle equality may be missed by that much.
-TRIANGLE_TOLERANCE = 1e-6
+TRIANGLE_TOLERANCE = 1e-6  # published tensors carry six digits: a rod's triangle equality may be missed by that much
 
 
 def check_robot_name(name: str, where: str) -> None:

@@ -18,10 +18,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 GREATEST_JOINT_RATIO = 1.05
 # Above one half, the joint is at least as far from the centre of mass as the matter is spread, if the tensor is about the joint.
 FAR_RATIO = 0.5
-# Fewer links than this prove nothing.
-LEAST_LINKS = 5
-# Keeps the ratio of a point mass finite [kg m^2].
-LEAST_MOMENT = 1e-30
+LEAST_LINKS = 5  # fewer links than this prove nothing
+LEAST_MOMENT = 1e-30  # keeps the ratio of a point mass finite [kg m^2]
 
 
 class Mass(NamedTuple):
@@ -120,8 +118,7 @@ def shift_to_com(link: Link) -> Link:
     return replace(link, inertia_com_kgm2=inertia_moments(about_com))
 
 
-# Mirrored places agree to this, and mirrored axes to this cosine.
-MIRROR_M, MIRROR_COSINE = 2e-3, 0.999
+MIRROR_M, MIRROR_COSINE = 2e-3, 0.999  # mirrored places agree to this, and mirrored axes to this cosine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

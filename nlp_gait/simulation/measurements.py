@@ -233,9 +233,8 @@ class Walk:
     drift_m: float | None  # distance to the left; None after a fall
     heading_deg: float | None  # direction of the torso at the end, positive to the left; None after a fall
     planned_heading_deg: float
-    model_J_per_m: (
-        float  # energy by the model, mechanical and heat, per planned metre; infinite for a turn in one place
-    )
+    # energy by the model, mechanical and heat, per planned metre; infinite for a turn in one place
+    model_J_per_m: float
     engine_J_per_planned_m: float | None  # energy of the drives; None after a fall
     engine_J: float | None  # energy of the drives; None after a fall
     engine_J_per_m: float | None  # per metre walked; None after a fall or without progress

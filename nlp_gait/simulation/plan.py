@@ -20,8 +20,7 @@ SIDES = ("left", "right")
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 STANDING = 1e-9  # [m]; a sole that moves less is a support
-# Of a walk: all measurements at every engine's step of 0.5 ms are in memory.
-MOST_STEPS, LONGEST_S = 1000, 300.0
+MOST_STEPS, LONGEST_S = 1000, 300.0  # of a walk: all measurements at every engine's step of 0.5 ms are in memory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -30,8 +30,7 @@ COLUMNS = {
 }
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
-# Called with the engine's model and data before every step.
-OnStep = Callable[[Any, Any], None]
+OnStep = Callable[[Any, Any], None]  # called with the engine's model and data before every step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,8 +23,7 @@ Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "sp
 PhaseTrajectory = Literal[Trajectory, "measured"]
 SPANS: dict[str, int] = dict(zip(get_args(PhaseTrajectory), (0, 1, 2, 4, 8, 16, 0), strict=True))
 
-# Default samples in each interval: a cubic cannot bend between 11 samples, a spline can.
-SAMPLES, SPLINE_SAMPLES = 1, 4
+SAMPLES, SPLINE_SAMPLES = 1, 4  # default samples in each interval: a cubic cannot bend between 11 samples, a spline can
 # Coefficients of a spline lie within these bounds, wider than any optimum's, and start within a share of them.
 BOUNDS = {"m": 0.3, "rad": 3.0}
 START_SHARE = 0.05

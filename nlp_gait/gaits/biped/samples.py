@@ -27,8 +27,7 @@ class Instant(NamedTuple):
     reach: SX = SX(0, 1)  # (2,) cosines of the left and the right knee
     # (6,) of the ground on the right sole, about the point under its ankle [N, Nm]; empty unless planned
     wrench: SX = SX(0, 1)
-    # (1,) yaw of the right foot, from the left one's [rad]; empty where both point forward
-    yaw: SX = SX(0, 1)
+    yaw: SX = SX(0, 1)  # (1,) yaw of the right foot, from the left one's [rad]; empty where both point forward
     miss: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
     attitude: SX = SX(0, 1)  # (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright
     torques: Mapping[str, SX] = {}  # by joint name [Nm]; this and the rest are computed from the motion by a ``Loader``
@@ -38,8 +37,7 @@ class Instant(NamedTuple):
 
 # From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
 Planner: TypeAlias = Callable[[InstantPoint, SX, Nonsmooth], Instant]
-# Adds torques, ZMP and the ground's wrenches to a planned motion.
-Loader: TypeAlias = Callable[[Instant], Instant]
+Loader: TypeAlias = Callable[[Instant], Instant]  # adds torques, ZMP and the ground's wrenches to a planned motion
 # Another quantity at an instant, a column, from the variables by name and the phase in [0, 1].
 Trace: TypeAlias = Callable[[InstantPoint, SX], SX]
 

@@ -20,8 +20,7 @@ from nlp_gait.gaits.biped.joined_phases import STAND
 CYCLE_END, STAND_AT_END = "cycle_end", "stand_at_end"
 HALF_STEPS = 2  # the first and the last step are half steps
 LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
-# Variables of a phase besides those of its first and last state.
-DURATION, RIGHT_FROM = "duration_s", "right_from_m"
+DURATION, RIGHT_FROM = "duration_s", "right_from_m"  # variables of a phase besides those of its first and last state
 
 EACH_STEP = re.compile(r"(start|stop|step\d+)_")  # in names of variables that a cycle has once
 START_NOISE = 0.002  # of start points, as a share of the bounds' ranges

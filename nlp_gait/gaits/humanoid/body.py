@@ -31,8 +31,7 @@ from nlp_gait.symbolic.trajectories import Motion, constant_motion
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than
 # its 0.886, with which ankles of other robots reach their limits.
 HEIGHT_SHARES = (0.5905, 0.95)
-# Lean of the torso: roll to either side, pitch back and forward [rad].
-LEAN = ("torso_roll", "torso_pitch")
+LEAN = ("torso_roll", "torso_pitch")  # lean of the torso: roll to either side, pitch back and forward [rad]
 LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
 FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

@@ -25,8 +25,7 @@ HELD_ARM_ANGLES |= {"LWristYaw": 0.0, "RWristYaw": 0.0}
 RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {"LShoulderPitch": 1.5, "RShoulderPitch": 1.5}
 RESTING_ARM_ANGLES |= {"LElbowRoll": -0.53, "RElbowRoll": 0.53}
 
-# The axis about which each joint must turn.
-FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)  # the axis about which each joint must turn
 AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
 
 # Published axes and origins are rounded: 1e-3 rad and 0.1 mm move a foot by less than the 4 mm by which margins reproduce.

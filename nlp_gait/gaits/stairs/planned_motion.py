@@ -18,8 +18,7 @@ LEAST_DURATION = 1e-3  # [s]
 _NEWTON_STEPS = 6
 # Flat stairs begin their cycloid at its first point, where the root has no slope: at 2e-5 rad instead.
 _LEAST_CYCLOID_ARGUMENT = 1e-15
-# Keeps the arc's root and slopes finite where a bad plan leaves the arc [m^2].
-_LEAST_ROOT_SQUARED = 1e-6
+_LEAST_ROOT_SQUARED = 1e-6  # keeps the arc's root and slopes finite where a bad plan leaves the arc [m^2]
 # Time exceeds t3 only in plans whose knots are out of order; more than this beyond t3, the hip no longer advances [s].
 _LATEST = 1.0
 

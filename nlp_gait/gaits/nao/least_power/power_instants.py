@@ -23,8 +23,7 @@ from nlp_gait.symbolic.balance import ground_load
 from nlp_gait.symbolic.dynamics import Wrench
 from nlp_gait.symbolic.trajectories import Motion, add_motions, cubic_of_sums, resting_point, stack
 
-# First of each pair of velocities at both ends: z, x, y.
-PAIRS = (1, 3, 5)
+PAIRS = (1, 3, 5)  # first of each pair of velocities at both ends: z, x, y
 ONE, FORWARD = SX(1), DM([1, 0, 0])
 
 
