@@ -28,10 +28,7 @@ MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 
 def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
-    """Return time histories of several steps, each ``rise_m`` above the last; InputError for less than one.
-
-    The cycle is a step that starts on the left foot and ends in the mirror image of its start.
-    """
+    """Return several steps of a cycle that ends in the mirror image of its start, each ``rise_m`` higher; InputError for none."""
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
     return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [step_length(cycle), 0.0, rise_m, 0.0]))

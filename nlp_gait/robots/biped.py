@@ -82,10 +82,7 @@ class Biped:
 
 
 def make_biped_model(robot: Robot) -> Biped:
-    """Convert a robot to a biped.
-
-    Raises InputError unless its legs are mirror images of six turning joints each, and its posture names only other joints.
-    """
+    """Convert a robot with mirrored legs of six turning joints, its other joints in a posture, to a biped; raises InputError."""
     feet = [robot.feet[side].link for side in SIDES]
     paths = [robot.path_to_root(foot) for foot in feet]
     shared = {joint.name for joint in paths[0]} & {joint.name for joint in paths[1]}
@@ -142,10 +139,7 @@ LIKE_NAO = 0.1  # legs whose length differs by at most this share from NAO's hav
 
 
 def compare_swing(biped: Biped) -> float:
-    """Return by how much a robot can swing faster than NAO does in its papers, in proportion; at least 1.
-
-    It is 1 for robots of NAO's size, and where the file has no torque: one that could hold the whole robot on a stretched leg.
-    """
+    """Return how much faster than NAO in its papers a robot can swing, 1 for NAO's size or a file without torques."""
     largest = biped.full.mass_kg * GRAVITY * biped.leg_length_m
     if abs(biped.length_scale - 1.0) <= LIKE_NAO or _find_hip(biped)[1] > largest:
         return 1.0
@@ -153,10 +147,7 @@ def compare_swing(biped: Biped) -> float:
 
 
 def find_least_swing_time(biped: Biped) -> float:
-    """Return the least time in which the hip carries a leg over two usual steps [s].
-
-    The angle is a cubic of time from rest to rest, within the joint's speed and torque; the leg is a rod of its mass.
-    """
+    """Return the least time in which the hip's speed and torque swing a leg, a rod, by a cubic over two usual steps [s]."""
     speed, torque = _find_hip(biped)
     angle = 2 * STEP_M / NAO_LEG_M
     mass_kg = sum(biped.model.links[biped.model.joint(name).child].mass_kg for name in biped.legs["left"].joints)

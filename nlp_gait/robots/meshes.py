@@ -86,10 +86,7 @@ def cylinder_points(radius: float, half_length: float) -> Array:
 
 
 def mesh_points(path: Path) -> Array:
-    """Read the corners (N, 3) of a mesh in the file's own unit, those of Collada in metres; raises RobotDataError.
-
-    It is read in a child process with limits, see ``limits.py``.
-    """
+    """Read the corners (N, 3) of a mesh in the file's unit, of Collada in metres, in a child process; raises RobotDataError."""
     data = read_in_child(f"mesh {str(path)!r}", lambda: np.asarray(_read_points(path), float).tobytes())
     return np.frombuffer(data).reshape(-1, 3).copy()
 

@@ -1,7 +1,4 @@
-"""URDF files in the form of a JSON robot file.
-
-They are parsed by ``urdf_parser_py`` of ROS (extra ``urdf``), which refuses incomplete links and joints by name.
-"""
+"""URDF files in the form of a JSON robot file; ``urdf_parser_py`` of ROS (extra ``urdf``) refuses incomplete links and joints."""
 
 from __future__ import annotations
 

@@ -221,10 +221,7 @@ def _if_any(statistic: Any, values: Array) -> float | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walk:
-    """A walk in numbers; distances are of the point halfway between the feet, from start to rest.
-
-    Forward is from the planned start straight to the planned end.
-    """
+    """A walk in numbers, of the point between the feet from start to rest; forward is from planned start to planned end."""
 
     steps: int
     steps_done: int  # whole steps before a fall; all if it fell later or not at all

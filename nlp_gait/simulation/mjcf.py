@@ -132,10 +132,7 @@ def add_bodies(
 
 
 def _positive_tensor(link: Link) -> tuple[float, ...]:
-    """Return the inertia tensor in MJCF's order, xx, yy, zz, xy, xz, yz [kg m^2].
-
-    MuJoCo refuses points and thin rods: they become as thick as a small ball of their mass.
-    """
+    """Return the tensor xx, yy, zz, xy, xz, yz [kg m^2]; points and thin rods, which MuJoCo refuses, get a small ball's."""
     moments, products = link.inertia_com_kgm2[:3], link.inertia_com_kgm2[3:]
     thin = np.linalg.eigvalsh(link.inertia_matrix)[0] < LEAST_MOMENT
     ball = 0.4 * link.mass_kg * BALL_RADIUS**2 if thin else 0.0

@@ -108,10 +108,7 @@ def simulate_plan(
     *,
     on_step: OnStep | None = None,
 ) -> Simulation:
-    """Simulate a gait from its planned state at time zero until it has settled or the robot has fallen.
-
-    Deterministic: the same arguments give the same numbers. Raises MissingExtraError without MuJoCo.
-    """
+    """Simulate a gait from its planned state until it has settled or fallen, deterministically; raises MissingExtraError."""
     engine = load_mujoco()
     drive, conditions = drive or Drive(), conditions or Conditions()
     model, data = prepare(plan, conditions, drive, sole)

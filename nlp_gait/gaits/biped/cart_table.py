@@ -161,10 +161,7 @@ class Walker:
         return path
 
     def make_gait(self, hip_path: Callable[[Array], Array]) -> Result:
-        """Return the cycle in which the hip moves along a path (2, k) over the floor, judged as a planned one.
-
-        Raises InputError if a foot is out of reach.
-        """
+        """Return the cycle in which the hip follows a path (2, k) over the floor; raises InputError if a foot is out of reach."""
         t, steps = self.times, self.footsteps
         hip = np.vstack([hip_path(t), np.full(len(t), steps.hip_height_m)])
         angles, reach, miss = (

@@ -54,10 +54,7 @@ class PhaseMotion(NamedTuple):
 
 
 def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
-    """Return the variables of a cycle; the step length is the last one.
-
-    Heights, velocities, swing height and times have the bounds of the phases.
-    """
+    """Return the variables of a cycle, most with the bounds of the phases; the step length is the last one."""
     found = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
     low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")

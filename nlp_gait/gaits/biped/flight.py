@@ -51,10 +51,7 @@ class Flight:
         return self.rise_m / self.run_m
 
     def swing(self, start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, s: SX) -> Motion:
-        """Return the motion of a swinging foot's ankle (3,) from tread to tread, from rest to rest [m].
-
-        The bow of height ``lift`` is added to the way upward.
-        """
+        """Return the motion (3,) of a swinging ankle from tread to tread and rest to rest, with a bow of height ``lift`` [m]."""
 
         def along(shape: Polynomial, start: SX | float, way: SX) -> Motion:
             orders = (ca.polyval(DM(shape.deriv(k).coef[::-1]), s) / duration**k for k in range(3))

@@ -74,10 +74,7 @@ def read_footholds(path: str | Path) -> str:
 
 
 def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float, float]) -> str:
-    """Return the footholds of a turn to the left along an arc or of a line, of which the last foot closes beside the other one.
-
-    All steps but the last advance equally, by a length of the arc and an angle; the right foot steps first.
-    """
+    """Return the footholds of a turn to the left along an arc, or of a line; steps advance equally, and the last foot closes."""
     found, turn = [], math.radians(turn_deg)
     for k in range(1, steps + 1):
         share, y = min(k / (steps - 1), 1.0), feet_y[k % 2]
@@ -91,10 +88,7 @@ def list_arc(turn_deg: float, steps: int, distance_m: float, feet_y: tuple[float
 
 
 def list_swings(footholds: Sequence[Foothold], feet_y: tuple[float, float]) -> list[tuple[Foothold, Foothold]]:
-    """Return where the foot of each step lifts and lands, as a right foot seen from a standing left one.
-
-    The walk begins with both feet side by side at x = 0, and the right one steps first.
-    """
+    """Return where the foot of each step, first the right one, lifts and lands, as a right foot seen from a left one."""
     feet = list_feet(footholds, feet_y)
     views = ((feet[k - 1], feet[k], feet[k + 1], k % 2 == 1) for k in range(1, len(feet) - 1))
     return [

@@ -68,10 +68,7 @@ def list_rows_over_time(
 
 
 def join_phases(phases: Iterable[Signals]) -> Signals:
-    """Join phases that each begin at time zero, one after the other.
-
-    Of the two samples at a switch the earlier one is kept: positions and velocities are equal.
-    """
+    """Join phases that begin at time zero; of both samples at a switch, equal in positions and rates, the earlier one is kept."""
     first, *others = phases
     arrays = {name: [array] for name, array in first.arrays.items()}
     for other in others:

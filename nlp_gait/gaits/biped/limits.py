@@ -65,10 +65,7 @@ def make_rows(
 def make_rows_at_samples(
     name: str, unit: str, values: MX, names: Sequence[str], lower: MX | None, upper: MX | None = None, *, first: int = 0
 ) -> Constraint:
-    """Make rows of every instant from a matrix (k, n) with a column for each sample, the first of them number ``first``.
-
-    Names are those of the matrix's rows (k,); limits are scalars or (k n, 1).
-    """
+    """Make rows of all instants from a matrix (k, n) of samples from number ``first``; limits are scalars or (k n, 1)."""
     numbers = range(first, first + values.shape[1])
     return make_rows(name, unit, ca.vec(values), lower, upper, make_labels(names, numbers), "instant")
 
@@ -160,10 +157,7 @@ class TorqueChange(Limit):
 
 
 class BalanceMargins(Limit):
-    """Least dynamic balance margins, at every sample and in the mean (sections 3.1, 3.2, 4.1 and 4.2).
-
-    ``mean_limits_m`` are the defaults of the least mean margins in x and y, ``least_m`` those of the margins at samples [m].
-    """
+    """Least balance margins at samples, by default ``least_m``, and in the mean, in x and y [m] (sections 3.1 to 4.2)."""
 
     def __init__(
         self, margins: Margins, mean_limits_m: tuple[float, float], least_m: tuple[float, float] = (0.0, 0.0)
@@ -197,10 +191,7 @@ class BalanceMargins(Limit):
 
 
 class AngleLimits(Limit):
-    """Angles between the ends of a phase within the robot's limits, which only a richer motion than a cubic can break.
-
-    The trace ``angles`` is a column of the joints' angles [rad].
-    """
+    """Angles within the robot's limits between the ends, which a cubic cannot break; the trace is a column of them [rad]."""
 
     def __init__(self, name: str, robot: Robot, joints: Sequence[str], angles: Trace) -> None:
         self._name, self._robot, self._joints = name, robot, tuple(joints)
@@ -243,10 +234,7 @@ class FootClearance(Limit):
 def make_halfway_rows(
     along: MX, middle: float, heights: MX, least: MX, corners: tuple[str, ...] = ()
 ) -> tuple[Constraint, ...]:
-    """Make rows for a swing foot halfway through the phase: in the middle of its path, as in the papers, and high enough.
-
-    Its place along the path and the heights (m, 1) of its points, whose names are ``corners``, are in metres.
-    """
+    """Make rows for a swing foot halfway: in the middle of its path, as in the papers, and high enough at ``corners`` [m]."""
     return (
         make_rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),
         make_rows("foot_lift", "m", heights - least, MX(0.0), labels=corners, over="once"),

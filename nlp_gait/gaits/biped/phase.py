@@ -76,10 +76,7 @@ class Phase:
         )
 
     def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
-        """Evaluate the phase at its N + 1 equidistant samples, or at other phases (1, k); mapped, never unrolled.
-
-        Finite differences are of the samples themselves, so other phases need analytic derivatives.
-        """
+        """Evaluate the phase at N + 1 equidistant samples, or with analytic derivatives at other phases (1, k); one map."""
         return self.sample_several([at], ops, phases)[0]
 
     def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
@@ -126,10 +123,7 @@ class Phase:
         )
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
-        """Return the phase as functions of time; nothing with finite differences, which are of its samples.
-
-        In a longer motion it has a name and begins after the phases of which ``begins`` lists the durations.
-        """
+        """Return the phase as functions of time, after those of the durations ``begins``; nothing with finite differences."""
         if self.derivatives != "analytic":
             return ()
 
@@ -292,10 +286,7 @@ class Phase:
     def _write_kinematics(
         self, inputs: list[SX], plan: Instant, at: InstantPoint, traces: Mapping[str, Trace]
     ) -> ca.Function:
-        """One sample: moving angles and both derivatives, hip, planned angles, reach, world, attitude, and traces.
-
-        ``world`` is the centre of mass, both feet, the planned wrench and the right foot's yaw in one column.
-        """
+        """One sample: motion, hip, planned angles, reach, world (mass centre, feet, planned wrench, yaw), attitude, traces."""
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
         tree = tree_from(self.body.robot, self.body.robot.feet["left"].link)
         angles = {name: joint.position for name, joint in plan.joints.items()}

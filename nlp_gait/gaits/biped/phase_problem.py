@@ -59,10 +59,7 @@ def make_phase_limits(body: Body, balance: limits.BalanceMargins, *, solved: boo
 
 
 def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool = True) -> GaitProblem:
-    """Return the problem of one phase; its name is without the robot's family, its title without the robot.
-
-    Only gradient methods solve a problem that is not searchable.
-    """
+    """Return the problem of one phase, whose name and title lack the robot's; not ``searchable``, it needs gradients."""
     body, start = phase.body, phase.start
     if not body.closed_form:
         usual = [body.narrow(variable) for variable in phase.variables]

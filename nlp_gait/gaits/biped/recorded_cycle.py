@@ -127,10 +127,7 @@ GROUND_TOLERANCE = Parameter(
 
 
 class HipLimits(Limit):
-    """The hip at both ends within the ranges of the planned motion's variables.
-
-    ``variables`` are those at the start and at the end, by what they limit: ``x``, ``z``, ``vx``, ``vy``, ``vz``.
-    """
+    """The hip at both ends within the ranges of planned variables, by what they limit: ``x``, ``z``, ``vx``, ``vy``, ``vz``."""
 
     def __init__(self, variables: Sequence[Mapping[str, Variable]], labels: Sequence[str]) -> None:
         self._variables, self._labels = variables, labels

@@ -123,10 +123,7 @@ class FreeParts(NamedTuple):
 
 
 def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
-    """Return the places of torso and right foot of a robot on its left foot, from angles by joint name [rad].
-
-    The robot's links that never move are welded; its left ankle stands at ``support`` [m].
-    """
+    """Return the places of torso and right foot of a robot with its left ankle at ``support`` [m], from joint angles [rad]."""
     tree = tree_from(robot, robot.feet["left"].link)
     found = forward_kinematics(tree, q, SX(DM(support)))
     poses = {body.link.name: pose for body, pose in zip(tree, found, strict=True)}
@@ -150,10 +147,7 @@ def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, f
 
 @lru_cache(maxsize=8)
 def make_places_function(body: Body) -> ca.Function:
-    """Return a function of the angles (J,) on the left foot.
-
-    Outputs: torso, hip and right ankle (3,), corners of the right sole (3, 4) [m], and the cosine of the lean.
-    """
+    """Return the function of angles (J,) to torso, hip, right ankle (3,), right sole's corners (3, 4) [m], cosine of the lean."""
     q = SX.sym("q", len(body.joints))
     parts = locate_free_parts(body.robot, dict(zip(body.joints, ca.vertsplit(q), strict=True)), body.support)
     hip = parts.torso + parts.rotation @ DM(body.hip_m)

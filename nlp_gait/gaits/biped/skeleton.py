@@ -65,10 +65,7 @@ def _at_zero(robot: Robot, link: str) -> Array:
 
 
 def place_links(robot: Robot, angles: Mapping[str, SX], left_ankle: SX) -> dict[str, SX]:
-    """Return world positions (3,) of every link's joint, and of its tip, the centre of mass, seen from the flat left foot.
-
-    Joints without an angle [rad] are at zero; the left ankle is (3,) [m].
-    """
+    """Return places (3,) of every link's joint and tip, its centre of mass, from the left ankle [m]; other joints are at zero."""
     tree = tree_from(robot, robot.feet[LEFT].link)
     places: dict[str, SX] = {}
     poses = forward_kinematics(tree, dict.fromkeys(robot.joints, SX(0)) | dict(angles), left_ankle)

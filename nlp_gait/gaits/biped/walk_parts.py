@@ -72,10 +72,7 @@ def make_phase_variables(body: Body) -> tuple[Variable, ...]:
 
 
 def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
-    """Return the variables of the cycle, and those of both ends of the walk after them.
-
-    Without inner steps, only the state between the half steps and the step length remain of the cycle.
-    """
+    """Return the variables of the cycle and of both ends of the walk; without inner steps, few of the cycle's remain."""
     cycle = make_cycle_variables(body)
     own = {variable.name: variable for variable in cycle}
     inner = {LIFT, *TIMES.values()} | {name for name in own if "touch_down" in name}
@@ -113,10 +110,7 @@ def _load_start() -> dict[str, float]:
 def start_walk(
     variables: Sequence[Variable], rise: float, parameters: Mapping[str, float], rng: np.random.Generator
 ) -> Array:
-    """Draw a start point (n,) near a walk of NAO in proportion to the bounds, at the required speed.
-
-    On ground that rises forward, by ``rise`` for each metre, the hip is ahead by that share of its height.
-    """
+    """Draw a start point (n,) near NAO's walk in proportion to the bounds, at the required speed, on ground that may rise."""
     shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
     x = {
         variable.name: variable.lower + width * shares.get(EACH_STEP.sub("", variable.name), 0.5)
@@ -136,10 +130,7 @@ def start_walk(
 
 
 def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float], rise_m: float = 0.0) -> Array:
-    """Return a start point (n,) with the states and times of a cycle in all phases; ``start`` has what a cycle has not.
-
-    On stairs, of which each step climbs ``rise_m``, the hip is as far above the middle of both feet as on the flat.
-    """
+    """Return ``start`` (n,) with states and times of a cycle in all phases; on stairs the hip rises with the feet's middle."""
     found = walk.by_name(start)
     for name in found:
         same = EACH_STEP.sub("", name).replace(STAND, "lift_off")

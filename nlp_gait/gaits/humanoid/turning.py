@@ -30,10 +30,7 @@ class SharpestTurn(NamedTuple):
 
 
 def find_stiff_joint(biped: Biped, yaw: float) -> tuple[str, float] | None:
-    """Return the hip joint that does not allow a yaw of the right foot from the left one [rad], and the largest that it allows.
-
-    The torso points into the mean of both feet's directions, and a joint about the vertical turns each leg from there.
-    """
+    """Return the hip joint that forbids a yaw between the feet [rad], of which each leg turns half, and the largest allowed."""
     for side, leg in biped.legs.items():
         turn = (yaw if side == "right" else -yaw) / 2
         for axis, (low, high), joint in zip(leg.axes[:3], leg.limits_rad, leg.joints, strict=False):

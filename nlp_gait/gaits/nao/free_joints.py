@@ -142,10 +142,7 @@ class FreePhase(Phase):
 
 
 class FreeLimits(limits.Limit):
-    """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot.
-
-    Halfway the swing foot is at x = ``path_middle``; ``inner_edge`` is y of the supporting sole's inner edge [m].
-    """
+    """Limits that planned motions keep by construction: joints, the swing foot's height, and its side of the other foot [m]."""
 
     def __init__(self, robot: Robot, path_middle: float, inner_edge: float) -> None:
         self._robot, self._path_middle, self._inner_edge = robot, path_middle, inner_edge
@@ -197,10 +194,7 @@ def tie_entries(values: MX, ops: Nonsmooth) -> MX:
 
 
 def fit_coefficients(signals: Signals, spans: int) -> Array:
-    """Return the coefficients, curve by curve, of the free motion that is nearest to another one with the same ends.
-
-    The other motion's signals should have many samples; 0 spans stand for no splines.
-    """
+    """Return the coefficients, curve by curve, of the free motion nearest to another, finely sampled one with the same ends."""
     if spans == 0:
         return np.zeros(0)
     t, q, qd = (signals.arrays[name] for name in ("t", "q", "qd"))

@@ -76,10 +76,7 @@ def make_leaning_nao(body: NaoBody) -> LeaningNao:
 
 
 class FlatSoles(Limit):
-    """Soles that the closed chain leaves flat between the ends, where Newton's method has converged.
-
-    The trace ``turns`` is the angle of each sole from flat (2,) [rad].
-    """
+    """Soles that the closed chain leaves flat where Newton's method has converged; ``turns`` (2,) are their angles [rad]."""
 
     def __init__(self, turns: Trace) -> None:
         self.traces = {"sole_turn": turns}

@@ -196,10 +196,7 @@ def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repea
 def make_standing_step(
     t: Array, q: Array, qd: Array, qdd: Array, toe: Array, sole: Array, double_support_s: float
 ) -> StepMotion:
-    """Return a step over the flat stance foot, with load on the rear foot for some time.
-
-    Angles q (T, 7) of the moving links are absolute [rad]; the ground's forces act on the rear toe and sole joint, (T, 2) [N].
-    """
+    """Return a step over the flat stance foot from angles q (T, 7) [rad] and forces (T, 2) [N] on rear toe and sole joint."""
     found = biped.make_loads("T", "S").map(len(t))(q.T, qd.T, qdd.T, toe.T, sole.T)
     torque, stance, pressure = (np.array(part).T for part in found)
     flat = np.zeros((len(t), len(biped.LINKS) - len(biped.MOVING)))
@@ -257,10 +254,7 @@ def _signals(step: StepMotion, rise: float) -> Signals:
 
 
 def _stance_toe_torque(load: Array, pressure: Array) -> Array:
-    """(T,) torque of the standing toe, from the force on the whole foot [N] and its centre ahead of the ankle [m].
-
-    With the pressure ahead of the joint the toe carries the load; behind it, the toe needs no torque.
-    """
+    """(T,) torque of the standing toe from the foot's load [N] and its centre from the ankle [m]; none behind the joint."""
     paper = biped.toe_foot_biped()
     weight = paper.link("ST").mass_kg * biped.GRAVITY * paper.toe_m / 2
     return np.maximum(load * (pressure - paper.sole_m) - weight, 0.0)

@@ -29,10 +29,7 @@ def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
 
 
 def compute_leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
-    """Return (2,) rates of thigh and shank [rad/s] at which the ankle has a velocity (2,) from the hip [m/s].
-
-    Damped where the knee is straight or folded within a thousandth of a radian, so that they are always finite.
-    """
+    """Return (2,) rates of thigh and shank [rad/s] for an ankle's velocity (2,) from the hip [m/s], damped at a straight knee."""
     (a, b), (c, d) = (
         ca.vertsplit(row) for row in ca.horzsplit(ca.jacobian(leg_vector(angles, thigh, shank), angles).T)
     )

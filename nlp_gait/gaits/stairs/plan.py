@@ -162,10 +162,7 @@ def _phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]
 
 
 def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: Nonsmooth) -> Assembly:
-    """Return the rows of one phase of the step at fractions (1, k) of it.
-
-    Clearance has no reserve here, which accounts for the motion between samples.
-    """
+    """Return the rows of one phase at fractions (1, k) of it; clearance has no reserve for the motion between samples here."""
     grid = grid_at(phase, fractions)
     samples = step.samples(point, ops, grid)
     start, end = (point[name] if name else MX(0) for name in PHASE_ENDS[phase : phase + 2])

@@ -90,10 +90,7 @@ class PlannedStep:
         return total
 
     def jerk(self, samples: PlanSamples, quantum: MX, *, knots: bool = False) -> MX:
-        """Return joint jerk between consecutive samples as a column [rad/s^3], everywhere or between phases only.
-
-        A jump between phases takes one quantum [s].
-        """
+        """Return joint jerk between samples [rad/s^3] as a column, or between phases only, where a jump takes one quantum [s]."""
         change = DM(JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
         columns = []
         for k in range(change.shape[1]):

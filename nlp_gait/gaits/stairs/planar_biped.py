@@ -122,10 +122,7 @@ def direction(link: str, angle: SX) -> SX:
 
 
 def points(q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
-    """Return positions of all joints and ends by name, (2,) each [m], from nine angles [rad] and the place of the base (2,) [m].
-
-    The base is the stance ankle A', the tip of the stance toe T' or the hip H.
-    """
+    """Return joints and ends by name, (2,) each [m], from nine angles [rad] and the place (2,) of a base: A', toe T' or hip H."""
     return sum_along_links(base, place, lambda link: rod(link).length_m * direction(link, q[LINKS.index(link)]))
 
 

@@ -99,10 +99,7 @@ def ankle_on_toe(sole: SX, toe: SX) -> SX:
 
 
 def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
-    """Return angles of sole and toe of the foot that landed last [rad], at fractions s (4,) of the next step's phases.
-
-    The motion of the rear foot backwards in time: about the tip of the toe, then about the sole; see ``ankle_on_toe``.
-    """
+    """Return angles of sole and toe of the foot that landed last [rad]: the rear foot's motion backwards (``ankle_on_toe``)."""
     first, second = ca.vertsplit(plan.durations[:2])
     remaining = landing_share(plan, s) * first
     back = ca.vertcat(ca.fmin(remaining / first, 1), ca.fmax((remaining - first) / second, 0), 0, 0)
@@ -223,10 +220,7 @@ class Posture(NamedTuple):
 def posture(
     plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin: SX, ops: Nonsmooth, step: StepKind = "next"
 ) -> Posture:
-    """Return the posture at fractions s (4,) of the phases, symbols; their rates (4,) are 1 / duration now, else 0 [1/s].
-
-    The margin is on the cosine of a knee.
-    """
+    """Return the posture at symbols s (4,), shares of the phases with rates 1 / duration or 0; margin of a knee's cosine."""
     stance = ca.vertcat(stair.tread, stair.rise)  # of the stance ankle from the rear one
     climbed = stair  # half of the swing foot's way
     if step == "first":

@@ -64,10 +64,7 @@ def read_stair(point: Point) -> Stair[MX]:
 
 
 def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
-    """Return histories of joints (columns as JOINTS) and of links (columns as MOVING, m rows).
-
-    A joint's angle is the difference of its links' absolute angles, see ``JOINT_RATES``.
-    """
+    """Return histories of joints, differences of links' absolute angles (``JOINT_RATES``), and of links (m rows, as MOVING)."""
     links = {"q": q, "qd": qd, "qdd": qdd}
     joints = {name: value @ JOINT_RATES.T for name, value in links.items()}
     return {**joints, **{f"link_{name}": value for name, value in links.items()}}
@@ -84,10 +81,7 @@ def rows(
     upper: MX | float | None = None,
     columns: Sequence[int] = (),
 ) -> Constraint:
-    """Return rows for quantities ``of`` (r,) at instants ``columns`` (m,), by default from zero; the value is (r, m) [unit].
-
-    Bounds are for all rows or for each; ``scale`` is that of a violation, see ``Constraint``.
-    """
+    """Return rows for quantities ``of`` (r,) at instants ``columns`` (m,), by default from zero; the value is (r, m) [unit]."""
     labels, column = make_labels(of, columns or range(value.shape[1])), ca.vec(value)
     least, most = (None if bound is None else MX(bound) for bound in (lower, upper))
     return Constraint(

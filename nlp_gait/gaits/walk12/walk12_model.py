@@ -94,10 +94,7 @@ Shank: TypeAlias = Callable[[Walk12Leg, DM], Motion]
 
 
 def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBiped) -> tuple[Motion, Motion]:
-    """Return positions (3,) of the swing ankle P12 and of the stance hip P6 [m] over the first step of T [s].
-
-    The variables x (4,) are step length s, frontal shift n, foot lift H and bending height h [m].
-    """
+    """Return swing ankle P12 and stance hip P6 (3,) [m] over the first step of T [s], for the variables x: s, n, H and h [m]."""
     s, n, lift, bend = ca.vertsplit(x)
 
     def swing_ankle(t: SX) -> SX:
@@ -115,10 +112,7 @@ def compute_ankle_and_hip(x: SX, time: Motion, step_time: SX, robot: PointMassBi
 def compute_legs(
     x: SX, phase: SX, step_time: SX, turn: SX, margin: SX, robot: PointMassBiped, ops: Nonsmooth
 ) -> tuple[Walk12Leg, Walk12Leg]:
-    """Return the stance leg and the swing leg at a phase t / T.
-
-    The swing leg is yawed at its hip by K, ``turn`` [rad], positive to the left; for the margin see ``Nonsmooth.acos``.
-    """
+    """Return stance and swing leg at a phase t / T, the swing leg yawed at its hip by ``turn``, K [rad], positive to the left."""
     swing_ankle, hip = compute_ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
     stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))
     swing_hip = hip._replace(position=hip.position + _across(robot))

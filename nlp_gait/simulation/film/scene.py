@@ -48,10 +48,7 @@ def find_stairs(model: Any) -> Any:
 
 
 class Scene:
-    """Views of one recording, together of a width and height [pixels]; call ``close`` at the end.
-
-    Raises OutputError if this machine cannot draw off the screen.
-    """
+    """Views of one recording, width by height [pixels]; call ``close`` at the end. Raises OutputError if nothing can be drawn."""
 
     def __init__(self, recording: Recording, views: Sequence[View], width: int, height: int) -> None:
         self._engine = engine = load_mujoco(pictures=True)

@@ -29,10 +29,7 @@ STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 
 
 def power_form_maker(robot: Robot, make_phase: Callable[[float], PowerPhase]) -> Callable[[GaitProblem], PowerForm]:
-    """Return the function that makes a phase's power form.
-
-    ``make_phase`` makes the phase for a largest cosine of the knee's angle, see ``leg_frames``.
-    """
+    """Return the maker of a phase's power form; ``make_phase`` takes the knee's largest cosine, see ``leg_frames``."""
 
     def make(problem: GaitProblem) -> PowerForm:
         margin = problem.value("reach_margin")

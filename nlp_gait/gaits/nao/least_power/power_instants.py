@@ -74,10 +74,7 @@ class PowerInstant:
         return world_frame.link_wrench(self.robot.links[name], frame.axes, frame.origin.acceleration, GRAVITY)
 
     def add_arm(self, side: str, arms: Mapping[str, Motion], acceleration: SX) -> SX:
-        """Add the torques of an arm; returns its wrench (6, 2) about the torso's origin.
-
-        At one phase the arm's pose consists of numbers, so that everything is linear in the torso's acceleration.
-        """
+        """Add the torques of an arm, whose pose at one phase is numbers; returns its wrench (6, 2) about the torso's origin."""
         joints, a = [self.robot.joint(f"{side}{name}") for name in ARM_JOINTS], SX.sym("a", 3)
         frames = world_frame.chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
         carried, at, rows = SX(6, 2), SX(3, 1), list[SX]()

@@ -73,10 +73,7 @@ def _pitch(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
 
 
 def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Motion) -> dict[str, Frame]:
-    """Return the frames of the links of a chain of joints, from the base outwards, on a link that does not turn.
-
-    Angles are by joint name [rad]; ``base`` is the motion (3,) of the origin of the link before the first joint [m].
-    """
+    """Return the frames of a chain's links, outwards from a base (3,) [m] that does not turn, with angles by joint name [rad]."""
     names = [joint.name for joint in joints]
 
     def columns(q: SX) -> SX:
