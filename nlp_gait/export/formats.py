@@ -36,11 +36,7 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     """Write a gait to a file in one of FORMATS.
 
     Rows are exactly a period apart; the last one is that before the end, or after it where the robot is at rest.
-
-    Raises:
-        UnknownNameError: no such format.
-        InputError: the format cannot express the gait.
-        OutputError: the file cannot be written.
+    Raises UnknownNameError, InputError if the format cannot express the gait, or OutputError.
     """
     if name not in FORMATS:
         raise unknown("format", name, FORMATS)

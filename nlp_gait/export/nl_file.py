@@ -37,11 +37,8 @@ def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> l
     """Write the ``.nl`` file of a problem's NLP, names of its columns and rows, and a JSON file; return their paths.
 
     The NLP is that of the solvers: scaled variables, then those of lifted operations. The JSON file has offset and scale of the
-    variables, and ``known``, facts such as the best known value.
-
-    Raises:
-        InputError: an operation that the format does not have.
-        OutputError: the folder cannot be written to, or has a file of another program under one of the names.
+    variables, and ``known``, facts such as the best known value. Raises InputError for an operation that the format does not
+    have, or OutputError, also for a file of another program under one of the names.
     """
     model = build_nlp(problem)
     prefix, width = f"{problem.name.replace('-', '_')}_nlp", model.widths[-1]

@@ -29,11 +29,7 @@ def export_solver(problem: GaitProblem, folder: Path, *, near: Outcome | None = 
     """Write source, header, example and build line of a problem's NLP with its parameter values; return the files.
 
     With ``near``, an optimum by IPOPT, also a planner in C that begins there and solves again for other parameter values.
-
-    Raises:
-        CompilerError: the NLP has an operation without C++ code.
-        InputError: ``near`` is not an optimum, or no planner can be written for the problem.
-        OutputError: the folder cannot be written to.
+    Raises CompilerError for an operation without C++ code, InputError as ``describe_planner``, or OutputError.
     """
     model = build_nlp(problem)
     found = make_nlp_plan(split_nlp(model.nlp))

@@ -142,9 +142,7 @@ def resolve_instance(name: str) -> dict[str, str]:
 def define(id: str) -> Definition:
     """Return what an instance is made from: one of either suite, or a problem by its name, with its defaults.
 
-    Raises:
-        UnknownNameError: no such instance, family or problem.
-        InputError: a malformed id, or a problem that no search can solve.
+    Raises UnknownNameError, or InputError for a malformed id, or a problem that no search can solve.
     """
     if id in PROBLEMS and id not in BY_ID:
         problem = load(id)

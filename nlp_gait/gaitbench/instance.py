@@ -78,14 +78,11 @@ class Instance:
         return f"<GaitBench {self.id}: {len(self.names)} variables, {len(self.row_names)} inequalities>"
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Evaluate points X (P, n), one a row.
+        """Evaluate points X (P, n), one a row; raises InputError if X has another shape, or is not made of numbers.
 
         Returns:
             (P,) objective, to be minimised; and (P,) violation: the sum of all rows' positive parts and of what exceeds the
             bounds, in units of each scale, zero if and only if the point is feasible. Both are infinite where x is not finite.
-
-        Raises:
-            InputError: X has another shape, or is not made of numbers.
         """
         return self._objective(self._physical(X))
 
@@ -228,9 +225,7 @@ def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:
         seed: 0 or above; test seeds (``list_test_seeds``) are disjoint from those for training.
         unit_cube: whether x runs from 0 to 1; generated instances always do.
 
-    Raises:
-        UnknownNameError: no such family.
-        InputError: the seed is not a whole number from 0 to 1e12.
+    Raises UnknownNameError, or InputError if the seed is not a whole number from 0 to 1e12.
     """
     return load(make_id(family, seed), unit_cube=unit_cube)
 

@@ -88,15 +88,8 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
 def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[str] = ()) -> GaitProblem:
     """Return the problem in the variables z of an affine map, whose current bounds of x are rows.
 
-    Objective, feasible set and optimum stay what they are; only where they are in the box of z changes.
-
-    Args:
-        problem: in x.
-        affine: its box replaces the problem's bounds.
-        names: (n,) of z; by default z1, z2, ...
-
-    Raises:
-        InputError: the map has another number of variables.
+    Objective, feasible set and optimum stay what they are; only where they are in the box of z changes. By default the variables
+    are z1, z2, ... Raises InputError if the map has another number of them.
     """
     n = len(problem.names)
     if affine.matrix.shape != (n, n):

@@ -91,12 +91,8 @@ def load_robot(name_or_path: str) -> Robot:
 
     What such a file does not state is inferred, see ``robots/inference.py``; a ``.json`` of the same name next to it overrides
     both. Changes of masses, leg lengths and soles may follow after an ``@``, see ``robots/perturbation.py``. A file is read
-    again each time, because it may have changed.
-
-    Raises:
-        UnknownNameError: no such robot.
-        RobotDataError: the file cannot be read, is damaged or describes an impossible robot.
-        MissingExtraError: a URDF cannot be read without its extra.
+    again each time, because it may have changed. Raises UnknownNameError; RobotDataError for a file that cannot be read, is
+    damaged or describes an impossible robot; or MissingExtraError for a URDF without its extra.
     """
     if not isinstance(name_or_path, str):
         raise UnknownNameError(f"the name of a robot must be a text, got {format_value(name_or_path)}")

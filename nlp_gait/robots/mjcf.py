@@ -34,12 +34,8 @@ def mjcf_record(path: str) -> dict[str, Any]:
     """Read links and joints of an MJCF file by the schema of a robot file, without feet.
 
     The robot is the heaviest tree of bodies in the world. All frames get its root's axes at the reference pose, where all angles
-    count as zero. Bodies that do not turn against each other become one.
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed.
-        RobotDataError: MuJoCo cannot read the file.
-        ValueError: it contains no robot, or a body with several hinges.
+    count as zero. Bodies that do not turn against each other become one. Raises MissingExtraError without MuJoCo, RobotDataError
+    if that cannot read the file, or ValueError if it contains no robot, or a body with several hinges.
     """
     _read.cache_clear()  # the file, or one that it includes, may have changed
     model = _compile(path)

@@ -35,10 +35,7 @@ LENGTHS = {"thigh_m": 2, "tibia_m": 1}
 def perturb(robot: Robot, changes: Mapping[str, float]) -> Robot:
     """Return the robot with some quantities changed, in the given order: factors of masses, and lengths to add [m].
 
-    Raises:
-        UnknownNameError: no such quantity, link or joint.
-        RobotDataError: the result is physically impossible.
-        InputError: a value is not a finite number.
+    Raises UnknownNameError, RobotDataError if the result is physically impossible, or InputError for an infinite value.
     """
     for name, value in changes.items():
         if not math.isfinite(value):

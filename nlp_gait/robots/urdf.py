@@ -32,12 +32,8 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
 
     All frames get the root's axes at the zero pose. Links that do not turn against each other become one: those behind fixed,
     prismatic, planar and floating joints, which stay at zero. With ``about_joint``, the tensors refer to the origins of the
-    link frames instead of the centres of mass.
-
-    Raises:
-        MissingExtraError: the parser is not installed.
-        RobotDataError: the file cannot be read, or is not a URDF.
-        ValueError: its links do not form a tree, or one of its values is missing or not allowed.
+    link frames instead of the centres of mass. Raises MissingExtraError without the parser, RobotDataError if the file cannot be
+    read or is not a URDF, or ValueError if its links do not form a tree, or a value is missing or not allowed.
     """
     model = _parse(_read_xml(path), path)
     joints = {joint.child: joint for joint in model.joints}

@@ -23,9 +23,7 @@ DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 def load_mujoco(*, pictures: bool = False) -> ModuleType:
     """Import the engine; with pictures, it will draw: without a display and without another choice, through EGL.
 
-    Raises:
-        MissingExtraError: it is not installed.
-        OutputError: it does not load with the graphics driver ``MUJOCO_GL``.
+    Raises MissingExtraError, or OutputError if it does not load with the graphics driver ``MUJOCO_GL``.
     """
     if pictures and sys.platform == "linux" and not any(os.environ.get(name) for name in DISPLAYS):
         os.environ.setdefault(DRIVER, "egl")

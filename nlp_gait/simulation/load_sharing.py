@@ -68,9 +68,7 @@ class SharedLoads(NamedTuple):
 def share_loads(plan: Plan, sharing: Sharing | None = None) -> Plan:
     """Return the same motion with the torques in double support of least power, |torque rate| + K torque^2.
 
-    Raises:
-        MissingExtraError: Clarabel is not installed.
-        InputError: there is no double support, or soles, friction and rate allow no division; with its time.
+    Raises MissingExtraError without Clarabel, or InputError without a double support, or if its limits allow no division.
     """
     sharing, arrays = sharing or Sharing(), {name: array.copy() for name, array in plan.signals.arrays.items()}
     supports = list(find_double_supports(plan.signals))

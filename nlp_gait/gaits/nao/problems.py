@@ -136,18 +136,9 @@ def nao_cycle(
     starts 0.01 m ahead of it, and arms and velocities differ too. Here the states at both switches, the times and the step
     length are variables, and the cycle repeats after mirroring left to right.
 
-    Args:
-        robot: name or file.
-        objective: ``"energy-per-metre"`` leaves the speed free; ``"power"``, and ``"torque"`` for the mean of the sum of squared
-            torques, are those at the speed ``speed_m_s``, a parameter: the step length is then no variable but speed times the
-            time of the cycle.
-        intervals: of each phase.
-        rotational_inertia: False takes every link as a point mass.
-        torso_share: by the lever rule the nearer foot carries more, so that the load passes from foot to foot; as printed, the
-            farther one; free plans the load of the foot that has landed.
-        samples_per_interval: above 1 for a denser grid; 0 for what suits the loads: 4 where they are planned, else 1.
-        motors: features of the real motors; the mean square of a continuous torque is that of each phase.
-        load_degree: of the planned wrench over double support.
+    ``objective="energy-per-metre"`` leaves the speed free; ``"power"``, and ``"torque"`` for the mean of the sum of squared
+    torques, are those at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle. By
+    ``torso_share="lever"`` the nearer foot carries more, so that the load passes from foot to foot; as printed, the farther one.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
@@ -174,16 +165,9 @@ def nao_walk(
     All inner steps are one cycle, as in ``nao-cycle``; its speed may have limits, which are parameters. The feet advance by one
     step length less than there are steps, because the first and the last one are half steps.
 
-    Args:
-        robot: name or file.
-        steps: swings of a foot, both half steps included.
-        intervals: of each phase.
-        rotational_inertia: False takes every link as a point mass.
-        samples_per_interval: above 1 for a denser grid.
-        slope_deg: by which the ground rises forward; all places are in its axes, in which gravity is tilted.
-        footholds: rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, where the right foot, the left foot and so on land
-            instead; then every step has its own states. All angles are 0: one motor turns both feet.
-        motors: features of the real motors; the mean square of a continuous torque is that of each phase.
+    ``steps`` are swings of a foot, both half steps included. On ground that rises forward by ``slope_deg`` all places are in its
+    axes, in which gravity is tilted. ``footholds``, rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, are where the right
+    foot, the left foot and so on land instead; then every step has its own states. All angles are 0: one motor turns both feet.
 
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.

@@ -59,8 +59,8 @@ def test_rates_of_a_leg_are_those_of_its_angles() -> None:
     thigh, tibia = 0.1, 0.1029
     apart = moving("apart", 3)
     angles = leg_angles(apart, thigh, tibia, SX(0.01), Exact())
-    rates = leg_rates(apart, thigh, tibia, 0.99)
-    both = ca.Function("both", [*apart], [angles.joints.velocity, ca.vertcat(*rates.joints), rates.distance_squared])
+    rates, distance_squared = leg_rates(apart, thigh, tibia, 0.99)
+    both = ca.Function("both", [*apart], [angles.joints.velocity, ca.vertcat(*rates), distance_squared])
     rng = np.random.default_rng(SEED)
     for _ in range(20):
         place = np.array([0.02, 0.01, -0.17]) + rng.normal(0.0, 0.01, 3)

@@ -44,17 +44,6 @@ class LegJoint(NamedTuple):
     place: SX
 
 
-class LegParts(NamedTuple):
-    """A leg from the hip down: the wrench of each link (see ``link_wrench``) with its point (3,) of reference, and the joints.
-
-    Points are the hip's yaw-pitch joint for the pelvis, the hip for hip link and thigh, and the ankle for the others. None is the
-    knee, whose bounds are widest where the leg is almost straight.
-    """
-
-    links: tuple[tuple[SX, SX], ...]
-    joints: tuple[LegJoint, ...]
-
-
 @dataclass(kw_only=True)
 class PowerInstant:
     """One sample."""
@@ -94,16 +83,15 @@ class PowerInstant:
 
     def add_stance_leg(self, side: str, hip: Motion, ankle: Motion, upper: SX) -> Wrench:
         """Add the torques of a leg that carries ``upper`` (about the torso's origin); returns the wrench at its ankle."""
-        leg = self._split_leg(side, hip, ankle)
-        ground = self._add_torques(upper, hip.position, leg.joints, leg.links, -1)
+        links, joints = self._split_leg(side, hip, ankle)
+        ground = self._add_torques(upper, hip.position, joints, links, -1)
         total = ground[:, 0] + self.rate_squared * ground[:, 1]
         return Wrench(total[:3], total[3:])
 
     def add_swing_leg(self, side: str, hip: Motion, ankle: Motion) -> SX:
         """Add the torques of a hanging leg; returns its wrench (6, 2) about the torso's origin."""
-        leg = self._split_leg(side, hip, ankle)
-        *above, sole = leg.links
-        return self._add_torques(*sole, leg.joints[::-1], [*above[::-1], (SX(6, 2), hip.position)], 1)
+        (*above, sole), joints = self._split_leg(side, hip, ankle)
+        return self._add_torques(*sole, joints[::-1], [*above[::-1], (SX(6, 2), hip.position)], 1)
 
     def _add_torques(
         self, carried: SX, at: SX, joints: Sequence[LegJoint], links: Sequence[tuple[SX, SX]], direction: int
@@ -116,14 +104,19 @@ class PowerInstant:
             carried, at = world_frame.move_wrench(carried, at - point) + wrench, point
         return carried
 
-    def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> LegParts:
+    def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> tuple[list[tuple[SX, SX]], list[LegJoint]]:
+        """Return the wrench of each link from the hip down with its point (3,) of reference, and the joints.
+
+        Points are the hip's yaw-pitch joint for the pelvis, the hip for hip link and thigh, and the ankle for the others. None is
+        the knee, whose bounds are widest where the leg is almost straight.
+        """
         geometry, yaw = measure_leg(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
         at_hip = add_motions(hip, resting_point(geometry.hip_m))
         frames = world_frame.leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
         apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
-        rates = world_frame.leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
-        self.rates |= {f"{side}{name}": rate for name, rate in zip(LEG_JOINTS, rates.joints, strict=True)}
-        self.reaches[side] = rates.distance_squared
+        rates, distance_squared = world_frame.leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        self.rates |= {f"{side}{name}": rate for name, rate in zip(LEG_JOINTS, rates, strict=True)}
+        self.reaches[side] = distance_squared
         self.sideways[side] = apart.position[1], -apart.position[2]
         names = (yaw.child, *(self.robot.joint(f"{side}{name}").child for name in LEG_JOINTS))
         wrenches = [
@@ -139,11 +132,8 @@ class PowerInstant:
         axes: tuple[SX | DM, ...] = (DM(yaw.axis), FORWARD, across, across, across, FORWARD)
         places = (yaw_place, hip_place, hip_place, knee, ankle_place, ankle_place)
         about = (yaw_place, hip_place, hip_place, ankle_place, ankle_place, ankle_place)
-        joints = tuple(
-            LegJoint(f"{side}{name}", axis, place)
-            for name, axis, place in zip(("HipYawPitch", *LEG_JOINTS), axes, places, strict=True)
-        )
-        return LegParts(tuple(zip(wrenches, about, strict=True)), joints)
+        names = tuple(f"{side}{name}" for name in ("HipYawPitch", *LEG_JOINTS))
+        return [*zip(wrenches, about, strict=True)], [*map(LegJoint, names, axes, places)]
 
 
 def double_support_instants(

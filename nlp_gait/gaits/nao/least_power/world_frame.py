@@ -124,15 +124,8 @@ def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> S
     return ca.horzcat(weight, ca.vertcat(force, moment))
 
 
-class LegRates(NamedTuple):
-    """Rates of a leg's joints from the hip down, and the squared distance of hip and ankle [m^2]."""
-
-    joints: tuple[SX, SX, SX, SX, SX]
-    distance_squared: SX
-
-
-def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float) -> LegRates:
-    """Compute the rates of roll, pitch, knee, ankle pitch and ankle roll, without their angles.
+def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float) -> tuple[tuple[SX, ...], SX]:
+    """Compute the rates of roll, pitch, knee, ankle pitch and ankle roll, and the squared distance of hip and ankle [m^2].
 
     From the motion (3,) of the ankle seen from the hip joint and the lengths of both links [m]; see ``leg_frames``.
 
@@ -149,4 +142,4 @@ def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: 
     knee = -(x * xd + y * yd + z * zd) / (thigh * tibia) / ca.sqrt(1 - cosine * cosine)
     roll, inverse = (y * zd - z * yd) / length_squared, 1 / bent
     turn, offset = (x * lengthd - length * xd) * inverse, (thigh**2 - tibia**2) / 2 * inverse
-    return LegRates((roll, turn - (0.5 - offset) * knee, knee, -turn - (0.5 + offset) * knee, -roll), distance_squared)
+    return (roll, turn - (0.5 - offset) * knee, knee, -turn - (0.5 + offset) * knee, -roll), distance_squared
