@@ -1,7 +1,5 @@
 """C and C++ files from templates, for exported objectives and solvers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Gaits in formats of other programs."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -94,14 +92,10 @@ def write_keyframes(result: Result, period_ms: int) -> str:
 def write_signals_csv(path: Path, signals: Signals) -> None:
     """Write one row per sample, with a header like ``q_LKneePitch_rad``; raises InputError, OutputError."""
     table = list(signals.named_columns())
-    header = [name_column(name, unit) for name, unit, _ in table]
+    # plain headings such as ``qd_LKneePitch_rad_s``; a dimensionless column has no unit
+    suffixes = ("" if unit == "1" else "_" + unit.replace("/", "_").replace("^", "") for _, unit, _ in table)
+    header = [name.replace(" ", "_") + suffix for (name, _, _), suffix in zip(table, suffixes, strict=True)]
     write_text(path, format_csv([header, *zip(*(values.tolist() for _, _, values in table), strict=True)]))
-
-
-def name_column(name: str, unit: str) -> str:
-    """Return a plain heading, ``qd_LKneePitch_rad_s``; a dimensionless column has no unit."""
-    suffix = "" if unit == "1" else "_" + unit.replace("/", "_").replace("^", "")
-    return name.replace(" ", "_") + suffix
 
 
 def to_ros(signals: Signals) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Joint angles over time from files of other programs: CSV, and Webots' ``.motion``."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

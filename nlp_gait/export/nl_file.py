@@ -1,7 +1,5 @@
 """Export of a problem's NLP as an ``.nl`` file, which AMPL's solvers read, with names and the best known value."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict

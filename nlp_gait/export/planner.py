@@ -1,7 +1,5 @@
 """A solver in C that plans again for changed parameters, on the exported NLP; needs only libc and libm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Set-points of joint angles for a robot or a simulator, and the arguments of NAOqi."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Export of a problem's NLP with its derivatives as C++ with a C header, for a solver on board; needs only libc and libm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 

@@ -5,8 +5,6 @@ The grammar is that of Webots' own parser (`src/controller/c/motion.c`), and str
 one value a motor; lines shorter than 4,096 characters; an empty line ends the file. Webots interpolates linearly between rows.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection

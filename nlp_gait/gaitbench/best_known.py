@@ -1,7 +1,5 @@
 """The best known point of an ``Instance``, strictly feasible, by IPOPT from random starts, and values that identify it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from itertools import pairwise
 from typing import Any

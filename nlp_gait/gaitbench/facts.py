@@ -3,8 +3,6 @@
 A definition never changes; an instance that has to change gets a new id.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

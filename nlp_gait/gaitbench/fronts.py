@@ -4,8 +4,6 @@ The front's points were found by IPOPT, each as the best value of the first obje
 (``python -m benchmarks.gaitbench.fronts``); an instance evaluates them again by its own functions when it is loaded.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -8,8 +8,6 @@ A drawn quantity in [a, b] is a + u (b - a), rounded to six significant digits. 
 gets a new name.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

@@ -1,7 +1,5 @@
 """Instances of the suite: each one object with everything that an optimiser needs."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Sequence
 from functools import cached_property, lru_cache, partial

@@ -1,7 +1,5 @@
 """Instances as gait problems: variables that the suite holds constant become parameters, and equations narrow bands."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

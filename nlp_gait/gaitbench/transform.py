@@ -1,7 +1,5 @@
 """The same problem in other variables: with some held constant, or x = A z + b with the bounds of x as constraints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

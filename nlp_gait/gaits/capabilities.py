@@ -1,7 +1,5 @@
 """Functions that some problems provide beyond their mathematics, as ``module:function``, imported when first used."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Walks of several steps from one cycle: each step is the mirror image of the previous one, one step length ahead."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Robots as bipeds: two legs of six turning joints, all other links one body in a posture; scales and swings against NAO's."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Feet of a robot whose file does not state them: their links and soles, and the forward direction."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from itertools import combinations

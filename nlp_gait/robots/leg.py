@@ -1,7 +1,5 @@
 """Geometry of a leg with six turning joints, and the nearest leg whose inverse kinematics has a closed form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Limits for files that another program may have made to exhaust this one: counts in MJCF, and reading in a child process."""
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 import os

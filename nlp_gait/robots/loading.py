@@ -1,7 +1,5 @@
 """Robots from files: JSON, URDF and MJCF. A JSON file may extend any of them and replace some of its records."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os
@@ -146,15 +144,13 @@ def list_robot_files(name_or_path: str) -> set[str]:
     return {os.path.abspath(file) for file in found}
 
 
-@cache
-def _load_shipped(name: str) -> Robot:
-    return _load(name)
-
-
 def _load(name_or_path: str) -> Robot:
     source, changes = split_name(name_or_path)
     path = _find_description(source)
     return perturb(_make_robot(_read_merged(path), path), changes)
+
+
+_load_shipped = cache(_load)
 
 
 def _find_description(source: str) -> str:

@@ -3,8 +3,6 @@
 Nothing but corners is read, and hostile files are refused; libraries for meshes expand XML entities and skip damaged parts.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Sequence

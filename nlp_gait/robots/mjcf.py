@@ -1,7 +1,5 @@
 """MJCF files in the form of a JSON robot file; MuJoCo itself reads them, with all files that they include."""
 
-from __future__ import annotations
-
 import json
 import logging
 import math

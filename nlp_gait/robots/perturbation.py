@@ -11,8 +11,6 @@ Changes are written after a robot's name, ``nao-v5@mass=1.05,thigh_m=0.001``, wh
     sole_front_m    added to both soles' extent forwards; also ``sole_back_m``, ``sole_left_m``, ``sole_right_m``
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Links and joints of a URDF or MJCF that cannot be used as they are: welded to their parents, or repaired."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Frozen, validated data of a legged robot: links, joints, motors, feet."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields

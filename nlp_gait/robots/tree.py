@@ -1,11 +1,9 @@
 """A robot's links: masses and inertias; trees from any fixed link, locked, turned or reversed joints, mirror images of joints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -30,7 +28,7 @@ class Mass(NamedTuple):
     tensor_kgm2: Array  # (3, 3) inertia about the centre of mass
 
     @classmethod
-    def from_record(cls, raw: Mapping[str, Any]) -> Mass:
+    def from_record(cls, raw: Mapping[str, Any]) -> Self:
         """Return the mass of a link as a robot file describes it."""
         tensor = make_tensor(raw["inertia_com_kgm2"])
         return cls(float(raw["mass_kg"]), np.array(raw["com_m"], dtype=float), tensor)
@@ -40,15 +38,15 @@ class Mass(NamedTuple):
         moments = list(inertia_moments(self.tensor_kgm2))
         return {"mass_kg": float(self.mass_kg), "com_m": self.com_m.tolist(), "inertia_com_kgm2": moments}
 
-    def move(self, offset: Array) -> Mass:
+    def move(self, offset: Array) -> Self:
         """Return the mass in a frame from which its own is ``offset`` (3,) away [m]."""
         return self._replace(com_m=self.com_m + offset)
 
-    def turn(self, rotation: Array) -> Mass:
+    def turn(self, rotation: Array) -> Self:
         """Return the mass along other axes, by a rotation (3, 3)."""
-        return Mass(self.mass_kg, rotation @ self.com_m, rotation @ self.tensor_kgm2 @ rotation.T)
+        return self._replace(com_m=rotation @ self.com_m, tensor_kgm2=rotation @ self.tensor_kgm2 @ rotation.T)
 
-    def repair(self) -> Mass:
+    def repair(self) -> Self:
         """Return the mass with the nearest tensor of a rigid body: no second moment of its matter is negative."""
         trace = np.trace(self.tensor_kgm2)
         moments, axes = np.linalg.eigh(trace / 2 * np.eye(3) - self.tensor_kgm2)

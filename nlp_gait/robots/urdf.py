@@ -1,7 +1,5 @@
 """URDF files in the form of a JSON robot file; ``urdf_parser_py`` of ROS (extra ``urdf``) refuses incomplete links and joints."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import partial

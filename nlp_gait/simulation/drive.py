@@ -1,7 +1,5 @@
 """Position drives of the simulated robot: stiffness, torque limits, set-points, and feed-forward."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The engine: import of MuJoCo, indices in its arrays, and sensors of the torso with noise and delay."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

@@ -1,9 +1,7 @@
 """Balance feedback: a virtual spring between the torso and its planned place, with sensor noise and delay."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -38,7 +36,7 @@ class Feedback(Sensing):
     # at the height of the torso; 0.05 compensates a slope of 3 degrees
     growth_limit: float = 0.05
 
-    def with_strength(self, factor: float) -> Feedback:
+    def with_strength(self, factor: float) -> Self:
         """Return the feedback with springs and dampers times a factor."""
         return replace(self, **{name: factor * getattr(self, name) for name in STRENGTHS})
 

@@ -3,8 +3,6 @@
 The motion and the torques in single support stay. Between two instants of the controller, wrenches are linear in time.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

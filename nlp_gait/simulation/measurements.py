@@ -1,11 +1,9 @@
 """Simulations in numbers, with the model's predictions; and walks of several steps."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -31,7 +29,7 @@ class Power:
     heat_W: float  # K torque^2
 
     @classmethod
-    def compute(cls, torque: Array, rate: Array, heat_loss: float, mean: Callable[[Array], float]) -> Power:
+    def compute(cls, torque: Array, rate: Array, heat_loss: float, mean: Callable[[Array], float]) -> Self:
         """Compute it from torques [Nm] and rates [rad/s] (T, J), K [W/(Nm)^2], and a function for the mean of samples (T,)."""
         work = torque * rate
         return cls(

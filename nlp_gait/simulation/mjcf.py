@@ -1,7 +1,5 @@
 """Robots and their world in MJCF, MuJoCo's model format; needs no MuJoCo."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Literal

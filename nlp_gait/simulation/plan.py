@@ -1,7 +1,5 @@
 """Planned motion and torques of a gait as functions of time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -7,8 +7,6 @@ the swinging foot is turned and raised to the floor as it is under the leaning r
 begins at the last plan's end.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -1,10 +1,8 @@
 """Primitive shapes of a robot's links, for drawing and for contacts with the floor."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 
@@ -30,7 +28,7 @@ class Capsule:
     radius: float
     solid: bool = True
 
-    def move(self, by: Vector) -> Capsule:
+    def move(self, by: Vector) -> Self:
         """Return the shape, moved by a vector."""
         return replace(self, start=plus(self.start, by), end=plus(self.end, by))
 
@@ -43,7 +41,7 @@ class Prism:
     bottom: float
     thickness: float
 
-    def move(self, by: Vector) -> Prism:
+    def move(self, by: Vector) -> Self:
         """Return the shape, moved by a vector."""
         outline = tuple((x + by[0], y + by[1]) for x, y in self.outline)
         return replace(self, outline=outline, bottom=self.bottom + by[2])

@@ -1,7 +1,5 @@
 """A gait in the engine: its simulation, and the disturbances that it survives."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Instances in the form that optimisers' packages take; each package is imported when it is needed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
@@ -19,7 +17,7 @@ ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
     "optuna": ("optuna:OptunaProblem", ("optuna", "optunahub")),
     "nevergrad": ("plain:to_nevergrad", ("nevergrad",)),
     "pymoo-front": ("pymoo:PymooProblem", ("pymoo",)),
-    "pygmo-front": ("plain:to_pygmo_front", ("pygmo",)),
+    "pygmo-front": ("plain:to_pygmo", ("pygmo",)),
 }
 
 

@@ -90,22 +90,18 @@ def to_nevergrad(instance: Instance) -> Any:
     return function
 
 
-def to_pygmo(instance: Instance) -> Any:
+def to_pygmo(instance: Instance | FrontInstance) -> Any:
     """Return a problem of pygmo."""
     import pygmo
 
-    return pygmo.problem(_PygmoProblem(instance))
-
-
-def to_pygmo_front(instance: FrontInstance) -> Any:
-    """Return a problem of pygmo; its algorithms for several objectives take no constraints, so a violation adds to both."""
-    import pygmo
-
-    return pygmo.problem(_PygmoFrontProblem(instance))
+    return pygmo.problem((_PygmoFrontProblem if hasattr(instance, "front") else _PygmoProblem)(instance))
 
 
 class _PygmoFrontProblem:
-    """User-defined problem of pygmo with two objectives; infeasible points are worse than any feasible one."""
+    """User-defined problem of pygmo with two objectives; infeasible points are worse than any feasible one.
+
+    pygmo's algorithms for several objectives take no constraints, so a violation adds to both.
+    """
 
     def __init__(self, instance: Any) -> None:
         self.instance = instance

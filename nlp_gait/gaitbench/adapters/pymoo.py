@@ -1,7 +1,5 @@
 """Instances as problems of pymoo."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A biped as the gaits take it: everything in which one robot's phases differ from another's."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence

@@ -9,8 +9,6 @@ Source:
     weights and the preview of its example, and a second pass with the error of the whole body's ZMP (section 5).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A curve is the paper's cubic plus a spline that leaves both ends unchanged. The 
 the paper; if all are zero, the motion is the paper's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -1,7 +1,5 @@
 """A walking cycle as one problem: rows of both phases, changes of torques at the switches, energy and speed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ both stand. Every coordinate is a cubic in Hermite form between the states at th
 mirror image of the one at the start. So hip, feet and what else is planned have continuous positions and velocities for any x.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -86,7 +84,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
 
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     """Return the plans of both phases."""
-    images = DM([c.image for c in body.coordinates])
+    images, mirror = DM([c.image for c in body.coordinates]), SX([1, -1, 1])
 
     def read(at: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
         """States at lift-off and touch-down, and the step length [m]."""
@@ -98,8 +96,10 @@ def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
         return PhaseMotion(lift_off, touch_down, read_duration(at, "ssp"), -step, step, at[LIFT])
 
     def double(at: InstantPoint) -> PhaseMotion:
-        lift_off, touch_down, step = read(at)
-        return PhaseMotion(touch_down, mirror_state(lift_off, images, step), read_duration(at, "dsp"), step, step)
+        (hip, velocity, others, rates), touch_down, step = read(at)
+        place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
+        end = SwitchState(place, mirror * velocity, images * others, images * rates)
+        return PhaseMotion(touch_down, end, read_duration(at, "dsp"), step, step)
 
     return {"ssp": make_planner(body, single), "dsp": make_planner(body, double)}
 
@@ -122,13 +122,6 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
         return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, at[REACH_MARGIN], ops)
 
     return plan
-
-
-def mirror_state(state: SwitchState, images: DM, step: SX) -> SwitchState:
-    """Return the mirror image of a state, a step further; ``images`` are the signs (k,) of the coordinates."""
-    hip, velocity, others, rates = state
-    mirror = SX([1, -1, 1])
-    return SwitchState(mirror * hip + vertcat(step, 0, 0), mirror * velocity, images * others, images * rates)
 
 
 def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> SwitchState:

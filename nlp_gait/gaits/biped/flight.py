@@ -1,7 +1,5 @@
 """A flight of stairs that a biped climbs by one tread with each step: its ground, and the swing over its edges."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

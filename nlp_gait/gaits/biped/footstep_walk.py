@@ -4,8 +4,6 @@ Each step is seen from its standing foot, mirrored if that is the right one: a l
 foot that swings from foothold to foothold. The torso's yaw is the mean of both feet's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

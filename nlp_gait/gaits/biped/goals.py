@@ -1,7 +1,5 @@
 """What a phase minimises: mean electrical power as in the paper, or its torques, or the smoothness of its motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """Phases of a longer motion, a cycle or a walk: parameters, rows and indexes named by phase, times one after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Limits of a phase: each adds the rows, the parameters and the indexes of one concern."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence

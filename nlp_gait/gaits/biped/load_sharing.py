@@ -6,8 +6,6 @@ of the phase whose coefficients are variables; the wrench on the left sole and t
 a rough floor limit both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Literal

@@ -13,8 +13,6 @@ Two joints may share a motor, whose rotor counts half at each: NAO's hip yaw-pit
 acceleration, so there is none here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A support phase of a spatial biped sampled over time: its motion and the loads on motors and ground."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -86,7 +84,8 @@ class Phase:
             reads_motion = self._reads_motion
             found = self._map_instant(ats, ops, phases)
         else:
-            q, _, _, hip, planned, reach, world, _, *seen = self._map(self._kinematics(ops, traces), ats)
+            kinematics = self._write_kinematics(*self._symbolic_plan(ops), traces)
+            q, _, _, hip, planned, reach, world, _, *seen = self._map(kinematics, ats)
             n = self.grid.parts + 1
             qd, qdd = self._differences(q, ats[0])
             torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
@@ -280,9 +279,6 @@ class Phase:
         outputs += [trace(at, inputs[2]) for trace in self._traces.values()]
         return inputs, outputs
 
-    def _kinematics(self, ops: Nonsmooth, traces: Mapping[str, Trace]) -> ca.Function:
-        return self._write_kinematics(*self._symbolic_plan(ops), traces)
-
     def _write_kinematics(
         self, inputs: list[SX], plan: Instant, at: InstantPoint, traces: Mapping[str, Trace]
     ) -> ca.Function:
@@ -327,7 +323,7 @@ class Phase:
 
     @cached_property
     def _loads(self) -> tuple[list[SX], Instant]:
-        """Return angles, both derivatives, hip and world (see ``_kinematics``), and the loads as functions of these."""
+        """Return angles, both derivatives, hip and world (see ``_write_kinematics``), and the loads as functions of these."""
         plan = self._exact_plan[1]
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         sizes = (3, 3, 3, plan.wrench.shape[0], plan.yaw.shape[0])

@@ -1,7 +1,5 @@
 """The problem of a phase: its goal, its limits, its start points, and its robot for drawings and simulations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Problems of recorded motions: judged by the limits of the planned phases; their times and their step are the variables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -14,8 +14,6 @@ Source:
     body's ZMP and reach, and with a ZMP that may be anywhere within the sole.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

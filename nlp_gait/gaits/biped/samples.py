@@ -1,7 +1,5 @@
 """One instant of a biped, which plans return, and a phase at its samples, which limits and goals read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias

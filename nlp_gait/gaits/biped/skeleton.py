@@ -1,7 +1,5 @@
 """Stick figure of any biped: legs, soles, and every other limb that is long enough to be seen."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import casadi as ca

@@ -3,8 +3,6 @@
 Phases of sections 3 and 4 of Gupta, Pratihar, Deb (2023), with the margins of the ZMP on a sole and around both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 

@@ -5,8 +5,6 @@ begins there. So the size of the problem does not depend on the number of steps,
 positions and velocities for any x. A walk of two half steps has no inner step, and neither variables nor rows of one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

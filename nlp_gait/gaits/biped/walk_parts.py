@@ -1,7 +1,5 @@
 """The phases of a whole walk, each over the left foot at x = 0, their states, the variables of both, and their start points."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

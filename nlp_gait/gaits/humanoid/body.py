@@ -1,7 +1,5 @@
 """Any humanoid as its gaits take it: sizes that scale NAO's bounds and limits, and legs under a torso that leans."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

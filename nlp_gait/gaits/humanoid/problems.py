@@ -1,7 +1,5 @@
 """The humanoid problems: single support, double support and walking cycle; options are in ``gaits.humanoid``."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from nlp_gait.errors import InputError

@@ -1,7 +1,5 @@
 """How sharply a humanoid can turn from step to step: limits of the hip joints about the vertical, and soles that would meet."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms, its motors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

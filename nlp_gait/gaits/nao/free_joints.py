@@ -6,8 +6,6 @@ at rest. In between all joints of the legs are free, including the coupled yaw-p
 paper swings: the torso leans and turns, the swing foot tilts and leaves its line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Joints of NAO that its gaits move, angles at which its arms are held, and the geometry of its legs."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

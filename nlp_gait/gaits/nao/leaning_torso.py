@@ -4,8 +4,6 @@ Twelve leg joints, two of which share a motor, connect torso and soles: the tors
 position, roll and pitch are planned; its yaw and the angle of the hips' yaw-pitch follow.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """The NAO problems: published phases, with free joints too, walking cycle, recorded gaits; options are in ``gaits.nao``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial

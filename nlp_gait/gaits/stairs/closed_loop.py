@@ -1,7 +1,5 @@
 """The closed loop on stairs: desired angles, one quantum of the nine-link dynamics, and what a quantum costs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

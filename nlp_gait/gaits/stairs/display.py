@@ -4,8 +4,6 @@ Both legs lie in one plane and pass through each other. A foot is a rod on the g
 the stairs. The leg with primes, which stands first, is the left one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Climbing one step at least effort: full trajectory optimisation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import cache, partial

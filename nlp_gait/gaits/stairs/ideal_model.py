@@ -1,7 +1,5 @@
 """Objective and constraints of ``stairs-ideal``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Source:
     Bhardwaj et al., section VI, Algorithm 1 and eqs. (27)-(30).
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from functools import cache

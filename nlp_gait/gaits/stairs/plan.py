@@ -1,7 +1,5 @@
 """Planning one step on stairs: the governing parameters that cost least energy or joint jerk."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from math import inf

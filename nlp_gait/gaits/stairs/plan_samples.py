@@ -1,7 +1,5 @@
 """A planned step, sampled phase by phase: posture, torques, ground force and clearance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Literal, NamedTuple

@@ -4,8 +4,6 @@ All angles are absolute. Those of legs and feet turn clockwise from the forward 
 the torso turns counter-clockwise. Primes mark the stance leg, whose ankle is the base.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The planned step of Bhardwaj et al.: curves of feet, ankle and hip over time, and the link angles that follow from them."""
 
-from __future__ import annotations
-
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Definitions shared by the stair problems: the stair, governing parameters of a step, limits, rows of knees and stance foot."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from math import inf

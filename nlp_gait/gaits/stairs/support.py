@@ -1,7 +1,5 @@
 """Balance as the paper checks it: the ZMP of (49) in the convex hull of the contact points, and the torques that follow."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Tracking a planned step with a PD controller: gains and torso pitch of least cost (the paper's use of ant colonies)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import inf
 from typing import Literal
@@ -138,29 +136,16 @@ def stairs_track(
         parts = (*found[:4], loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
         joints, names = loop.joints.full().T, tuple(closed_loop.ANGLES[coordinates])
-        return Signals(
-            joints=names,
-            arrays={
-                "t": np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta),
-                "q": state[:, : closed_loop.N] @ joints,
-                "qd": state[:, closed_loop.N :] @ joints,
-                "q_desired": desired[:, : closed_loop.N] @ joints,
-                "qd_desired": desired[:, closed_loop.N :] @ joints,
-                "link_q": state[:, : closed_loop.N],
-                "link_qd": state[:, closed_loop.N :],
-                "tau": torque,
-                "zmp": zmp[:, 0],
-                "stance_ankle": stance_ankle,
-            },
-            columns={
-                "zmp": stair.COLUMNS["zmp"],
-                "stance_ankle": stair.COLUMNS["stance_ankle"],
-                "q_desired": Columns(unit="rad", labels=names),
-                "qd_desired": Columns(unit="rad/s", labels=names),
-                "link_q": Columns(unit="rad", labels=LINKS),
-                "link_qd": Columns(unit="rad/s", labels=LINKS),
-            },
-        )
+        (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))
+        links = {"q": q, "qd": qd, "q_desired": q_desired, "qd_desired": qd_desired}
+        t = np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta)
+        arrays = {"t": t, **{name: value @ joints for name, value in links.items()}, "link_q": q, "link_qd": qd}
+        arrays |= {"tau": torque, "zmp": zmp[:, 0], "stance_ankle": stance_ankle}
+        columns = {name: stair.COLUMNS[name] for name in ("zmp", "stance_ankle")}
+        for kind, labels in (("{}_desired", names), ("link_{}", LINKS)):
+            columns |= {kind.format("q"): Columns(unit="rad", labels=labels)}
+            columns |= {kind.format("qd"): Columns(unit="rad/s", labels=labels)}
+        return Signals(joints=names, arrays=arrays, columns=columns)
 
     def step_motion(at: NumericPoint) -> StepMotion:
         arrays = motion(at).arrays

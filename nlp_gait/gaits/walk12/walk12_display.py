@@ -5,8 +5,6 @@ every mass in its place, as a small sphere, and divide it among the links that m
 stay on the shank: it belongs to the sole and the ankle, at the same height above the ankle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -7,8 +7,6 @@ Source:
     Goswami, Vadakkepat, Phung (2008), sections 3, 4 and 6 and the appendix.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields

@@ -1,7 +1,5 @@
 """The 12-joint walk: stability margin against step length (Goswami, Vadakkepat, Phung 2008, section 5)."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Literal

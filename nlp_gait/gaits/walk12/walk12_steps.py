@@ -8,8 +8,6 @@ Source:
     Goswami, Vadakkepat, Phung (2008), sections 4 and 5.4.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import casadi as ca

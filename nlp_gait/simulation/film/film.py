@@ -1,7 +1,5 @@
 """Films of one gait, or of two side by side: from the side, the front and above, with captions and a chart of the power."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing

@@ -1,7 +1,5 @@
 """Simulations recorded for films, the robot's state and the numbers at every picture, or shown in MuJoCo's own window."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The simulated robot seen from several sides, drawn off the screen."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Sequences of pictures as GIF or MP4 files."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from contextlib import closing

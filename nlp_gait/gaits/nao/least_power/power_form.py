@@ -5,8 +5,6 @@ of the time T, and a torque is that of gravity plus 1 / T^2 times that of the mo
 |w| <= v T in place of the velocities' bounds. The pitch of hip and ankle has no rows: a bound with fewer rows is valid with all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 

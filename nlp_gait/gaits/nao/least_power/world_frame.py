@@ -5,8 +5,6 @@ recursion passes forces from joint to joint, which multiplies errors over a box.
 of hip and ankle, without an angle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
