@@ -30,13 +30,9 @@ class Deb:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class StaticPenalty:
-    """Compare f + weight * violation, as many papers do; the result depends on the weight.
+    """Compare f + weight * violation, as many papers do; the result depends on the weight."""
 
-    Attributes:
-        weight: Objective units per unit of violation, > 0. There is no default, as none suits every problem.
-    """
-
-    weight: float
+    weight: float  #: objective units per unit of violation, > 0; there is no default, as none suits every problem
     name: ClassVar[str] = "static penalty"
 
     def __post_init__(self) -> None:
@@ -53,19 +49,14 @@ class EpsilonLevel:
     Helps where the feasible set is thin or the optimum is reached from outside. From the control fraction on it is
     equal to `Deb`.
 
-    Attributes:
-        share: Epsilon starts at the violation below which this share of the first generation lies (theta).
-        exponent: Speed of the fall (cp).
-        control: Fraction of the budget at which epsilon reaches zero (Tc / T).
-
     Source:
         Takahama, Sakai (2006), Constrained optimization by the epsilon constrained differential evolution with
         gradient-based mutation and feasible elites: epsilon level comparison and its control.
     """
 
-    share: float = 0.2
-    exponent: float = 5.0
-    control: float = 0.8
+    share: float = 0.2  #: epsilon starts at the violation below which this share of the first generation lies (theta)
+    exponent: float = 5.0  #: speed of the fall (cp)
+    control: float = 0.8  #: fraction of the budget at which epsilon reaches zero (Tc / T)
     name: ClassVar[str] = "epsilon level"
 
     def __post_init__(self) -> None:

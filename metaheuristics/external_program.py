@@ -38,20 +38,13 @@ class ExternalProgram:
     point or many, and receives `{"f": [...], "violation": [...], "cost": [...]}`, again and again, until it receives
     `{"stop": true}`, sends `{"stop": "its reason"}` or ends with status 0. `cost` combines f and violation, see `PlainFunction`.
     A value of a failed evaluation is null.
-
-    Attributes:
-        command: program and arguments.
-        name: in reports.
-        settings: sent to the program.
-        population: 1, as a program has no first generation.
-        answer_s: longest time between two of its lines [s]; then it is killed.
     """
 
-    command: tuple[str, ...]
-    name: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    population: int = 1
-    answer_s: float = 600.0
+    command: tuple[str, ...]  #: program and arguments
+    name: str  #: in reports
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: sent to the program
+    population: int = 1  #: as a program has no first generation
+    answer_s: float = 600.0  #: longest time between two of its lines [s]; then it is killed
 
     def __post_init__(self) -> None:
         check_number(self, "answer_s", above=0.0)

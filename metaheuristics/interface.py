@@ -64,15 +64,12 @@ class Constraints:
     """Separate constraints of an objective that provides them; see `Start`.
 
     An objective provides them by the attributes `inequalities` and `groups`, as here.
-
-    Attributes:
-        inequalities: Values (P, m) of m rows at points (P, n) within the bounds; a row is satisfied where its value is
-            <= 0. Called only for points that are also evaluated; does not count as an evaluation.
-        groups: (m,) the constraint that each row belongs to; rows of one constraint are adjacent.
     """
 
+    #: Values (P, m) of m rows at points (P, n) within the bounds; a row is satisfied where its value is <= 0. Called only for
+    #: points that are also evaluated; does not count as an evaluation.
     inequalities: Callable[[Array], Array]
-    groups: tuple[str, ...]
+    groups: tuple[str, ...]  #: (m,) the constraint that each row belongs to; rows of one constraint are adjacent
 
     def worst(self, X: Array) -> Array:
         """Return the greatest value (P, c) within each constraint at points (P, n); 1e30 where it is not finite."""
@@ -86,25 +83,17 @@ UNKNOWN = 1e30  # value of a row without a finite value
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Start:
-    """Inputs of an algorithm at the start of a run.
+    """Inputs of an algorithm at the start of a run."""
 
-    Attributes:
-        lower: (n,) lower bounds, read-only.
-        upper: (n,) upper bounds, read-only.
-        initial: (P, n) starting points, read-only; P is the population of the algorithm. The first `ask` returns them.
-        evaluations: Budget of the run, a hint for algorithms that plan ahead.
-        rng: The only source of randomness of the search.
-        constraints: Separate constraints, for searches that use them; None where only the total violation is available.
-        names: The n names of the variables.
-    """
-
-    lower: Array
-    upper: Array
+    lower: Array  #: (n,) lower bounds, read-only
+    upper: Array  #: (n,) upper bounds, read-only
+    #: (P, n) starting points, read-only; P is the population of the algorithm. The first `ask` returns them
     initial: Array
-    evaluations: int
-    rng: np.random.Generator
+    evaluations: int  #: budget of the run, a hint for algorithms that plan ahead
+    rng: np.random.Generator  #: the only source of randomness of the search
+    #: Separate constraints, for searches that use them; None where only the total violation is available
     constraints: Constraints | None = None
-    names: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()  #: the n names of the variables
 
     def inequalities(self, X: Array, violation: Array) -> Array:
         """Return each constraint's value (P, c) at points (P, n); without `constraints`, the violation (P,) as the only one."""
@@ -120,12 +109,9 @@ class Rule:
     The keys are the violation and the objective as the rule sees them. So pairwise comparison and sorting have one definition,
     and packages that put feasible points first by themselves can follow any rule. A failed evaluation, both values of which are
     infinite, comes last under every rule.
-
-    Attributes:
-        keys: Maps f and violation, any equal shape and free of NaN, to the two keys of the same shape: effective violation,
-            >= 0, and effective objective.
     """
 
+    #: Maps f and violation, of equal shape, free of NaN, to two keys of that shape: effective violation, >= 0, and objective
     keys: Callable[[Array, Array], tuple[Array, Array]]
 
     def better(self, f1: Array, violation1: Array, f2: Array, violation2: Array) -> NDArray[np.bool_]:
@@ -242,19 +228,12 @@ class CallingSearch(ABC):
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class History:
-    """Best so far after each of the G generations, by the feasibility rules whatever the constraint handling.
+    """Best so far after each of the G generations, by the feasibility rules whatever the constraint handling."""
 
-    Attributes:
-        evaluations: (G,) evaluations used, failed ones included.
-        objective: (G,) objective of the best; it may rise where the violation falls.
-        violation: (G,) violation of the best; never rises.
-        elapsed_s: (G,) wall-clock time since the run began [s].
-    """
-
-    evaluations: NDArray[np.int64]
-    objective: Array
-    violation: Array
-    elapsed_s: Array
+    evaluations: NDArray[np.int64]  #: (G,) evaluations used, failed ones included
+    objective: Array  #: (G,) objective of the best; it may rise where the violation falls
+    violation: Array  #: (G,) violation of the best; never rises
+    elapsed_s: Array  #: (G,) wall-clock time since the run began [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
@@ -262,39 +241,23 @@ class Result:
     """Outcome of a run: plain data, read-only, safe to pickle.
 
     There is always a best point: the best feasible one, or else the one of least violation.
-
-    Attributes:
-        x: (n,) best point.
-        objective: Its objective; infinity if every evaluation failed.
-        violation: Its total constraint violation; infinity if every evaluation failed.
-        evaluations: Evaluations used, failed ones included.
-        failed_evaluations: Evaluations that gave NaN or infinity.
-        generations: Batches evaluated, the starting points being the first.
-        history: Best so far after each generation.
-        reasons: Reasons for ending, in words; also "every evaluation failed" where that is so.
-        time_s: Wall-clock time of the run [s].
-        objective_time_s: Part of it spent in the objective [s].
-        algorithm: Settings used.
-        handling: Constraint handling used.
-        seed_entropy: With the spawn key, all that is needed to repeat the run:
-            `numpy.random.SeedSequence(seed_entropy, spawn_key=seed_spawn_key)`.
-        seed_spawn_key: See seed_entropy.
     """
 
-    x: Array
-    objective: float
-    violation: float
-    evaluations: int
-    failed_evaluations: int
-    generations: int
-    history: History = field(repr=False)
-    reasons: tuple[str, ...]
-    time_s: float
-    objective_time_s: float
-    algorithm: Algorithm
-    handling: ConstraintHandling
+    x: Array  #: (n,) best point
+    objective: float  #: its objective; infinity if every evaluation failed
+    violation: float  #: its total constraint violation; infinity if every evaluation failed
+    evaluations: int  #: evaluations used, failed ones included
+    failed_evaluations: int  #: evaluations that gave NaN or infinity
+    generations: int  #: batches evaluated, the starting points being the first
+    history: History = field(repr=False)  #: best so far after each generation
+    reasons: tuple[str, ...]  #: reasons for ending, in words; also "every evaluation failed" where that is so
+    time_s: float  #: wall-clock time of the run [s]
+    objective_time_s: float  #: part of it spent in the objective [s]
+    algorithm: Algorithm  #: settings used
+    handling: ConstraintHandling  #: constraint handling used
+    #: With the spawn key all to repeat the run: `numpy.random.SeedSequence(seed_entropy, spawn_key=seed_spawn_key)`
     seed_entropy: int | tuple[int, ...]
-    seed_spawn_key: tuple[int, ...]
+    seed_spawn_key: tuple[int, ...]  #: see `seed_entropy`
 
     @property
     def feasible(self) -> bool:

@@ -46,17 +46,7 @@ def mark_failed(f: Array, violation: Array) -> tuple[Array, Array, NDArray[np.bo
 
 
 class Evaluator:
-    """Evaluates generations of one run and keeps its record.
-
-    Attributes:
-        evaluations: Evaluations so far, failed ones included.
-        failed: Failed evaluations so far.
-        objective_time_s: Time spent in the objective so far [s].
-        best_x: (n,) best point so far by the feasibility rules.
-        best: Its violation and objective, which compare as the rules do.
-        stagnation: Generations since the best last improved.
-        generations: So far.
-    """
+    """Evaluates generations of one run and keeps its record."""
 
     def __init__(self, objective: BatchObjective, callback: Callback | None, thinned: bool = False) -> None:
         """Start the clock; a thinned history has one entry for each better point, and the last one."""
@@ -65,13 +55,13 @@ class Evaluator:
         self._thinned = thinned
         self._started = perf_counter()
         self._history: list[tuple[int, float, float, float]] = []
-        self.evaluations = 0
-        self.failed = 0
-        self.objective_time_s = 0.0
-        self.best_x: Array = np.empty(0)
-        self.best = (np.inf, np.inf)
-        self.stagnation = 0
-        self.generations = 0
+        self.evaluations = 0  #: so far, failed ones included
+        self.failed = 0  #: failed evaluations so far
+        self.objective_time_s = 0.0  #: spent in the objective so far [s]
+        self.best_x: Array = np.empty(0)  #: (n,) best point so far by the feasibility rules
+        self.best = (np.inf, np.inf)  #: its violation and objective, which compare as the rules do
+        self.stagnation = 0  #: generations since the best last improved
+        self.generations = 0  #: so far
 
     @property
     def elapsed_s(self) -> float:

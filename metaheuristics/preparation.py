@@ -69,18 +69,14 @@ def read_bounds(objective: Bounded) -> tuple[Array, Array]:
 
 
 class UnitCube:
-    """Free variables scaled to the unit cube, for searches that work there.
-
-    Attributes:
-        size: k, number of free variables.
-    """
+    """Free variables scaled to the unit cube, for searches that work there."""
 
     def __init__(self, start: Start) -> None:
         self._start = start
         self._free = np.flatnonzero(start.upper > start.lower)
         self._lower = start.lower[self._free]
         self._range = start.upper[self._free] - self._lower
-        self.size = int(self._free.size)
+        self.size = int(self._free.size)  #: k, number of free variables
 
     def shares(self, X: Array) -> Array:
         """Return the positions (..., k) in the cube of points (..., n)."""

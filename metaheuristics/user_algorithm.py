@@ -29,7 +29,7 @@ def as_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None
         settings: that differ from its defaults.
 
     Raises:
-        SearchError: the object is of no such kind, or does not take the settings.
+        SearchError: the object is of no such kind, does not take the settings, or its population is no whole number >= 1.
     """
     settings = dict(settings or {})
     algorithm: Any
@@ -50,19 +50,14 @@ def as_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None
         algorithm = user(**settings)
     else:
         algorithm = user
-    return check_algorithm(algorithm, name)
-
-
-def check_algorithm(candidate: Any, name: str) -> Algorithm:
-    """Return the algorithm; SearchError if it has no `start`, or its population is not a whole number >= 1."""
-    if not callable(getattr(candidate, "start", None)):
+    if not callable(getattr(algorithm, "start", None)):
         raise SearchError(
             f"{name!r} must be an algorithm with `population` and `start`, or a plain function of ({', '.join(ARGUMENTS)}); "
-            f"got {type(candidate).__name__}"
+            f"got {type(algorithm).__name__}"
         )
-    check_population(candidate, name)
-    algorithm: Algorithm = candidate
-    return algorithm
+    check_population(algorithm, name)
+    made: Algorithm = algorithm
+    return made
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,20 +69,14 @@ class PlainFunction:
     objective and constraints: the objective where a point is feasible, and 1e9 plus the violation elsewhere, so that its order
     is Deb's; under a static penalty it is objective plus weighted violation. 1e30 marks a failed evaluation.
 
-    Attributes:
-        function: to call.
-        name: in reports.
-        settings: further keyword arguments.
-        population: 1, as a function has no first generation.
-
     Raises:
         SearchError: the function does not take these arguments.
     """
 
-    function: Callable[..., object]
-    name: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    population: int = 1
+    function: Callable[..., object]  #: to call
+    name: str  #: in reports
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: further keyword arguments
+    population: int = 1  #: as a function has no first generation
 
     def __post_init__(self) -> None:
         if not takes_function_arguments(self.function, self.settings):

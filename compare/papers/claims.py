@@ -53,9 +53,7 @@ class Claim:
     criterion: str = ""  # what decides, where the claim leaves it open
     # Of sizes, for example "5 %" of the printed value, or "2 mm" in the unit of the compared values.
     tolerance: str = ""
-    least: str = (
-        ""  # smallest change that counts where the paper prints no size, for example "1 %" in the unit of the change
-    )
+    least: str = ""  # smallest change that counts where no size is printed, for example "1 %" in the unit of the change
     found: str = ""  # our numbers
     verdict: str = ""  # a ``ClaimVerdict``; in a file only of a claim without a check
     detail: str = ""  # of the verdict, for example by how much a claim holds

@@ -38,23 +38,14 @@ class Effort:
 
 @dataclass(frozen=True, kw_only=True)
 class Runner:
-    """Runs tasks and other computations of a reproduction; results that an earlier call has stored in its folder are read.
+    """Runs tasks and other computations of a reproduction; results that an earlier call has stored in its folder are read."""
 
-    Attributes:
-        folder: of the reproduction.
-        progress: receives a line for each run and each computation.
-        jobs: worker processes; 1 runs in this process.
-        scheduler: address of a Dask scheduler, whose workers perform the runs; other computations stay on this machine.
-        on_outdated: receives a line for each solver whose stored runs are recomputed, with the reason.
-        records: of all tasks, filled by ``run_tasks``.
-    """
-
-    folder: Path
-    progress: Progress
-    jobs: int
-    scheduler: str | None = None
-    on_outdated: Progress = ignore_progress
-    records: list[RunRecord] = field(default_factory=list)
+    folder: Path  # of the reproduction
+    progress: Progress  # receives a line for each run and each computation
+    jobs: int  # worker processes; 1 runs in this process
+    scheduler: str | None = None  # address of a Dask scheduler for the runs; other computations stay on this machine
+    on_outdated: Progress = ignore_progress  # receives a line for each solver whose stored runs are recomputed
+    records: list[RunRecord] = field(default_factory=list)  # of all tasks, filled by ``run_tasks``
 
     def run_tasks(self, tasks: Iterable[Task], run: Run = run_task) -> Runs:
         """Run tasks with different titles by a function that performs one run, and return their records.

@@ -66,8 +66,8 @@ class Reproduction(Generic[E, F]):
     name: str  # of the folder, and the beginning of the names of its files
     full: E  # effort of the paper
     run: Callable[[Runner, E], F]  # computes the findings
-    values: Callable[[F], Mapping[str, Any]]  # of the places in the text
-    tables: Callable[[F], Mapping[str, Rows]]  # rows by name in the text
+    values: Callable[[F], Mapping[str, Any]]  # of the places in the text and in the table of differences
+    tables: Callable[[F], Mapping[str, Rows]]  # rows by name in the text, which has their headings and formats
     figures: Callable[[F], Mapping[str, Figure]]  # by name in the text
     checks: Mapping[str, Callable[[F], Check]] = field(default_factory=dict)  # by id of the claim
     csv_tables: Callable[[F], Sequence[Table]] = lambda _: ()  # that are not in the text

@@ -78,16 +78,11 @@ def polynomial(X: Array, lower: Array, upper: Array, index: float, u: Array) -> 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SimulatedBinary:
-    """Simulated binary crossover (SBX).
+    """Simulated binary crossover (SBX)."""
 
-    Attributes:
-        index: Distribution index.
-        probability: Chance that a pair is crossed at all.
-        variable_probability: Chance that a variable of a crossed pair is; it also exchanges sides with chance 0.5.
-    """
-
-    index: float = 2.0
-    probability: float = 0.9
+    index: float = 2.0  #: distribution index
+    probability: float = 0.9  #: chance that a pair is crossed at all
+    #: Chance that a variable of a crossed pair is; it also exchanges sides with chance 0.5
     variable_probability: float = 0.5
 
     def __post_init__(self) -> None:
@@ -104,13 +99,9 @@ class SimulatedBinary:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SinglePoint:
-    """Single-point crossover: from a random position on, two parents exchange their variables.
+    """Single-point crossover: from a random position on, two parents exchange their variables."""
 
-    Attributes:
-        probability: Chance that a pair is crossed. With one variable there is nothing to exchange.
-    """
-
-    probability: float = 0.8
+    probability: float = 0.8  #: chance that a pair is crossed; with one variable there is nothing to exchange
 
     def __post_init__(self) -> None:
         check_number(self, "probability", at_least=0.0, at_most=1.0)
@@ -124,15 +115,10 @@ class SinglePoint:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Polynomial:
-    """Polynomial mutation.
+    """Polynomial mutation."""
 
-    Attributes:
-        index: Distribution index.
-        probability: Chance that a variable mutates; None for 1 / n.
-    """
-
-    index: float = 20.0
-    probability: float | None = None
+    index: float = 20.0  #: distribution index
+    probability: float | None = None  #: chance that a variable mutates; None for 1 / n
 
     def __post_init__(self) -> None:
         check_number(self, "index", at_least=0.0)
@@ -149,14 +135,11 @@ class Polynomial:
 class Flip:
     """Mutation that mirrors a variable at the middle of its range.
 
-    Attributes:
-        probability: Chance that a variable mutates.
-
     Source:
         Goswami, Vadakkepat, Phung (2008), section 5.4: s -> (0.05 + 0.13) - s.
     """
 
-    probability: float = 0.1
+    probability: float = 0.1  #: chance that a variable mutates
 
     def __post_init__(self) -> None:
         check_number(self, "probability", at_least=0.0, at_most=1.0)

@@ -11,17 +11,11 @@ from metaheuristics.interface import Array, Rule
 
 
 class Points(NamedTuple):
-    """Points with what is known about them; operations return new ones.
+    """Points with what is known about them; operations return new ones."""
 
-    Attributes:
-        X: (P, n) points.
-        f: (P,) objectives; infinity where failed.
-        violation: (P,) violations; infinity where failed.
-    """
-
-    X: Array
-    f: Array
-    violation: Array
+    X: Array  #: (P, n) points
+    f: Array  #: (P,) objectives; infinity where failed
+    violation: Array  #: (P,) violations; infinity where failed
 
     @classmethod
     def none(cls, n: int) -> Points:

@@ -6,7 +6,7 @@ snapshots = minimize_many(objectives, front_algorithm("NSGA2"), evaluations=(1_0
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from metaheuristics.adapters.pymoo import FRONT_MODULES
+from metaheuristics.adapters.pymoo import FRONT_MODULES, MultiObjective
 from metaheuristics.multi_objective.constrained_moead import ConstrainedMoead
 from metaheuristics.multi_objective.dynamic_nsga3 import DynamicConstrainedNsga3
 from metaheuristics.multi_objective.minimize_many import (
@@ -16,7 +16,6 @@ from metaheuristics.multi_objective.minimize_many import (
     check_budgets,
     minimize_many,
 )
-from metaheuristics.multi_objective.pymoo import MultiObjective
 from metaheuristics.registry import make_by_name
 
 FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = {

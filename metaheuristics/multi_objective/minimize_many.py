@@ -67,25 +67,15 @@ def check_budgets(algorithm: FrontAlgorithm, evaluations: Sequence[int]) -> None
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Snapshot:
-    """Feasible points of a run that no other point of its population betters in all objectives.
+    """Feasible points of a run that no other point of its population betters in all objectives."""
 
-    Attributes:
-        evaluations: used until then.
-        feasible: of these, without violation.
-        first_feasible: the first of these, counted from 1; None until there is one.
-        time_s: processor time until then [s].
-        objective_time_s: part of it spent in the objectives [s].
-        X: (k, n) points; none as long as the population has no feasible one.
-        F: (k, m) objectives.
-    """
-
-    evaluations: int
-    feasible: int
-    first_feasible: int | None
-    time_s: float
-    objective_time_s: float
-    X: Array
-    F: Array
+    evaluations: int  #: used until then
+    feasible: int  #: of these, without violation
+    first_feasible: int | None  #: the first of these, counted from 1; None until there is one
+    time_s: float  #: processor time until then [s]
+    objective_time_s: float  #: part of it spent in the objectives [s]
+    X: Array  #: (k, n) points; none as long as the population has no feasible one
+    F: Array  #: (k, m) objectives
 
 
 def minimize_many(

@@ -16,8 +16,7 @@ from compare.analysis.record_statistics import a12, rank_sum_normal
 from compare.papers import claims
 from compare.papers.claims import Check, ClaimVerdict, compare_changes, compare_levels, decide, require_change
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
-from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, SWING_POWER_W
-from compare.papers.nao.nao_runs import ALGORITHMS
+from compare.papers.nao.nao_runs import ALGORITHMS, PAPER, SWING_HEIGHT, SWING_POWER_W
 from nlp_gait.formulation import Array
 
 # A solution that costs this share more than the optimum is as good for a walker.
@@ -163,29 +162,23 @@ def _check_swing_beyond(findings: NaoFindings) -> Check:
 
 def _compute_swing_leads(phase: PhaseFindings, swarm: str) -> tuple[Array, Array]:
     """Return how much more GA needs near each swing height than a swarm, by the median runs and by all runs [%]."""
-    middle, every = (
-        100 * (phase.list_swing_powers("ga", whole=whole) / phase.list_swing_powers(swarm, whole=whole) - 1)
-        for whole in (False, True)
-    )
-    return middle, every
+    ga, pso = ([phase.list_swing_powers(name, whole=whole) for whole in (False, True)] for name in ("ga", swarm))
+    return 100 * (ga[0] / pso[0] - 1), 100 * (ga[1] / pso[1] - 1)
 
 
 def _check_swing_heights(phase: PhaseFindings, swarm: str) -> Check:
     """Where a median run has no solution at a height, both outcomes are tried."""
-    leads = _compute_swing_leads(phase, swarm)
-    texts = [
-        ", ".join(f"{_describe_change(v)} at {at:.3f} m" for v, at in zip(row, PAPER.swing_heights_m, strict=True))
-        for row in leads
-    ]
+    leads, texts = _compute_swing_leads(phase, swarm), []
+    for row in leads:
+        pairs = zip(row, PAPER.swing_heights_m, strict=True)
+        texts.append(", ".join(f"{_describe_change(lead)} at {at:.3f} m" for lead, at in pairs))
     readings = [np.nan_to_num(leads[0], nan=end) for end in (math.inf, -math.inf)]
     return require_change(readings, swarm=NAMES[swarm], middle=texts[0], every=texts[1])
 
 
 def _check_swing_lead(phase: PhaseFindings, swarm: str) -> Check:
-    at, printed = (
-        PAPER.swing_heights_m.index(0.024),
-        100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1),
-    )
+    at = PAPER.swing_heights_m.index(0.024)
+    printed = 100 * (SWING_POWER_W["ga"][0.024] / SWING_POWER_W["pso"][0.024] - 1)
     pso, ga = (f"{phase.list_swing_powers(name)[at]:.4f} W" for name in (swarm, "ga"))
     middle, every = (float(leads[at]) for leads in _compute_swing_leads(phase, swarm))
     return _compare_histories(compare_changes, printed, middle, every, swarm=NAMES[swarm], pso=pso, ga=ga)

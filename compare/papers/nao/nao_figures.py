@@ -12,8 +12,7 @@ from compare.drawing.animation import plot_poses
 from compare.drawing.figures import COLOURS, new_figure
 from compare.drawing.gait_figure import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, FeasiblePoints, NaoFindings, PhaseFindings
-from compare.papers.nao.nao_paper import PAPER
-from compare.papers.nao.nao_runs import ALGORITHMS, SEARCHES
+from compare.papers.nao.nao_runs import ALGORITHMS, PAPER, SEARCHES
 from compare.papers.paper_runs import get_point
 from nlp_gait.formulation import Array, Result
 

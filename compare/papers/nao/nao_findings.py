@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from compare.analysis.record_statistics import RankSum, rank_sum_normal
-from compare.papers.nao.nao_paper import PAPER, SWING_HEIGHT, PrintedPhase
-from compare.papers.nao.nao_runs import FixedOptimum, evaluate_indexes
+from compare.papers.nao.nao_runs import PAPER, SWING_HEIGHT, FixedOptimum, PrintedPhase, evaluate_indexes
 from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord, Verdict
 from compare.study.references import find_reference

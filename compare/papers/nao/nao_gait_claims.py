@@ -13,8 +13,7 @@ from compare.analysis.record_statistics import rank_sum_normal
 from compare.papers import claims
 from compare.papers.claims import Check, Series, compare_changes, compare_levels, decide, require_change
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
-from compare.papers.nao.nao_paper import SWING_HEIGHT
-from compare.papers.nao.nao_runs import ALGORITHMS, WEBOTS_DRIVE
+from compare.papers.nao.nao_runs import ALGORITHMS, SWING_HEIGHT, WEBOTS_DRIVE
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.joints import measure_leg

@@ -17,8 +17,7 @@ from compare.papers.nao import nao_runs as nao
 from compare.papers.nao.nao_figures import draw_figures
 from compare.papers.nao.nao_findings import NAMES, FeasiblePoints, NaoFindings, PhaseFindings, choose_sweep_values
 from compare.papers.nao.nao_gait_claims import MARGINS, compute_joint_shares, describe_effect
-from compare.papers.nao.nao_paper import PAPER, SWING_POWER_W, PrintedPhase
-from compare.papers.nao.nao_runs import ALGORITHMS, FixedOptimum, NaoEffort
+from compare.papers.nao.nao_runs import ALGORITHMS, PAPER, SWING_POWER_W, FixedOptimum, NaoEffort, PrintedPhase
 from compare.papers.paper_runs import Runner, Runs, choose_best, compute_range
 from compare.papers.reproduction import Reproduction
 from compare.report.document import Rows, Value
@@ -37,7 +36,7 @@ from nlp_gait.simulation.simulate import SETTLE_TIME
 MEANS = ("dbm_x_mean_limit_m", "dbm_y_mean_limit_m")
 
 
-def run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
+def _run_nao(runner: Runner, effort: NaoEffort) -> NaoFindings:
     """Run searches and IPOPT on both phases, and sweep over their variables; again with other choices."""
     findings, others = NaoFindings(**_run_phases(runner, effort)), {}
     for choice in effort.others:
@@ -110,8 +109,7 @@ def _solve_sweeps(runner: Runner, sweeps: Sequence[Computation]) -> list[list[Fi
     return [[FixedOptimum(**row) for row in rows] for rows in runner.compute(sweeps, code=(nao, ipopt)).values()]
 
 
-def compute_values(findings: NaoFindings) -> dict[str, Any]:
-    """Return the values of the places in the report's text and in the table of differences."""
+def _compute_values(findings: NaoFindings) -> dict[str, Any]:
     ssp, dsp = findings.phases
     runs, robot = ssp.searches["pso"], str(ssp.problem.options["robot"])
     solutions = [(phase, *pair) for phase in findings.phases for pair in phase.paper.optima.items()]
@@ -232,8 +230,7 @@ def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
     }
 
 
-def make_tables(findings: NaoFindings) -> dict[str, Rows]:
-    """Return rows by name; headings and formats are in the report's template."""
+def _make_tables(findings: NaoFindings) -> dict[str, Rows]:
     dsp = findings.dsp
     tables: dict[str, Rows] = {
         "table7-swing-heights": _list_swing_heights(findings),
@@ -290,9 +287,8 @@ def _list_choices(phase: PhaseFindings) -> Rows:
     """The printed solutions and IPOPT's optimum with each other choice."""
     rows, every = [], {"": phase.printed_here, **phase.printed_by_choice}
     for choice, printed in every.items():
-        title, best = (
-            (PAPER.choices[choice].title, phase.optimum_with(choice)) if choice else ("as here", phase.optimum)
-        )
+        title = PAPER.choices[choice].title if choice else "as here"
+        best = phase.optimum_with(choice) if choice else phase.optimum
         solved = best is not None and best.claimed and best.verdict.feasible
         numbers = [printed[name][index] for name in ALGORITHMS for index in ("power_W", "torque_change_Nm")]
         rows.append([phase.paper.title, title, *numbers, best.verdict.objective if best and solved else "not solved"])
@@ -370,9 +366,9 @@ def _list_simulations(phase: PhaseFindings) -> Rows:
 REPRODUCTION = Reproduction(
     name="nao",
     full=NaoEffort(),
-    run=run_nao,
-    values=compute_values,
-    tables=make_tables,
+    run=_run_nao,
+    values=_compute_values,
+    tables=_make_tables,
     figures=draw_figures,
     checks=bind_checks("nao/nao_claims.toml", {**vars(nao_claims), **vars(nao_gait_claims)}),
 )

@@ -200,10 +200,8 @@ def _is_moderate(runs: dict[str, Measures]) -> Tested:
 def _is_faster(runs: dict[str, Measures]) -> Tested:
     early = {n: m.hypervolume[:, m.early] for n, m in runs.items()}
     leads, numbers = _is_extreme(early, "CMOPSO", max, 100.0, " %")
-    at, medians = (
-        runs["CMOPSO"].evaluations[runs["CMOPSO"].early],
-        {n: np.median(m.until(NEAR)) for n, m in runs.items()},
-    )
+    at = runs["CMOPSO"].evaluations[runs["CMOPSO"].early]
+    medians = {n: np.median(m.until(NEAR)) for n, m in runs.items()}
     until = ", ".join(f"{NAMES[n]} {f'{k:,.0f}' if np.isfinite(k) else 'never'}" for n, k in medians.items())
     return leads, f"after {at:,.0f} {numbers}; {100 * NEAR:.0f} % are reached after {until}"
 

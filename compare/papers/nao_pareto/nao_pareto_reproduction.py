@@ -22,7 +22,8 @@ from compare.questions.pareto.searches import REFERENCE, Challenge, challenge_fr
 from compare.questions.question import Work, find
 from compare.report.document import Rows, Value
 from compare.study.store import Computation, Store
-from metaheuristics.multi_objective import constrained_moead, dynamic_nsga3, pymoo
+from metaheuristics.adapters import pymoo
+from metaheuristics.multi_objective import constrained_moead, dynamic_nsga3
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.decoding import decode
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
+def _run_pareto(runner: Runner, effort: ParetoEffort) -> ParetoFindings:
     """Solve for the true front of each phase, run the searches on it, and solve again from their best points."""
     return ParetoFindings(phases=tuple(_run_phase(runner, phase, effort) for phase in runs.PHASES), effort=effort)
 
@@ -54,8 +55,7 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFronts:
     return PhaseFronts(problem=problem, criterion=criterion, first_front=front, answer=answer, runs=done)
 
 
-def compute_values(findings: ParetoFindings) -> dict[str, Any]:
-    """Return the values of the places in the report's text."""
+def _compute_values(findings: ParetoFindings) -> dict[str, Any]:
     ssp, _ = findings.phases
     effort, verdicts = findings.effort, [claim.verdict for claim in REPRODUCTION.check_claims(findings).values()]
     return {
@@ -74,8 +74,7 @@ def compute_values(findings: ParetoFindings) -> dict[str, Any]:
     }
 
 
-def make_tables(findings: ParetoFindings) -> dict[str, Rows]:
-    """Return rows by name; headings and formats are in the report's template."""
+def _make_tables(findings: ParetoFindings) -> dict[str, Rows]:
     fronts: list[list[Value]] = []
     tables: dict[str, Rows] = {"fronts": fronts}
     for phase in findings.phases:
@@ -172,9 +171,9 @@ def _draw_fronts(phase: PhaseFronts) -> Figure:
 REPRODUCTION = Reproduction(
     name="nao_pareto",
     full=ParetoEffort(),
-    run=run_pareto,
-    values=compute_values,
-    tables=make_tables,
+    run=_run_pareto,
+    values=_compute_values,
+    tables=_make_tables,
     figures=draw_figures,
     checks=bind_checks("nao_pareto/nao_pareto_claims.toml", vars(nao_pareto_claims)),
 )

@@ -25,13 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def run_nao_walk(runner: Runner, effort: NaoWalkEffort) -> NaoWalkFindings:
-    """Compute optimal gaits, then simulate them and the robot's own walk.
-
-    Raises:
-        MissingExtraError: MuJoCo is not installed.
-        InputError: no optimal gait was found at the default speed.
-    """
+def _run_nao_walk(runner: Runner, effort: NaoWalkEffort) -> NaoWalkFindings:
+    """Compute optimal gaits, then simulate them and the robot's own walk."""
     load_mujoco()  # fail before the work if it is missing
     code = (runs, cart_table, recorded_cycle, drive, simulate)
     gaits = runner.compute(runs.make_gait_computations(effort), code)
@@ -58,8 +53,7 @@ def _select(results: dict[str, Any], prefix: str) -> dict[str, Any]:
     return {name.removeprefix(prefix): result for name, result in results.items() if name.startswith(prefix)}
 
 
-def compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
-    """Return the values of the places in the report's text."""
+def _compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
     effort = findings.effort
     disturbances = {"pushes": runs.PUSHES_NS, "slopes": runs.SLOPES_DEG}
     disturbances |= {"frictions": runs.FRICTIONS, "masses": runs.MASS_FACTORS}
@@ -87,8 +81,7 @@ NAMES = {
 }
 
 
-def make_tables(findings: NaoWalkFindings) -> dict[str, Rows]:
-    """Return rows by name; headings and formats are in the report's template."""
+def _make_tables(findings: NaoWalkFindings) -> dict[str, Rows]:
     drives = [
         [name, share, point["walked_share"], point["sheet_J_per_m"], point["paper_J_per_m"], point["tracking_rad"]]
         + [point["falls"], point["disturbances"], 100 * point["fastest_m_s"]]
@@ -194,9 +187,9 @@ def _draw_drives(findings: NaoWalkFindings) -> Figure:
 REPRODUCTION = Reproduction(
     name="nao_walk",
     full=NaoWalkEffort(),
-    run=run_nao_walk,
-    values=compute_values,
-    tables=make_tables,
+    run=_run_nao_walk,
+    values=_compute_values,
+    tables=_make_tables,
     figures=draw_figures,
     checks=bind_checks("nao_walk/nao_walk_claims.toml", vars(nao_walk_claims)),
 )

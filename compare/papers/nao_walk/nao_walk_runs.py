@@ -150,11 +150,7 @@ def solve_free_height(spec: ProblemSpec, starts: int) -> dict[str, Any]:
 def simulate_joints(feed_forward: str, heat: str, x: Mapping[str, float], steps: int) -> dict[str, Any]:
     """Return the energy per metre of each kind of joint, in the model and in the engine, with both heat constants [J/m].
 
-    Args:
-        feed_forward: of the drives.
-        heat: key of ``SPECS`` of an optimum; empty for the robot's own walk.
-        x: of the optimum.
-        steps: number of simulated steps.
+    The gait is the optimum x with the heat constant of a key of ``SPECS``; without a key it is the robot's own walk.
     """
     if heat:
         problem = SPECS[heat].load().with_values(speed_m_s=SPEED_M_S)

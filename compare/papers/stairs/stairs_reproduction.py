@@ -12,7 +12,7 @@ import numpy as np
 from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.stairs import stairs_effects, stairs_instants
+from compare.papers.stairs import stairs_instants
 from compare.papers.stairs import stairs_plan_claims as plan_claims
 from compare.papers.stairs import stairs_planning as planning
 from compare.papers.stairs import stairs_runs as runs
@@ -32,7 +32,7 @@ CASE_COLUMNS = {"papers": "paper {}", "jerks": "least jerk {}", "energies": "lea
 CASE_COLUMNS |= {"cases_4f": ".4f", "cases_6g": ".6g"}
 
 
-def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
+def _run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     """Run plans and ideals, then track the best plans, then compute what follows from them."""
     findings = StairsFindings(effort=effort, runs=runner.run_tasks(runs.make_first_tasks(effort)))
     findings.runs.update(runner.run_tasks(planning.make_choice_tasks(findings)))
@@ -49,8 +49,7 @@ def run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:
     return replace(findings, others=runner.compute(computations, (runs, planning, stairs_instants)))
 
 
-def compute_values(findings: StairsFindings) -> dict[str, Any]:
-    """Return the values of the places in the report's text."""
+def _compute_values(findings: StairsFindings) -> dict[str, Any]:
     effort = findings.effort
     (end_rate,) = [variable for variable in GOVERNING_VARIABLES if variable.name == "end_rate_rad_s"]
     return {
@@ -63,12 +62,11 @@ def compute_values(findings: StairsFindings) -> dict[str, Any]:
         "end_rate": end_rate,
         **plan_claims.compute_planning_values(findings),
         **tracking.compute_tracking_values(findings),
-        **stairs_effects.compute_effects(findings),
+        **plan_claims.compute_effects(findings),
     }
 
 
-def make_tables(findings: StairsFindings) -> dict[str, Rows]:
-    """Return rows by name; headings and formats are in the report's template."""
+def _make_tables(findings: StairsFindings) -> dict[str, Rows]:
     return {
         "table3": _list_table_3(findings),
         "plans": [row for case in findings.cases for row in _list_plans(findings, case)],
@@ -168,9 +166,9 @@ def _list_network(network: Mapping[str, Any]) -> Rows:
 REPRODUCTION = Reproduction(
     name="stairs",
     full=StairsEffort(),
-    run=run_stairs,
-    values=compute_values,
-    tables=make_tables,
+    run=_run_stairs,
+    values=_compute_values,
+    tables=_make_tables,
     figures=draw_figures,
     checks=bind_checks("stairs/stairs_claims.toml", {**vars(plan_claims), **vars(tracking)}),
 )

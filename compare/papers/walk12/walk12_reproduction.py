@@ -44,7 +44,7 @@ SAME_OPTIMUM = 2e-4  # starts whose f differs by less agree
 SEARCHES = ("ga", "pso")
 
 
-def run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
+def _run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     """Run Table III under both normalisations, Table IV, the errata and both paths."""
     records = runner.run_tasks(runs.make_first_tasks(effort))
     records |= runner.run_tasks(runs.make_second_tasks(effort, records))
@@ -74,10 +74,10 @@ def make_trajectories(findings: Walk12Findings) -> list[Table]:
     return tables
 
 
-def compute_values(findings: Walk12Findings) -> dict[str, Any]:
-    """Return the values of the places in the report's text."""
+def _compute_values(findings: Walk12Findings) -> dict[str, Any]:
     problem, robot = load("walk12"), load_point_mass_biped()
     lengths = [problem.value(f"step_length_m.{end}") for end in ("lower", "upper")]
+    every = {n: [run for row in TABLE_3 for run in findings.records(PAPER, row.weight, n)] for n in ("ga", IPOPT)}
     return {
         "effort": findings.effort,
         "steps": WALKED_STEPS,
@@ -99,12 +99,7 @@ def compute_values(findings: Walk12Findings) -> dict[str, Any]:
         "corner_leg_mm": 1e3 * (robot.leg_m - 2 * CORNER_M),
         "instants": int(problem.options["intervals"]) // 2 + 1,
         "circle_off_mm": CHECKS["circle"](findings).values["off"],
-        "time_s": {
-            name: float(
-                np.median([run.time_s.solve for row in TABLE_3 for run in findings.records(PAPER, row.weight, name)])
-            )
-            for name in ("ga", IPOPT)
-        },
+        "time_s": {name: float(np.median([run.time_s.solve for run in done])) for name, done in every.items()},
         **_compute_normalisation(findings),
         **_compute_tradeoff(findings, *lengths),
         **_compute_errata(findings),
@@ -185,9 +180,8 @@ def _compute_gap(row: PaperRow, horizon: Horizon) -> float:
 def _describe_reading(findings: Walk12Findings, zmp: Zmp) -> str:
     """Return f1max, the optimum at lambda = 0.15 and where the optimum moves between both ends of s, by a reading."""
     ends = [findings.best(f"{zmp}-{weight:g}") for weight in (0.15, 1.0)]
-    (long, low), (short, high) = (
-        (get_point(run)[0] / F2MAX, run.verdict.indexes["f1_per_m2s"] / F1MAX) for run in ends
-    )
+    long, short = (get_point(run)[0] / F2MAX for run in ends)
+    low, high = (run.verdict.indexes["f1_per_m2s"] / F1MAX for run in ends)
     weight = (long - short) / (long - short + high - low)
     return (
         f"f1max becomes {F1MAX * high:.2f}, the optimum at λ = 0.15 {ends[0].verdict.objective:.4f}, and both ends of s have "
@@ -261,8 +255,7 @@ def get_dense(record: RunRecord) -> Mapping[str, float]:
     return record.verdict.dense or {}
 
 
-def make_tables(findings: Walk12Findings) -> dict[str, Rows]:
-    """Return rows by name; headings and formats are in the report's template."""
+def _make_tables(findings: Walk12Findings) -> dict[str, Rows]:
     return {
         "table3-paper": _list_table_3(findings, PAPER),
         "table3-model": _list_table_3(findings, MODEL),
@@ -359,9 +352,9 @@ def _list_table_4(findings: Walk12Findings) -> Rows:
 REPRODUCTION = Reproduction(
     name="walk12",
     full=Walk12Effort(),
-    run=run_walk12,
-    values=compute_values,
-    tables=make_tables,
+    run=_run_walk12,
+    values=_compute_values,
+    tables=_make_tables,
     figures=draw_figures,
     checks=CHECKS,
     csv_tables=make_trajectories,

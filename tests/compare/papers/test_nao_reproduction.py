@@ -14,9 +14,8 @@ import nlp_gait
 from compare import judge
 from compare.papers.nao import nao_figures, nao_runs
 from compare.papers.nao.nao_findings import FeasiblePoints, NaoFindings, PhaseFindings, choose_sweep_values
-from compare.papers.nao.nao_paper import DSP, PAPER, PHASES, SSP
-from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12, compute_values
-from compare.papers.nao.nao_runs import FixedOptimum, evaluate_indexes
+from compare.papers.nao.nao_reproduction import REPRODUCTION, compute_implied_a12
+from compare.papers.nao.nao_runs import DSP, PAPER, PHASES, SSP, FixedOptimum, evaluate_indexes
 from compare.study.record import RunRecord, read_record
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import Array, GaitProblem
@@ -144,7 +143,7 @@ def test_verdicts_with_other_choices_are_compared(finished: Finished) -> None:
     findings = finished.findings
     assert "verdicts are others" not in finished.report and "not computed at this effort" in finished.report
     lines = [with_sweep(findings, 0, powers) for powers in ((2.0, 1.5, 1.0), (1.0, 1.5, 2.0))]
-    values = compute_values(replace(lines[0], others={"v6": lines[1]}))
+    values = REPRODUCTION.values(replace(lines[0], others={"v6": lines[1]}))
     assert (
         f"{REPRODUCTION.printed.claims['higher-hip-ssp'].text}: does not hold instead of holds"
         in values["changed"]["v6"]
