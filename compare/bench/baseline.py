@@ -1,29 +1,24 @@
 """The rules of GaitBench 1, and the shipped records of its baseline: one compressed file for each instance.
 
-A packed record lacks time histories, the dense grid, prices and indexes.
+A packed record lacks time histories, the dense grid, prices and indexes; ``benchmarks.gaitbench.baseline`` packs them.
 """
 
 from __future__ import annotations
 
 import gzip
 import json
-import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from compare.study.definition import select_shared
-from compare.study.record import History, RunRecord, Times, Verdict, decode_record
+from compare.study.record import RunRecord, decode_record
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait import gaitbench
-from nlp_gait.backends.identity import HASH
 from nlp_gait.errors import InputError
-from nlp_gait.files import make_folder, replace_file
 from nlp_gait.gaitbench.facts import Subset
 from nlp_gait.gaitbench.generated import is_generated, list_test_seeds, make_id
 
@@ -35,7 +30,6 @@ FOLDER = Path(__file__).with_name("records")
 DRAWN = "drawn"  # folder below it, and the suite, of drawn instances: fewer runs of the same solvers
 SEEDS = re.compile(r"([0-9]{1,12}):([0-9]{1,12})")
 MOST_SEEDS = 1000
-DIGITS = 12  # of numbers in the histories
 
 
 def choose_instances(
@@ -80,24 +74,6 @@ def make_bench_study(
     return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
-def pack_records(instance: str, records: Sequence[RunRecord], folder: Path | None = None) -> Path:
-    """Write the records of one instance, and return the file. Equal records give an equal file."""
-    packed = [_shorten(record) for record in records]
-    shared: dict[str, Any] = {}
-    for record in packed:
-        if record.problem != instance:
-            raise InputError(f"a record of {record.problem!r} does not belong to {instance!r}")
-        definition = select_shared(record.definition)
-        if shared.setdefault(record.solver, definition) != definition:
-            raise InputError(f"runs of {record.solver!r} on {instance!r} differ in their settings")
-    text = json.dumps([record.to_json() for record in packed], separators=(",", ":"))
-    path = _locate(instance, folder)
-    make_folder(path.parent)
-    with replace_file(path) as temporary:
-        temporary.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
-    return path
-
-
 def list_instances(folder: Path = FOLDER) -> tuple[str, ...]:
     """Return the ids of the instances with baseline records, without drawn ones."""
     return tuple(sorted(path.name.removesuffix(".json.gz") for path in folder.glob("*.json.gz")))
@@ -108,7 +84,7 @@ def list_drawn(folder: Path = FOLDER) -> tuple[str, ...]:
     return tuple(id.replace("_", ":") for id in list_instances(folder / DRAWN))
 
 
-def _locate(instance: str, folder: Path | None) -> Path:
+def locate_records(instance: str, folder: Path | None) -> Path:
     """Return the file of an instance's records: Windows allows no colons in names."""
     folder = folder or (FOLDER / DRAWN if is_generated(instance) else FOLDER)
     return folder / f"{instance.replace(':', '_')}.json.gz"
@@ -117,33 +93,8 @@ def _locate(instance: str, folder: Path | None) -> Path:
 @cache
 def load_baseline(instance: str, folder: Path | None = None) -> tuple[RunRecord, ...]:
     """Return the records of all solvers of the baseline on an instance; raises InputError if none are shipped."""
-    path = _locate(instance, folder)
+    path = locate_records(instance, folder)
     if not path.is_file():
         available = ", ".join((*list_instances(folder or FOLDER), *list_drawn(folder or FOLDER)))
         raise InputError(f"no baseline records of {instance!r} are shipped; available: {available}")
     return tuple(map(decode_record, json.loads(gzip.decompress(path.read_bytes()))))
-
-
-def _shorten(record: RunRecord) -> RunRecord:
-    """Return a record without what the leaderboard does not read; of its history, the changes of the best and the last entry."""
-    counts, best, verdict = record.history.evaluations, record.history.objective, record.verdict
-    kept = [k for k, value in enumerate(best) if value != (best[k - 1] if k else None) or k == len(best) - 1]
-    # An instance is identified by its probe values: the hash of its mathematics depends on the version of CasADi.
-    problem = {key: value for key, value in record.definition["problem"].items() if key != HASH}
-    return replace(
-        record,
-        definition={**record.definition, "problem": problem},
-        x={name: _round(value) for name, value in record.x.items()},
-        verdict=Verdict.make_plain(verdict.objective, verdict.violation, verdict.feasible),
-        active_constraints=(),
-        history=History(
-            evaluations=tuple(counts[k] for k in kept),
-            objective=tuple(None if (value := best[k]) is None else _round(value) for k in kept),
-        ),
-        time_s=Times.make_unknown(_round(record.time_s.solve, 4), (math.nan,) * len(kept)),
-        origin=None,
-    )
-
-
-def _round(value: float, digits: int = DIGITS) -> float:
-    return float(f"{value:.{digits}g}")
