@@ -15,10 +15,9 @@ from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS
 from compare.bench.leaderboard import Leaderboard, filter_instances
 from compare.drawing.comparison_figures import plot_suite_ecdf
-from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Section, Table, text_table
 from compare.report.provenance import TERMS
-from compare.report.tuning_section import make_tuning_section
+from compare.report.solver_sections import make_anytime_section, make_tuning_section
 from compare.study.task import GRADIENT_SOLVERS
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array

@@ -1,9 +1,10 @@
-"""Report of a study from its records."""
+"""Report of a study from its records, written once or while the study runs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
@@ -21,17 +22,18 @@ from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import Tuning, read_tunings
 from compare.analysis.verdict import find_leaders, write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
-from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document, Figure, Part, Section, Table, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
+from compare.report.solver_sections import make_anytime_section, make_tuning_section
 from compare.report.study_files import FurtherFiles
-from compare.report.tuning_section import make_tuning_section
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence
 from compare.study.record import RunRecord
+from compare.study.record_files import RECORDS
 from compare.study.settings import Manifest, read_manifest
 from compare.study.simulations import SimulatedGait, load_simulations
+from nlp_gait.files import write_text
 
 
 def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Section:
@@ -81,6 +83,8 @@ def _make_wins(comparisons: Sequence[Comparison], solver: str) -> Table:
 
 
 REPORT_ALONE = FurtherFiles()
+RELOAD = '<head>\n<meta http-equiv="refresh" content="5">'  # seconds between reloads of the page
+POLL_S = 2.0
 
 
 def rebuild_report(
@@ -107,6 +111,24 @@ def write_report(
     document = make_study_document(comparisons, manifest, simulated, excluded, read_tunings(folder))
     written = write_document(folder, document)
     return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons)]
+
+
+def watch_report(folder: Path, rewrite: Callable[[], object], sleep: Callable[[float], None] = time.sleep) -> None:
+    """Rewrite the report of a folder after every change of its records until Ctrl-C; its page reloads itself meanwhile.
+
+    ``rewrite`` writes the report. A folder without records is waited for.
+    """
+    page, shown = folder / "report.html", None
+    try:
+        while True:
+            records = {path: path.stat().st_mtime_ns for path in (folder / RECORDS).glob("*/*.json")}
+            if records and records != shown:
+                rewrite()
+                write_text(page, page.read_text(encoding="utf-8").replace("<head>", RELOAD, 1))
+                shown = records
+            sleep(POLL_S)
+    except KeyboardInterrupt:
+        return
 
 
 def make_study_document(

@@ -12,8 +12,8 @@ from scipy.stats import beta
 from compare.analysis.anytime import compute_area, compute_budget, read_gap, sample_best, score_anytime
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import Curve
-from compare.report.anytime_section import make_anytime_section
 from compare.report.document import Document
+from compare.report.solver_sections import make_anytime_section
 from compare.report.writing import write_document
 from tests.compare.records import record
 

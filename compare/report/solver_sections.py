@@ -1,4 +1,4 @@
-"""Section on solvers over many problems at all budgets, next to the ranks by their medians."""
+"""Sections on solvers over many problems: at all budgets, next to the ranks by their medians; how their settings were tuned."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from compare.analysis.comparison import Comparison
 from compare.analysis.overview import describe_tests, rank_over_problems
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
-from compare.analysis.units import percent
+from compare.analysis.tuning import Tuning, describe_choice
+from compare.analysis.units import join_words, percent
 from compare.drawing.comparison_figures import plot_critical_difference
 from compare.report.document import Figure, Part, Section, text_table
 
@@ -54,3 +55,32 @@ def _format_score(score: AnytimeScore) -> tuple[str, ...]:
 def _format_fixed(score: AnytimeScore) -> tuple[str, ...]:
     gaps = (percent(gap) if math.isfinite(gap) else "infeasible" for gap in score.gaps)
     return score.solver, *gaps, *(count(cost) for cost in score.costs)
+
+
+def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:
+    """Return the section, none without tunings."""
+    if not tunings:
+        return ()
+    rows = [
+        (
+            tuning.solver,
+            *(f"{area:.3f}" for area in tuning.area),
+            *(str(tuning.trials), f"{tuning.evaluations:,}".replace(",", " "), f"{tuning.time_s:.0f} s"),
+            describe_choice(tuning),
+        )
+        for tuning in tunings
+    ]
+    header = ("solver", "area before", "tuned", "trials", "evaluations", "time of all runs", "chosen settings")
+    return (
+        Section(
+            title="Tuning",
+            parts=(
+                f"A trial of a search is one run on each of {join_words(tunings[0].training)}, which are not judged here or have "
+                "other seeds; the first has the settings before. Optuna's tree-structured Parzen estimator proposes the others "
+                "within the ranges that belong to the search's settings, and the trial with the largest mean area over the "
+                "convergence curve (AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before the judged "
+                "runs, and are not counted there.",
+                text_table(header, rows, "Settings before and after tuning", prose=True),
+            ),
+        ),
+    )
