@@ -1,10 +1,11 @@
-"""Settings of a solver with defaults, meaning and source, from its docstring."""
+"""Settings of a solver with defaults, meaning and source, from its docstring and the ``#:`` comments of its fields."""
 
 from __future__ import annotations
 
 import inspect
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,7 +16,7 @@ from metaheuristics.registry import ADAPTERS, ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
 SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
-ENTRY = re.compile(r"^(\w+): (.*)$")
+FIELD = re.compile(r"^    (\w+):")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +49,9 @@ def describe_solver(name: str) -> Description:
     bound = factory.keywords if isinstance(factory, partial) else {}
     kind: Any = factory.func if isinstance(factory, partial) else factory
     # A class may inherit the documentation of its settings and its source.
-    sections = {k: text for base in reversed(kind.__mro__[:-1]) for k, text in split_sections(base.__doc__ or "")}
-    meanings = dict(_entries(sections.get("Attributes", "") or sections.get("Args", "")))
+    bases = list(reversed(kind.__mro__[:-1]))
+    sections = {k: text for base in bases for k, text in split_sections(base.__doc__ or "")}
+    meanings = {name: text for base in bases for name, text in _read_fields(base)}
     parameters = inspect.signature(kind).parameters.values()
     settings = tuple(
         Setting(name=p.name, default="" if p.default is p.empty else str(p.default), meaning=meanings.get(p.name, ""))
@@ -77,9 +79,14 @@ def split_sections(text: str) -> Iterator[tuple[str, str]]:
     yield heading, "\n".join(lines).strip("\n")
 
 
-def _entries(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the ``name: text`` pairs of a section; lines are joined."""
-    for block in re.split(r"\n(?=\S)", inspect.cleandoc(text)):
-        found = ENTRY.match(" ".join(block.split()))
-        if found:
-            yield found[1], found[2].rstrip(".").replace("``", "`")
+def _read_fields(kind: type) -> Iterator[tuple[str, str]]:
+    """Yield the fields of a class with their ``#:`` comments, which stand before or behind them."""
+    words: list[str] = []
+    with suppress(OSError):  # a frozen program has no source
+        for line in inspect.getsource(kind).splitlines():
+            code, _, comment = line.partition("#: ")
+            words += [comment] * bool(comment)
+            if words and (field := FIELD.match(code)):
+                yield field[1], " ".join(words).replace("``", "`")
+            if code.strip():
+                words = []

@@ -21,19 +21,15 @@ class CmaEs:
     violation. The shared starting points are its first generation; the first distribution is centred on their best.
     Once pycma would stop, it starts again from a random point with a larger population, until the budget ends.
 
-    Attributes:
-        population: Points in a generation; 10 is pycma's own choice for 8 and 9 variables.
-        sigma: First standard deviation, as a share of each variable's range.
-        growth: Factor on the population at every restart.
-
     Source:
         Hansen, Ostermeier (2001), Completely derandomized self-adaptation in evolution strategies; Auger, Hansen (2005),
         A restart CMA evolution strategy with increasing population size.
     """
 
+    #: Points in a generation; 10 is pycma's own choice for 8 and 9 variables
     population: int = tunable(10, 6, 60, "log")
-    sigma: float = tunable(0.3, 0.05, 0.6, "log")
-    growth: float = tunable(2.0, 1.0, 3.0)
+    sigma: float = tunable(0.3, 0.05, 0.6, "log")  #: First standard deviation, as a share of each variable's range
+    growth: float = tunable(2.0, 1.0, 3.0)  #: Factor on the population at every restart
     name: ClassVar[str] = "cma"
 
     def __post_init__(self) -> None:

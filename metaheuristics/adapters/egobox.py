@@ -22,16 +22,13 @@ class BayesianOptimisation:
     its worst row, modelled as sign(c) ln(1 + |c|), as it spans many powers of ten. The constraint handling of the study
     is not used. After 500 evaluations it stops: fitting takes longer with every point.
 
-    Attributes:
-        population: points evaluated before the first model; 20 are about two for each of 9 variables.
-
     Source:
         Lafage (2022), egobox, a Rust toolbox for efficient global optimization; Jones, Schonlau, Welch (1998), Efficient
         global optimization of expensive black-box functions; the transform of constraints after Eriksson, Poloczek (2021),
         Scalable constrained Bayesian optimization.
     """
 
-    population: int = 20
+    population: int = 20  #: points evaluated before the first model; 20 are about two for each of 9 variables
     name: ClassVar[str] = "bayes"
 
     def __post_init__(self) -> None:

@@ -20,17 +20,13 @@ class ScipyStarts:
 
     Where the objective cannot separate its constraints, the total violation is the only one. The constraint handling of the
     study is not used.
-
-    Attributes:
-        population: starting points, which all searches share; further starts are drawn uniformly.
-        margin: tightens each constraint, in units of its scale: a solver stops slightly outside its constraints, which a
-            search counts as infeasible. Not applied to the total violation, which has no inside.
-        iterations: limit for one start.
     """
 
-    population: int = 1
+    population: int = 1  #: starting points, which all searches share; further starts are drawn uniformly
+    #: tightens each constraint, in units of its scale: a solver stops slightly outside its constraints, which a search counts
+    #: as infeasible. Not applied to the total violation, which has no inside
     margin: float = 1e-7
-    iterations: int = 1000
+    iterations: int = 1000  #: limit for one start
     name: ClassVar[str]
 
     def __post_init__(self) -> None:

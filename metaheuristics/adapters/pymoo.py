@@ -36,20 +36,14 @@ FRONT_MODULES: Mapping[str, str] = {"NSGA2": "moo.nsga2", "CMOPSO": "moo.cmopso"
 class PymooSettings:
     """An algorithm of pymoo with its own defaults, started from the starting points.
 
-    Attributes:
-        algorithm: Class name in pymoo, for example "GA".
-        population: Size of the population (pop_size).
-        settings: Further arguments of the class.
-        modules: Where pymoo has the classes that are allowed.
-
     Source:
         Blank, Deb (2020), pymoo: Multi-objective optimization in Python.
     """
 
-    algorithm: str
-    population: int = tunable(50, 20, 200, "log")
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    modules: ClassVar[Mapping[str, str]]
+    algorithm: str  #: Class name in pymoo, for example "GA"
+    population: int = tunable(50, 20, 200, "log")  #: Size of the population (pop_size)
+    settings: Mapping[str, Any] = field(default_factory=dict)  #: Further arguments of the class
+    modules: ClassVar[Mapping[str, str]]  #: Where pymoo has the classes that are allowed
 
     def __post_init__(self) -> None:
         if self.algorithm not in self.modules:

@@ -22,21 +22,17 @@ class AntColony:
     archive. Samples beyond a bound are put on it. The rotation of axes that the source adds for non-separable
     problems is left out, and the archive fills up from the shared starting points instead of `archive` random ones.
 
-    Attributes:
-        population: Number of ants, and of starting points.
-        archive: Number of points kept (k).
-        locality: Reach of the preference for the best, as a share of the archive (q); small is greedy.
-        spread: Deviation in mean distances (xi). It acts as evaporation does in a discrete colony (Socha, Dorigo):
-            the higher, the less the search is bound to where it has been, and the slower it converges. An evaporation
-            rate of 0.7, as in Bhardwaj et al., Table IV, is thus naturally `spread=0.7`.
-
     Source:
         Socha, Dorigo (2008), Ant colony optimization for continuous domains, section 3.
     """
 
-    population: int = tunable(30, 10, 100, "log")
-    archive: int = tunable(50, 10, 200, "log")
+    population: int = tunable(30, 10, 100, "log")  #: Number of ants, and of starting points
+    archive: int = tunable(50, 10, 200, "log")  #: Number of points kept (k)
+    #: Reach of the preference for the best, as a share of the archive (q); small is greedy
     locality: float = tunable(0.1, 0.01, 0.5, "log")
+    #: Deviation in mean distances (xi). It acts as evaporation does in a discrete colony (Socha, Dorigo): the higher, the less
+    #: the search is bound to where it has been, and the slower it converges. An evaporation rate of 0.7, as in Bhardwaj et al.,
+    #: Table IV, is thus naturally `spread=0.7`
     spread: float = tunable(0.85, 0.3, 1.2)
     name: ClassVar[str] = "aco"
 
@@ -103,23 +99,18 @@ class AntColonyGrid:
     are scaled so that the pheromone of a variable stays a probability. A small share of all choices is uniform, which
     bounds pheromone from below and keeps the search alive at high evaporation. The answer is no finer than the grid.
 
-    Attributes:
-        population: Number of ants, and of starting points (which lie anywhere and deposit on the nearest level).
-        levels: Number of levels of each variable, bounds included.
-        evaporation: Share of pheromone lost in a generation. 0.7 is the value of Bhardwaj et al., Table IV.
-        depositors: Points that deposit: the best so far and the best ants of the generation.
-        exploration: Share of choices made regardless of pheromone.
-
     Source:
         Bullnheimer, Hartl, Strauss (1999), A new rank based version of the ant system (deposits); Blum, Dorigo (2004),
         The hyper-cube framework (scaling); Stuetzle, Hoos (2000), MAX-MIN ant system (lower bound).
     """
 
+    #: Number of ants, and of starting points (which lie anywhere and deposit on the nearest level)
     population: int = tunable(30, 10, 100, "log")
-    levels: int = tunable(101, 21, 501, "log")
+    levels: int = tunable(101, 21, 501, "log")  #: Number of levels of each variable, bounds included
+    #: Share of pheromone lost in a generation. 0.7 is the value of Bhardwaj et al., Table IV
     evaporation: float = tunable(0.7, 0.1, 0.95)
-    depositors: int = tunable(6, 1, 10)
-    exploration: float = tunable(0.1, 0.0, 0.3)
+    depositors: int = tunable(6, 1, 10)  #: Points that deposit: the best so far and the best ants of the generation
+    exploration: float = tunable(0.1, 0.0, 0.3)  #: Share of choices made regardless of pheromone
     name: ClassVar[str] = "aco-grid"
 
     def __post_init__(self) -> None:

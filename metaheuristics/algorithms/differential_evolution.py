@@ -34,22 +34,18 @@ class DifferentialEvolution:
     the bounds. Strategies, defaults and the order of random numbers are those of `scipy.optimize.differential_evolution`
     with deferred updating and without polishing, so that both make equal trials of equal members.
 
-    Attributes:
-        population: Members. SciPy's default is 15 for each variable; 50 is what the other algorithms here have.
-        strategy: Mutation and crossover, binomial or exponential, as SciPy names them.
-        mutation_low: Least weight of a difference; the weight is drawn again for each generation.
-        mutation_high: Greatest weight of a difference.
-        recombination: Probability of taking a variable from the mutant.
-
     Source:
         Storn, Price (1997), Differential evolution; SciPy's `differential_evolution`.
     """
 
+    #: Members. SciPy's default is 15 for each variable; 50 is what the other algorithms here have
     population: int = tunable(50, 10, 200, "log")
+    #: Mutation and crossover, binomial or exponential, as SciPy names them
     strategy: str = tunable("best1bin", *STRATEGIES)
+    #: Least weight of a difference; the weight is drawn again for each generation
     mutation_low: float = tunable(0.5, 0.1, 0.7)
-    mutation_high: float = tunable(1.0, 0.7, 1.2)
-    recombination: float = tunable(0.7, 0.1, 1.0)
+    mutation_high: float = tunable(1.0, 0.7, 1.2)  #: Greatest weight of a difference
+    recombination: float = tunable(0.7, 0.1, 1.0)  #: Probability of taking a variable from the mutant
     name: ClassVar[str] = "de"
 
     def __post_init__(self) -> None:
@@ -137,22 +133,17 @@ class LShade:
     With the constraint handling `epsilon` it is L-SHADE with epsilon levels. Variables beyond a bound are put halfway between
     it and the member. The population shrinks linearly to 4 over the budget.
 
-    Attributes:
-        population: members in the beginning; the source takes 18 for each variable, which is 162 for 9.
-        archive: replaced members that stay known, as a multiple of the population.
-        best: share of the population towards whose members the others move (p).
-        memory: entries of what has succeeded (H).
-
     Source:
         Tanabe, Fukunaga (2014), Improving the search performance of SHADE using linear population size reduction; epsilon
         levels after Takahama, Sakai (2006). The source has no constraints: a improved that the violation decides counts there
         by how much the violation fell, and each kind of improved has the weight of its largest.
     """
 
+    #: members in the beginning; the source takes 18 for each variable, which is 162 for 9
     population: int = tunable(162, 20, 400, "log")
-    archive: float = tunable(2.6, 0.0, 4.0)
-    best: float = tunable(0.11, 0.05, 0.3)
-    memory: int = tunable(6, 2, 20)
+    archive: float = tunable(2.6, 0.0, 4.0)  #: replaced members that stay known, as a multiple of the population
+    best: float = tunable(0.11, 0.05, 0.3)  #: share of the population towards whose members the others move (p)
+    memory: int = tunable(6, 2, 20)  #: entries of what has succeeded (H)
     name: ClassVar[str] = "lshade"
 
     def __post_init__(self) -> None:

@@ -5,8 +5,9 @@ An operator is a frozen dataclass of settings that draws random numbers; its for
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,20 +19,10 @@ from metaheuristics.settings import bad_setting, check_count, check_number, tuna
 _CLOSE = 1e-14  # parents nearer than this share of the range count as equal, as in Deb's code
 
 
-class Crossover(Protocol):
-    """Makes two children of two parents."""
-
-    def __call__(
-        self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator, /
-    ) -> tuple[Array, Array]:
-        """Return children (M, n) and (M, n) within the bounds (n,) of each row of A and the same row of B, (M, n) each."""
-
-
-class Mutation(Protocol):
-    """Changes points at random."""
-
-    def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator, /) -> Array:
-        """Return mutated points (P, n) within the bounds (n,) as a new array."""
+Crossover = Callable[[Array, Array, Array, Array, np.random.Generator], tuple[Array, Array]]
+"""Makes two children (M, n) within the bounds (n,) of each row of parents A and the same row of B, (M, n) each."""
+Mutation = Callable[[Array, Array, Array, np.random.Generator], Array]
+"""Changes points (P, n) at random, within the bounds (n,); returns a new array."""
 
 
 def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array) -> tuple[Array, Array]:
@@ -155,26 +146,19 @@ class GeneticAlgorithm:
 
     The constraint rule decides tournaments and survival.
 
-    Attributes:
-        population: Number of parents, and of children in a generation.
-        tournament: Parents that compete for each place among those that mate.
-        crossover: Operator on pairs.
-        mutation: Operator on children.
-        survival: "plus" keeps the best of parents and children, without copies (as pymoo's GA does); "generational"
-            replaces the parents by the children, except for the elites.
-        elites: Best parents that replace the worst children in "generational" survival.
-
     Source:
         Deb (2000), An efficient constraint handling method for genetic algorithms. Operators and indices (2 and 20)
         as in Gupta, Pratihar, Deb (2023), section 5; the paper is silent on survival and probabilities.
     """
 
-    population: int = tunable(50, 20, 200, "log")
-    tournament: int = tunable(2, 2, 10)
-    crossover: Crossover = field(default=SimulatedBinary())
-    mutation: Mutation = field(default=Polynomial())
+    population: int = tunable(50, 20, 200, "log")  #: Number of parents, and of children in a generation
+    tournament: int = tunable(2, 2, 10)  #: Parents that compete for each place among those that mate
+    crossover: Crossover = field(default=SimulatedBinary())  #: Operator on pairs
+    mutation: Mutation = field(default=Polynomial())  #: Operator on children
+    #: "plus" keeps the best of parents and children, without copies (as pymoo's GA does); "generational" replaces the parents
+    #: by the children, except for the elites
     survival: Literal["plus", "generational"] = tunable("plus", "plus", "generational")
-    elites: int = tunable(1, 0, 5)
+    elites: int = tunable(1, 0, 5)  #: Best parents that replace the worst children in "generational" survival
     name: ClassVar[str] = "ga"
 
     def __post_init__(self) -> None:

@@ -23,25 +23,19 @@ class ParticleSwarm:
     (synchronous). Yarpiz updates the global best within the sweep, after every particle (asynchronous), which a batch
     evaluation cannot do; all else, including the defaults, is as there.
 
-    Attributes:
-        population: Number of particles.
-        inertia: Share of the velocity kept in the first iteration (w).
-        inertia_damping: Factor on the inertia after every iteration (wdamp): 0.99 in the code that the paper cites, 1 for the
-            constant inertia that it prints.
-        cognitive: Pull towards a particle's own best (c1).
-        social: Pull towards the swarm's best (c2).
-        velocity_limit: Largest speed in a variable, as a share of its range, per iteration.
-
     Source:
         Kennedy, Eberhart (1995), Particle swarm optimization; Yarpiz project YPEA102 (Heris 2015), the code used by
         Gupta, Pratihar, Deb (2023), section 5.
     """
 
-    population: int = tunable(50, 10, 200, "log")
-    inertia: float = tunable(1.0, 0.4, 1.0)
+    population: int = tunable(50, 10, 200, "log")  #: Number of particles
+    inertia: float = tunable(1.0, 0.4, 1.0)  #: Share of the velocity kept in the first iteration (w)
+    #: Factor on the inertia after every iteration (wdamp): 0.99 in the code that the paper cites, 1 for the constant inertia
+    #: that it prints
     inertia_damping: float = tunable(0.99, 0.95, 1.0)
-    cognitive: float = tunable(1.5, 0.5, 2.5)
-    social: float = tunable(2.0, 0.5, 2.5)
+    cognitive: float = tunable(1.5, 0.5, 2.5)  #: Pull towards a particle's own best (c1)
+    social: float = tunable(2.0, 0.5, 2.5)  #: Pull towards the swarm's best (c2)
+    #: Largest speed in a variable, as a share of its range, per iteration
     velocity_limit: float = tunable(0.1, 0.02, 0.5, "log")
     name: ClassVar[str] = "pso"
 

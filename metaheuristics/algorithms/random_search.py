@@ -14,13 +14,9 @@ from metaheuristics.settings import check_count
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RandomSearch:
-    """Points drawn uniformly within the bounds; nothing is learned.
+    """Points drawn uniformly within the bounds; nothing is learned."""
 
-    Attributes:
-        population: Points of one batch.
-    """
-
-    population: int = 50
+    population: int = 50  #: Points of one batch
     name: ClassVar[str] = "random"
 
     def __post_init__(self) -> None:
@@ -43,17 +39,13 @@ class RandomSearchRun(PopulationSearch[RandomSearch]):
 class SobolPoints:
     """Points of a scrambled Sobol sequence over the variables that are free; nothing is learned.
 
-    Attributes:
-        population: starting points, which all searches share, before the sequence begins.
-        batch: points of the sequence asked for at once.
-
     Source:
         Sobol (1967), On the distribution of points in a cube; Owen (1998), Scrambling Sobol and Niederreiter-Xing points;
         as in `scipy.stats.qmc.Sobol`.
     """
 
-    population: int = 1
-    batch: int = 64
+    population: int = 1  #: starting points, which all searches share, before the sequence begins
+    batch: int = 64  #: points of the sequence asked for at once
     name: ClassVar[str] = "sobol"
 
     def __post_init__(self) -> None:

@@ -21,28 +21,23 @@ class ConstrainedMoead:
     it plus a penalty for the distance from it. A child of two neighbours takes the place of neighbours that violate more, or
     as much at no better a value.
 
-    Attributes:
-        population: members, a number of evenly spread directions; any number from 2 on for two objectives.
-        neighbours: members that count as near, T, the member itself among them; None for a tenth of the population.
-        replaced: neighbours whose place a child may take, n_r; None for a hundredth of the population, at least one.
-        near: probability that parents, and the places, are those of neighbours; else of the whole population.
-        penalty: theta of penalty boundary intersection.
-        crossover_index: of simulated binary crossover; the larger, the nearer are children to their parents.
-        mutation_index: of polynomial mutation, likewise.
-
     Source:
         Jain, Deb (2014), An evolutionary many-objective optimization algorithm using reference-point-based nondominated
         sorting approach, part II, IEEE Transactions on Evolutionary Computation 18(4), 602-622; Zhang, Li (2007), MOEA/D.
         Implemented from PlatEMO, not from the paper; the defaults are PlatEMO's.
     """
 
-    population: int = 100
+    population: int = 100  #: members, a number of evenly spread directions; any number from 2 on for two objectives
+    #: members that count as near, T, the member itself among them; None for a tenth of the population
     neighbours: int | None = None
+    #: neighbours whose place a child may take, n_r; None for a hundredth of the population, at least one
     replaced: int | None = None
+    #: probability that parents, and the places, are those of neighbours; else of the whole population
     near: float = 0.9
-    penalty: float = 5.0
+    penalty: float = 5.0  #: theta of penalty boundary intersection
+    #: of simulated binary crossover; the larger, the nearer are children to their parents
     crossover_index: float = 20.0
-    mutation_index: float = 20.0
+    mutation_index: float = 20.0  #: of polynomial mutation, likewise
     name: ClassVar[str] = "CMOEAD"
 
     def __post_init__(self) -> None:

@@ -24,22 +24,17 @@ class DynamicConstrainedNsga3:
     sorted by all objectives and the violation, and thinned out along reference directions as in NSGA-III; else those of least
     violation stay.
 
-    Attributes:
-        population: members, a number of evenly spread directions; any number from 2 on for two objectives.
-        decrease: speed at which the boundary falls (cp).
-        crossover_index: of simulated binary crossover; the larger, the nearer are children to their parents.
-        mutation_index: of polynomial mutation, likewise.
-
     Source:
         Jiao, Zeng, Li, Yang, Ong (2021), Handling constrained many-objective optimization problems via problem
         transformation, IEEE Transactions on Cybernetics 51(10), 4834-4847. Implemented from its first
         author's code, not from the paper (RuwangJiao/DCNSGA-III, and the one in PlatEMO), whose defaults these are.
     """
 
-    population: int = 100
-    decrease: float = 5.0
+    population: int = 100  #: members, a number of evenly spread directions; any number from 2 on for two objectives
+    decrease: float = 5.0  #: speed at which the boundary falls (cp)
+    #: of simulated binary crossover; the larger, the nearer are children to their parents
     crossover_index: float = 20.0
-    mutation_index: float = 20.0
+    mutation_index: float = 20.0  #: of polynomial mutation, likewise
     name: ClassVar[str] = "DCNSGA3"
 
     def __post_init__(self) -> None:

@@ -67,32 +67,25 @@ WORTHWHILE_SIZE = 1500
 
 @dataclass(frozen=True, kw_only=True)
 class IpoptSettings(Solver):
-    """IPOPT with its settings.
-
-    Attributes:
-        tolerance: IPOPT's ``tol``.
-        iterations: limit of iterations for each stage, in the first stage for each set of rows.
-        time_limit_s: limit of wall time for all stages of a run [s]; checked after each iteration.
-        hessian: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem.
-        compiled: whether the NLP's functions and derivatives are compiled; None if that pays for the number of solves and there
-            is a compiler.
-        linear_solver: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never
-            replaced by another one.
-        few_rows: begin with the rows that matter, see ``working_set``; None if the functions are compiled, because selecting
-            the rows takes a run. False begins with all rows.
-        widths: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those
-            of the NLP. Narrower ones follow if the exact functions refuse the last stage's point.
-    """
+    """IPOPT with its settings."""
 
     name: ClassVar[str] = "ipopt"
 
-    tolerance: float = 1e-8
-    iterations: int = 300
-    time_limit_s: float = 300.0
-    hessian: str | None = None
+    tolerance: float = 1e-8  #: IPOPT's ``tol``
+    iterations: int = 300  #: limit of iterations for each stage, in the first stage for each set of rows
+    time_limit_s: float = 300.0  #: limit of wall time for all stages of a run [s]; checked after each iteration
+    hessian: str | None = None  #: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem
+    #: whether the NLP's functions and derivatives are compiled; None if that pays for the number of solves and there is a
+    #: compiler
     compiled: bool | None = None
+    #: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never replaced by
+    #: another one
     linear_solver: str | None = None
+    #: begin with the rows that matter, see ``working_set``; None if the functions are compiled, because selecting the rows
+    #: takes a run. False begins with all rows
     few_rows: bool | None = None
+    #: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those of the
+    #: NLP. Narrower ones follow if the exact functions refuse the last stage's point
     widths: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:

@@ -134,12 +134,9 @@ class Fatrop(CasadiSolver):
 
 @dataclass(frozen=True, kw_only=True)
 class WatchedSolver(CasadiSolver):
-    """A solver that can be ended between iterations.
+    """A solver that can be ended between iterations."""
 
-    Attributes:
-        time_limit_s: limit of wall time for all stages, checked after each iteration [s]; None for no limit.
-    """
-
+    #: limit of wall time for all stages, checked after each iteration [s]; None for no limit
     time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of other solvers
 
 

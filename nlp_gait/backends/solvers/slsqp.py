@@ -32,18 +32,14 @@ class _Ended(Exception):
 class Slsqp(Solver):
     """SciPy's SLSQP with forward differences; its outcome is the best point that it evaluated.
 
-    Attributes:
-        evaluations: budget, each finite difference included.
-        time_limit_s: limit of wall time [s]; None for no limit.
-
     Source:
         Kraft (1988), A software package for sequential quadratic programming, as in ``scipy.optimize.minimize``.
     """
 
     name: ClassVar[str] = "slsqp"
 
-    evaluations: int = 10_000
-    time_limit_s: float | None = None
+    evaluations: int = 10_000  #: budget, each finite difference included
+    time_limit_s: float | None = None  #: limit of wall time [s]; None for no limit
 
     def check(self, problem: GaitProblem) -> None:
         if self.evaluations <= len(problem.names):
