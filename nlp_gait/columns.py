@@ -37,9 +37,8 @@ class CsvTable:
         """Check that all needed columns exist, else InputError, and no others than the allowed ones, else UnknownNameError."""
         missing = [name for name in needed if name not in self.header]
         if missing:
-            raise InputError(
-                f"{self.owner} needs the columns {', '.join(missing)}; it has {', '.join(self.header) or 'no header'}"
-            )
+            header = ", ".join(self.header) or "no header"
+            raise InputError(f"{self.owner} needs the columns {', '.join(missing)}; it has {header}")
         for name in self.header:
             if name not in needed and name not in allowed:
                 raise unknown(f"column of {self.owner}", name, [*needed, *allowed])
@@ -47,20 +46,16 @@ class CsvTable:
     def count(self, name: str, row: int, value: float, at_least: int = 0) -> int:
         """Return the value of a cell as a whole number; raises InputError."""
         if not (math.isfinite(value) and value == int(value) and at_least <= value <= MOST):
-            raise InputError(
-                f"{self.owner}, line {self.lines[row]}: {name} must be a whole number >= {at_least} and < 2^63, got {value:g}; "
-                "fix the cell"
-            )
+            cell, wanted = f"{self.owner}, line {self.lines[row]}: {name}", f"a whole number >= {at_least} and < 2^63"
+            raise InputError(f"{cell} must be {wanted}, got {value:g}; fix the cell")
         return int(value)
 
     def number(self, name: str, row: int, value: float, at_least: float = -math.inf) -> float:
         """Return the value of a cell, a finite number or NaN where it is empty; raises InputError."""
         if not (math.isnan(value) or (math.isfinite(value) and value >= at_least)):
             allowed = "a finite number" if math.isinf(at_least) else f"a finite number >= {at_least:g}"
-            raise InputError(
-                f"{self.owner}, line {self.lines[row]}: {name} must be {allowed}, got {value:g}; leave the cell empty if it is "
-                "unknown"
-            )
+            cell = f"{self.owner}, line {self.lines[row]}: {name}"
+            raise InputError(f"{cell} must be {allowed}, got {value:g}; leave the cell empty if it is unknown")
         return value
 
 

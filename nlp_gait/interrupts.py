@@ -11,6 +11,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from types import FrameType
 
+# Called between steps of long work; returns whether to end at once.
+Stop = Callable[[], bool]
+
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C, with the partial result; it propagates as every KeyboardInterrupt does."""

@@ -334,10 +334,8 @@ def _read_source(place: CodeReference, text: str) -> tuple[str, bytes]:
         except (ImportError, ValueError):
             spec = None
         if spec is None or not spec.origin or not spec.origin.endswith(ENDING):
-            raise UserCodeError(
-                f"{text!r}: no module {place.home!r} is installed; name a file as "
-                f"{place.home.replace('.', '/')}.py:{place.name}"
-            )
+            file = f"{place.home.replace('.', '/')}.py:{place.name}"
+            raise UserCodeError(f"{text!r}: no module {place.home!r} is installed; name a file as {file}")
         path = spec.origin
     return path, _read(Path(path), f"code of {text!r},")
 

@@ -22,7 +22,7 @@ from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
-from nlp_gait.interrupts import Interrupted, defer_interrupts, never
+from nlp_gait.interrupts import Interrupted, Stop, defer_interrupts, never
 from nlp_gait.processes import run_in_forks
 
 # A price below this, times the bound's scale, is numerical noise and not reported.
@@ -121,7 +121,7 @@ def run_starts(
     solver: Solver,
     problem: GaitProblem,
     points: Sequence[Array],
-    stop: Callable[[], bool] = never,
+    stop: Stop = never,
     workers: int | None = None,
 ) -> Iterator[Outcome]:
     """Yield the outcome of the run from each point (n,), in their order; fewer after ``stop`` returns True.
@@ -188,6 +188,7 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[
     Equations of the problem are left out; a fixed variable has a price.
     """
     exact, unit = build_exact_model(problem), problem.objective.unit
+    per = "" if unit == "1" else f"{unit} "
     rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last
     slopes = -np.concatenate([at.rows[:rows], at.bounds[: len(problem.names)] / problem.scale])
     weights = np.abs(slopes) * np.concatenate([np.ones(rows), problem.scale])
@@ -197,14 +198,10 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[
             break
         if i < rows and values.lower[i] == values.upper[i]:
             continue
-        side = (
-            "upper" if slopes[i] < 0 else "lower"
-        )  # a higher upper bound lowers the cost, a higher lower bound raises it
+        # A higher upper bound lowers the cost, a higher lower bound raises it.
+        side = "upper" if slopes[i] < 0 else "lower"
         name, row_unit, bound = exact.row_names[i], exact.row_units[i], float(getattr(values, side)[i])
-        price, price_unit = (
-            float(problem.objective.sign * slopes[i]),
-            f"{'' if unit == '1' else f'{unit} '}per {row_unit}",
-        )
+        price, price_unit = float(problem.objective.sign * slopes[i]), f"{per}per {row_unit}"
         active = ActiveConstraint(name=name, side=side, bound=bound, unit=row_unit, price=price, price_unit=price_unit)
         found.append(active)
     return tuple(found)
@@ -229,9 +226,7 @@ class Continuation:
         """Return the solution of the next problem on the path, a copy of the first one with other parameter values."""
         return make_solution(problem, self.run(problem), self._seed)
 
-    def run(
-        self, problem: GaitProblem, earlier: Sequence[Outcome] = (), stop: Callable[[], bool] = never
-    ) -> list[Outcome]:
+    def run(self, problem: GaitProblem, earlier: Sequence[Outcome] = (), stop: Stop = never) -> list[Outcome]:
         """Return runs of the next problem; the best of these and the earlier runs is the neighbour of the next problem.
 
         ``earlier`` are runs of the same problem on another path; random starts without success are not repeated. ``stop`` is

@@ -157,9 +157,8 @@ class GaitProblem:
             if abs(float(value)) > LARGEST:
                 raise InputError(f"parameter {name!r} must be within +-{LARGEST:g} {parameter.unit}, got {value}")
             if not parameter.minimum <= value <= parameter.maximum:
-                raise InputError(
-                    f"parameter {name!r} must be within [{parameter.minimum}, {parameter.maximum}] {parameter.unit}, got {value}"
-                )
+                limits = f"[{parameter.minimum}, {parameter.maximum}] {parameter.unit}"
+                raise InputError(f"parameter {name!r} must be within {limits}, got {value}")
         merged = {**self.values, **{name: float(value) for name, value in values.items()}}
         changed = self._copy(self._origin, values=merged)
         for name, low in changed.parameter_values.items():
@@ -301,9 +300,8 @@ class GaitProblem:
             x = [x[name] for name in self.names]
         array = to_floats(f"x of {self.name}", x)
         if array.shape != (len(self.names),):
-            raise InputError(
-                f"x of {self.name} must have {len(self.names)} values ({', '.join(self.names)}), got shape {array.shape}"
-            )
+            wanted = f"{len(self.names)} values ({', '.join(self.names)})"
+            raise InputError(f"x of {self.name} must have {wanted}, got shape {array.shape}")
         for name, value in zip(self.names, array, strict=True):
             if not math.isfinite(value):
                 raise InputError(f"x of {self.name}: {name} must be finite, got {value}")
@@ -377,8 +375,9 @@ class GaitProblem:
                     f"load it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
                 )
             if name in self.with_other_options:
+                other = self.with_other_options[name]
                 raise UnknownNameError(
-                    f"{name!r} is no parameter of {self.name} with these options; add --option {self.with_other_options[name]}"
+                    f"{name!r} is no parameter of {self.name} with these options; add --option {other}"
                 )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 

@@ -40,7 +40,6 @@ def to_floats(what: str, values: object) -> Array:
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what} must be numbers, got {type(values).__name__}: {error}") from error
     if array.dtype.kind not in "iuf":
-        raise InputError(
-            f"{what} must be numbers, got {type(values).__name__} of {array.dtype}: use real numbers, not texts, true or false"
-        )
+        got = f"{type(values).__name__} of {array.dtype}"
+        raise InputError(f"{what} must be numbers, got {got}: use real numbers, not texts, true or false")
     return array.astype(np.float64, copy=False)

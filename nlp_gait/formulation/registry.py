@@ -216,15 +216,13 @@ def check_mathematics(problem: GaitProblem) -> None:
                 continue
             bounds[f"{row}: {end}"] = parts[f"{row}, {end}"] = bound
             if Function("bound", inputs, [bound], {"allow_free": True}).sparsity_jac(0, 0).nnz():
-                raise InputError(
-                    f"{owner}: {row}: {end} must depend on parameters only; move terms with variables into value"
-                )
+                remedy = "move terms with variables into value"
+                raise InputError(f"{owner}: {row}: {end} must depend on parameters only; {remedy}")
     for part, value in parts.items():
         free = Function("part", inputs, [vertcat(value)], {"allow_free": True}).free_mx()
         if free:
-            raise InputError(
-                f"{owner}: {part} contains {free[0].name()!r}, which is neither a variable nor a parameter"
-            )
+            symbol = free[0].name()
+            raise InputError(f"{owner}: {part} contains {symbol!r}, which is neither a variable nor a parameter")
     for part, bound in bounds.items():
         if np.isnan(np.array(Function("bound", inputs, [vertcat(bound)])(problem.lower, problem.p))).any():
             raise InputError(f"{owner}: {part} is NaN; give a number, or leave it out for no bound")

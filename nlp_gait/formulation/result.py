@@ -119,9 +119,8 @@ def sample_signals(result: Result, period_s: float) -> Signals:
         forward = bool((times[1:] >= times[:-1]).all())  # NaN fails too
     if not (forward and SHORTEST_S <= duration_s <= LONGEST_S):
         reason = f"it lasts {duration_s:g} s" if forward or duration_s < 0.0 else "time runs backwards in one phase"
-        raise InputError(
-            f"a gait that is drawn, simulated or exported must last {SHORTEST_S:g} to {LONGEST_S:g} s, but {reason}"
-        )
+        limits = f"{SHORTEST_S:g} to {LONGEST_S:g} s"
+        raise InputError(f"a gait that is drawn, simulated or exported must last {limits}, but {reason}")
     longest = float((times[1:] - times[:-1]).max())
     factor = math.ceil(longest / period_s - 1e-9)  # rounding must not halve a step that equals the period
     dense = result.problem.dense(factor) if factor > 1 else None

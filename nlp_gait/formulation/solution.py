@@ -176,9 +176,8 @@ class Solution:
         rows = [(name, "", price) for name, price in list(bounds.items())[:SHOWN]]
         left_out = max(len(self.x) - SHOWN, 0) + max(len(bounds) - SHOWN, 0)
         note = self.status + (f"; {left_out} more in .x and .active_constraints" if left_out else "")
-        return format_html_table(
-            repr(self)[1:-1], ("variable or constraint", "value", "price of raising its bound"), [*x, *rows], note
-        )
+        header = ("variable or constraint", "value", "price of raising its bound")
+        return format_html_table(repr(self)[1:-1], header, [*x, *rows], note)
 
     def signals(self, problem: GaitProblem | None = None) -> Signals:
         """Return time histories at x.

@@ -97,9 +97,8 @@ def load_certified_problem(file: CertificateFile) -> GaitProblem:
         name = resolve_code(stored.name, "problem", "the certificate")
         problem = load(name, **stored.options).with_values(**stored.parameters)
     if identify_problem(problem) != dict(file.problem):
-        raise InputError(
-            f"problem {problem.name!r} has changed since the certificate was made; rerun `nlp-gait certainty` on it"
-        )
+        remedy = "rerun `nlp-gait certainty` on it"
+        raise InputError(f"problem {problem.name!r} has changed since the certificate was made; {remedy}")
     return problem
 
 

@@ -11,7 +11,7 @@ from nlp_gait.errors import CompilerError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs import time_search
-from nlp_gait.proofs.time_search import GRAIN, ROUNDING
+from nlp_gait.proofs.time_search import GRAIN, ROUNDING, TimeRows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,13 +84,10 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
             means[name] = (before[0] + low, before[1] + high)
     violations = tuple(sorted((v for found, _, _ in results for v in found), key=lambda v: v.from_s))
     proven = any(v.least > FEASIBILITY_TOLERANCE for v in violations)
-    return Guarantee(
-        satisfied=False if proven else None if violations else True,
-        violations=violations,
-        sampled=tuple(dict.fromkeys(name for phase in phases for name in phase.sampled)),
-        means=means,
-        pieces=sum(pieces for _, _, pieces in results),
-    )
+    satisfied = False if proven else None if violations else True
+    sampled = tuple(dict.fromkeys(name for phase in phases for name in phase.sampled))
+    count = sum(pieces for _, _, pieces in results)
+    return Guarantee(satisfied=satisfied, violations=violations, sampled=sampled, means=means, pieces=count)
 
 
 def _search_phase(
@@ -129,9 +126,7 @@ def _search_phase(
     return violations, means, pieces
 
 
-def _violation(
-    rows: time_search.TimeRows, k: int, piece: tuple[float, float], least: float, most: float
-) -> RowViolation:
+def _violation(rows: TimeRows, k: int, piece: tuple[float, float], least: float, most: float) -> RowViolation:
     known, (from_s, to_s) = most if np.isfinite(most) else None, piece
     row, unit = rows.names[k], rows.units[k]
     return RowViolation(row=row, unit=unit, from_s=from_s, to_s=to_s, least=max(least, 0.0), most=known)

@@ -110,11 +110,9 @@ class TimeRows:
             (values,) = self._function.call(arguments)
             part = ca.Function("part", arguments, [values[rows.tolist()]])
             share = part.n_instructions() / self._function.n_instructions()
-            self._parts[group] = (
-                EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
-                if share < 0.5
-                else EnclosedPart(self.whole, rows, 1.0)
-            )
+            self._parts[group] = EnclosedPart(self.whole, rows, 1.0)
+            if share < 0.5:
+                self._parts[group] = EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
         return self._parts[group]
 
 
@@ -151,13 +149,11 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     others, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
-    return TimeFunctions(
-        source=source,
-        instants=TimeRows(instants, others, [point.x, point.p, now], kinks) if instants or others else None,
-        squares=frozenset(range(first, first + len(squares))),
-        changes=TimeRows(changes, [], [point.x, point.p, now, later], kinks) if changes else None,
-        sampled=tuple(c.name for kind in (None, "samples") for c in by_kind[kind]),
-    )
+    given, numbers = [point.x, point.p, now], frozenset(range(first, first + len(squares)))
+    at_once = TimeRows(instants, others, given, kinks) if instants or others else None
+    between = TimeRows(changes, [], [*given, later], kinks) if changes else None
+    sampled = tuple(c.name for kind in (None, "samples") for c in by_kind[kind])
+    return TimeFunctions(source=source, instants=at_once, squares=numbers, changes=between, sampled=sampled)
 
 
 def _split(constraint: Constraint) -> list[tuple[Any, ...]]:

@@ -34,46 +34,39 @@ def write_nlp_source(found: NlpPlan) -> str:
     plan = found.plan
     m, n = found.jacobian.shape
     phases = dict(zip(("value", "first", "second"), plan.steps, strict=True))
-    sizes = {
-        "VARIABLES": n,
-        "PARAMETERS": found.parameters,
-        "ROWS": m,
-        "SIZE": plan.size,
-        "INITIALS": len(plan.initial),
-    }
+    sizes = {"VARIABLES": n, "PARAMETERS": found.parameters, "ROWS": m, "SIZE": plan.size}
     sizes["MOST_IN"] = max((function.nnz_in() for function in plan.functions), default=1)
     sizes["MOST_OUT"] = max((function.nnz_out() for function in plan.functions), default=1)
     sizes |= {"W": found.w, "P": found.p, "VALUE": found.rows, "WEIGHT": found.weights, "GRADIENT": found.gradient}
     sizes |= {"HESSIAN": found.hessian_place, "HESSIAN_NONZEROS": found.hessian.nnz()}
-    sizes |= {"JACOBIAN_NONZEROS": found.jacobian.nnz()}
+    sizes |= {"JACOBIAN_NONZEROS": found.jacobian.nnz(), "INITIALS": len(plan.initial)}
     sizes |= {f"{phase.upper()}_STEPS": len(steps) for phase, steps in phases.items()}
     cases = " ".join(
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
         for operation, expression in EXPRESSIONS.items()
     )
-    return "\n".join(
-        [
-            "#include <stdlib.h>\n#include <string.h>",
-            read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
-            read_native_source("nlp_gait.backends.derivatives", "operations.hpp"),
-            *(f"ONE_ARGUMENT({name})" for name in UNARY),
-            *(f"TWO_ARGUMENTS({name})" for name in BINARY),
-            *(f"enum {{ {name} = {size} }};" for name, size in sizes.items()),
-            *(write_function(f"function_{i}", function) for i, function in enumerate(plan.functions)),
-            write_array("int", "initial_place", plan.initial),
-            write_array("double", "initial_value", map(format_number, plan.initial.values())),
-            write_array("int", "jacobian_place", found.jacobian_places.tolist()),
-            write_array("long long int", "jacobian_sparsity", _compress(found.jacobian)),
-            write_array("long long int", "hessian_sparsity", _compress(found.hessian)),
-            _write_rows("tape", 4, plan.tape),
-            _write_rows("runs", 4, plan.runs),
-            _write_rows("products", 5, plan.products),
-            *(_write_rows(f"{phase}_steps", 3, steps) for phase, steps in phases.items()),
-            _write_calls(found),
-            f"#define OPERATIONS {cases}",
-            read_native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
-        ]
-    )
+    parts = [
+        "#include <stdlib.h>\n#include <string.h>",
+        read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
+        read_native_source("nlp_gait.backends.derivatives", "operations.hpp"),
+        *(f"ONE_ARGUMENT({name})" for name in UNARY),
+        *(f"TWO_ARGUMENTS({name})" for name in BINARY),
+        *(f"enum {{ {name} = {size} }};" for name, size in sizes.items()),
+        *(write_function(f"function_{i}", function) for i, function in enumerate(plan.functions)),
+        write_array("int", "initial_place", plan.initial),
+        write_array("double", "initial_value", map(format_number, plan.initial.values())),
+        write_array("int", "jacobian_place", found.jacobian_places.tolist()),
+        write_array("long long int", "jacobian_sparsity", _compress(found.jacobian)),
+        write_array("long long int", "hessian_sparsity", _compress(found.hessian)),
+        _write_rows("tape", 4, plan.tape),
+        _write_rows("runs", 4, plan.runs),
+        _write_rows("products", 5, plan.products),
+        *(_write_rows(f"{phase}_steps", 3, steps) for phase, steps in phases.items()),
+        _write_calls(found),
+        f"#define OPERATIONS {cases}",
+        read_native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
+    ]
+    return "\n".join(parts)
 
 
 def _write_rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:

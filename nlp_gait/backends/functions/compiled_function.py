@@ -113,18 +113,17 @@ def write_rows_source(kernel: ca.Function) -> str:
     code = re.sub(rf"\({entry}\?{entry}:0\)", r"if_else_zero(\1,\2)", generate_lane_code(kernel))
     if kernel.is_a("SXFunction"):  # no argument or result is left out
         code = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", code))
-    return "\n".join(
-        [
-            "#include <utility>",
-            read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
-            read_native_source("nlp_gait.backends.functions", "operations.hpp"),
-            code.replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)"),
-            f"enum {{ INPUTS = {len(inputs)}, OUTPUTS = {len(outputs)} }};",
-            f"static const long long input_size[] = {{{', '.join(inputs)}}};",
-            f"static const long long output_size[] = {{{', '.join(outputs)}}};",
-            read_native_source("nlp_gait.backends.functions", "rows.hpp"),
-        ]
-    )
+    parts = [
+        "#include <utility>",
+        read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
+        read_native_source("nlp_gait.backends.functions", "operations.hpp"),
+        code.replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)"),
+        f"enum {{ INPUTS = {len(inputs)}, OUTPUTS = {len(outputs)} }};",
+        f"static const long long input_size[] = {{{', '.join(inputs)}}};",
+        f"static const long long output_size[] = {{{', '.join(outputs)}}};",
+        read_native_source("nlp_gait.backends.functions", "rows.hpp"),
+    ]
+    return "\n".join(parts)
 
 
 class CompiledFunction:
@@ -208,9 +207,9 @@ class CompiledFunction:
         array = to_floats(f"argument {name} of {self.function.name()}", values)
         if array.shape[max(array.ndim - len(shape), 0) :] != shape or not 0 <= array.ndim - len(shape) <= 1:
             sizes = "".join(f", {size}" for size in shape)
+            wanted = f"(P{sizes or ','}), or {shape} for all rows"
             raise InputError(
-                f"argument {name} of {self.function.name()} must have the shape (P{sizes or ','}), or {shape} for all rows, got "
-                f"{array.shape}"
+                f"argument {name} of {self.function.name()} must have the shape {wanted}, got {array.shape}"
             )
         if len(shape) == 2:
             array = array.swapaxes(-2, -1)  # CasADi's order

@@ -228,10 +228,8 @@ class CompiledObjective:
             return self.problem.check_x(X)[None]
         array = np.require(to_floats(f"X of {self.problem.name}", X), requirements=("C", "A"))
         if array.ndim != 2 or array.shape[1] != len(self.names):
-            raise InputError(
-                f"X of {self.problem.name} must have one candidate per row and {len(self.names)} columns "
-                f"({', '.join(self.names)}), got shape {array.shape}"
-            )
+            wanted = f"one candidate per row and {len(self.names)} columns ({', '.join(self.names)})"
+            raise InputError(f"X of {self.problem.name} must have {wanted}, got shape {array.shape}")
         return array
 
 
@@ -258,9 +256,8 @@ def compile_objective(
     if not isinstance(require_compiler, bool):
         raise InputError(f"require_compiler must be True or False, got {format_value(require_compiler)}")
     if not problem.searchable:
-        raise InputError(
-            f"{problem.name} has {len(problem.names)} variables tied by equations, which no search can satisfy; use solve"
-        )
+        n = len(problem.names)
+        raise InputError(f"{problem.name} has {n} variables tied by equations, which no search can satisfy; use solve")
     used, count = check_parallelism(threads, lanes)
     evaluator: NativeKernel | InterpretedKernel
     try:

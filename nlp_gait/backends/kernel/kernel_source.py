@@ -47,16 +47,10 @@ def _build(problem: GaitProblem) -> Kernel:
 
 def write_kernel_source(function: ca.Function) -> str:
     """Return the C++ source of a kernel (x, p) to (cost, g); the lane count is the macro LANES."""
-    return "\n".join(
-        [
-            read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
-            generate_lane_code(function),
-            f"#define VARIABLES {function.size1_in(0)}",
-            f"#define PARAMETERS {function.size1_in(1)}",
-            f"#define ROWS {function.size1_out(1)}",
-            read_native_source("nlp_gait.backends.kernel", "batch.hpp"),
-        ]
-    )
+    numbers, batch = (read_native_source("nlp_gait.backends.kernel", name) for name in ("lanes.hpp", "batch.hpp"))
+    sizes = {"VARIABLES": function.size1_in(0), "PARAMETERS": function.size1_in(1), "ROWS": function.size1_out(1)}
+    macros = (f"#define {name} {size}" for name, size in sizes.items())
+    return "\n".join([numbers, generate_lane_code(function), *macros, batch])
 
 
 def generate_lane_code(function: ca.Function) -> str:

@@ -46,10 +46,10 @@ class Replan:
     feasible: bool  #: whether x satisfies all constraints, judged by the exact functions if that was requested
     converged: bool  #: whether x is a local optimum
     iterations: int  #: steps, and IPOPT's iterations
-    time_s: float  #: wall time [s]
-    solver: str  #: that found x: ``"sqp"`` or ``"ipopt"``
+    time_s: float = 0.0  #: wall time [s]
+    solver: str = "sqp"  #: that found x: ``"sqp"`` or ``"ipopt"``
     note: str  #: why it did not converge, or why IPOPT was used; else empty
-    violated: tuple[ConstraintValue, ...]  #: violated constraints and by how much, worst first
+    violated: tuple[ConstraintValue, ...] = ()  #: violated constraints and by how much, worst first
     guess: Guess  #: x and its multipliers in the lifted NLP
 
 
@@ -175,24 +175,16 @@ class Replanner:
         if outcome is None or not outcome.converged:
             cold = self._ipopt.run(problem, np.clip(found.x, problem.lower, problem.upper))
             outcome = cold if outcome is None else min(outcome, cold, key=lambda each: each.rank)
-        note = f"{found.note}; IPOPT {outcome.status}"
+        note, iterations = f"{found.note}; IPOPT {outcome.status}", found.iterations + outcome.iterations
+        found = replace(found, note=note, iterations=iterations)
         if outcome.converged and outcome.guess is not None:
             self._guess, self._near = outcome.guess, outcome
             self._steps.begin(outcome.guess.rows)
         elif found.feasible:
-            return replace(found, note=note, iterations=found.iterations + outcome.iterations)
-        return Replan(
-            x=outcome.x,
-            objective=outcome.objective,
-            feasible=outcome.feasible,
-            converged=outcome.converged,
-            iterations=found.iterations + outcome.iterations,
-            time_s=0.0,
-            solver="ipopt",
-            note=note,
-            violated=self._exact.find_violated(self._exact.at(outcome.x, problem.p)),
-            guess=outcome.guess or found.guess,
-        )
+            return found
+        violated = self._exact.find_violated(self._exact.at(outcome.x, problem.p))
+        result = {name: getattr(outcome, name) for name in ("x", "objective", "feasible", "converged")}
+        return replace(found, solver="ipopt", violated=violated, guess=outcome.guess or found.guess, **result)
 
 
 class _Run:
@@ -281,19 +273,11 @@ class _Run:
         if not self.converged and self._best is not None:
             self._go_to(self._best[1])
         feasible = self._violation <= FEASIBILITY_TOLERANCE and math.isfinite(at.cost[0])
-        rows = self._multipliers.copy()
-        return Replan(
-            x=np.clip(at.model.point(self._w), self._problem.lower, self._problem.upper),
-            objective=self._problem.objective.sign * float(at.cost[0]),
-            feasible=feasible,
-            converged=self.converged,
-            iterations=self.iterations,
-            time_s=0.0,
-            solver="sqp",
-            note=self.note,
-            violated=(),
-            guess=Guess(primal=self._w, bounds=np.zeros(len(self._w)), rows=rows, width=self._width),
-        )
+        w, problem, objective = self._w, self._problem, self._problem.objective.sign * float(at.cost[0])
+        x = np.clip(at.model.point(w), problem.lower, problem.upper)
+        guess = Guess(primal=w, bounds=np.zeros(len(w)), rows=self._multipliers.copy(), width=self._width)
+        run = {name: getattr(self, name) for name in ("converged", "iterations", "note")}
+        return Replan(x=x, objective=objective, feasible=feasible, guess=guess, **run)
 
     def _go_to(self, w: Array) -> None:
         """Evaluate the functions at z within its bounds and the exact values of the lifted variables."""

@@ -25,7 +25,7 @@ from nlp_gait.files import make_temporary_folder
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
-from nlp_gait.interrupts import defer_interrupts, never
+from nlp_gait.interrupts import Stop, defer_interrupts, never
 
 LOG = logging.getLogger("nlp_gait")
 
@@ -174,16 +174,10 @@ class Ipopt(Solver):
         self.warm = ca.nlpsol("warm", "ipopt", nlp, {**options, **derivatives, **warm})
         self.cold: ca.Function | WorkingSet = all_rows
         if settings.few_rows and nlp["g"].shape[0] >= LEAST_ROWS:
-            self.cold = self._make_working_set(problem, functions, general, all_rows)
+            self.cold = self._make_working_set(problem, general, all_rows)
         self.create_s = time.perf_counter() - started
 
-    def _make_working_set(
-        self,
-        problem: GaitProblem,
-        functions: Mapping[str, ca.Function],
-        options: Mapping[str, Any],
-        all_rows: ca.Function,
-    ) -> WorkingSet:
+    def _make_working_set(self, problem: GaitProblem, options: Mapping[str, Any], whole: ca.Function) -> WorkingSet:
         """Make a first stage that begins with few rows: ties of lifted variables, equations, and rows that one run needs.
 
         That run uses the parameters' defaults, so that it does not depend on which copy of the problem is solved first.
@@ -193,7 +187,7 @@ class Ipopt(Solver):
         bounds, width = model.bounds(usual), self.widths[0]
         always = bounds["lbg"] == bounds["ubg"]
         always[len(model.row_names) :] = True
-        cold = WorkingSet(model.nlp, functions, options, all_rows, self.watch, always)
+        cold = WorkingSet(model.nlp, self.functions, options, whole, self.watch, always)
         start = model.start(usual, usual.start_point(np.random.default_rng(0)), width)
         with defer_interrupts() as pressed:
             self.watch.begin(pressed, time.perf_counter() + self.time_limit_s)
@@ -224,7 +218,7 @@ class Ipopt(Solver):
         x0: Array,
         start: dict[str, Array],
         widths: tuple[float, ...],
-        stop: Callable[[], bool],
+        stop: Stop,
         cold: bool,
     ) -> Outcome:
         """Run the stages. If the caller gives no ``stop``, Ctrl-C ends the iterations and is raised after them."""
