@@ -111,9 +111,7 @@ def plan_walk(
         starts: most start points, until one converges.
         progress: receives a line about each start.
 
-    Raises:
-        InputError: a number that is not allowed, or a distance that these steps cannot have.
-        GaitError: a robot that cannot walk by these problems.
+    Raises InputError for a number that is not allowed or does not fit the others; GaitError for a robot that cannot walk.
     """
     for name, value in (("speed_m_s", speed_m_s), ("distance_m", distance_m)):
         if value is not None and not (isinstance(value, (int, float)) and 0.0 < value < math.inf):

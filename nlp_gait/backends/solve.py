@@ -62,9 +62,8 @@ def solve(
         The best start that converged and is feasible for the exact functions; else the best feasible end point; else the least
         infeasible one with its violated rows.
 
-    Raises:
-        InputError: no start, x0 or a fixed value that is not allowed, or a solver that does not run here.
-        Interrupted: Ctrl-C; carries the solution of the starts so far, and of the interrupted one where it stopped.
+    Raises InputError for a value that is not allowed or a solver that does not run here, and Interrupted for Ctrl-C, with the
+    solution of the starts so far, and of the interrupted one where it stopped.
     """
     starts = check_count("starts", starts, at_most=MOST_STARTS)
     workers = None if workers is None else check_count("workers", workers, at_most=MOST_WORKERS)
@@ -265,9 +264,7 @@ def solve_both_ways(
 
     Where a local optimum ceases to be the best one, a path in one direction stays on it for a while; in the other direction it
     arrives on the other optimum. The arguments are those of ``Continuation``, and progress is called twice for each problem.
-
-    Raises:
-        Interrupted: Ctrl-C; carries the solutions so far, None for problems without a run.
+    Ctrl-C raises Interrupted with the solutions so far, None for problems without a run.
     """
     order = range(len(problems))
     outcomes: list[list[Outcome]] = [[] for _ in problems]

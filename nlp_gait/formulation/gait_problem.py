@@ -145,9 +145,7 @@ class GaitProblem:
     def with_values(self, /, **values: float) -> GaitProblem:
         """Return the same problem with other parameter values; nothing is rebuilt. Pass names with a dot as ``**{...}``.
 
-        Raises:
-            UnknownNameError: no such parameter.
-            InputError: not finite, outside the parameter's limits, or bounds inverted.
+        Raises UnknownNameError, and InputError for a value outside the parameter's limits, or inverted bounds.
         """
         for name, value in values.items():
             parameter = self._parameter(name)
@@ -219,9 +217,6 @@ class GaitProblem:
             parameters: additional ones.
             change: makes the new assembly from this problem's, the point of all variables and parameters, and the
                 interpretation of non-smooth operations.
-
-        Raises:
-            InputError: a name exists already.
         """
 
         def assemble(point: Point, ops: Nonsmooth) -> Assembly:

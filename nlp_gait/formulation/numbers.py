@@ -24,8 +24,7 @@ def is_number(value: object) -> TypeGuard[float]:
 def to_floats(what: str, values: object) -> Array:
     """Return array-like values of any shape as doubles, copied only if necessary; they need not be finite.
 
-    Raises:
-        InputError: complex or masked numbers, texts, dates, true or false, which NumPy would convert silently.
+    Raises InputError for complex or masked numbers, texts, dates, true or false, which NumPy would convert silently.
     """
     # Importing numpy.ma here would cost every process a tenth of its start.
     if "numpy.ma" in sys.modules and np.ma.is_masked(values):

@@ -71,11 +71,7 @@ def find_maker(name: str) -> Maker:
     """Return the function that makes a problem; its keyword arguments are the problem's options.
 
     The name is that of a problem of this package or of an installed package's entry point, or ``file.py:name`` or ``module:name``
-    of a maker or a ``GaitProblem``.
-
-    Raises:
-        UnknownNameError: no such problem.
-        UserCodeError: user code that cannot be found or fails.
+    of a maker or a ``GaitProblem``. Raises UnknownNameError, and UserCodeError for code that is not found or fails.
     """
     if name in PROBLEMS:
         return import_object(PROBLEMS[name])
@@ -170,11 +166,8 @@ def _choices(make: Maker) -> dict[str, tuple[str, ...]]:
 def load(name: str, /, **options: str | int | float | bool) -> GaitProblem:
     """Return a problem by name, see ``find_maker``, built with the given options; the others keep their defaults.
 
-    An instance of GaitBench is a problem, too: ``load("ssp-v5")``, ``load("gb2:ssp:3")``.
-
-    Raises:
-        UnknownNameError: no such problem or option.
-        InputError: a value that the option does not allow, or user code that fails.
+    An instance of GaitBench is a problem, too: ``load("ssp-v5")``, ``load("gb2:ssp:3")``. Raises UnknownNameError,
+    and InputError for a value that the option does not allow, or user code that fails.
     """
     check_name("problem", name)
     name, instance = resolve_name(name)

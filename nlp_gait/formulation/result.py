@@ -106,9 +106,7 @@ def _make_result(
 def sample_signals(result: Result, period_s: float) -> Signals:
     """Return signals on the problem's grid, refined until neighbouring samples are at most a period apart.
 
-    Raises:
-        InputError: the problem has no signals, the period is not positive, or time runs backwards or lasts too long: x may be
-            far outside its bounds.
+    Raises InputError if there are no signals, the period is not positive, or time runs backwards or lasts too long.
     """
     if not period_s > 0.0:  # NaN fails too
         raise InputError(f"the time between samples must be > 0 s, got {period_s!r}")

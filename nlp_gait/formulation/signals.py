@@ -42,11 +42,7 @@ class JointAngles:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Signals:
-    """Time histories of one gait.
-
-    Raises:
-        InputError: the columns of an array are not described, or their number differs.
-    """
+    """Time histories of one gait; raises InputError if the columns of an array are not described, or their number differs."""
 
     joints: tuple[str, ...]  #: names of the columns of q, qd, qdd and tau
     arrays: Mapping[str, Array]  #: by name; the first axis is time, ``"t"`` is time itself [s]

@@ -182,11 +182,8 @@ class Solution:
     def signals(self, problem: GaitProblem | None = None) -> Signals:
         """Return time histories at x.
 
-        The problem that was solved is loaded by name if it is not given, which may be impossible for a user-defined one.
-
-        Raises:
-            UnknownNameError: no problem has that name.
-            InputError: the problem has no time histories.
+        The problem that was solved is loaded by name if it is not given, which may be impossible for a user-defined one: it
+        raises UnknownNameError. Raises InputError if the problem has no time histories.
         """
         return self._restore(problem).signals(self.x)
 
@@ -204,10 +201,7 @@ class Solution:
         It has ``value(quantity, parameter)`` in the quantity's unit per unit of the parameter, ``write_csv(path)``, and
         ``reach``, how far each parameter may change.
 
-        The problem is as for ``signals``.
-
-        Raises:
-            InputError: the solver returned no multipliers, or x is not an isolated optimum.
+        The problem is as for ``signals``. Raises InputError without multipliers, or if x is not an isolated optimum.
         """
         return import_object(FUNCTIONS["tabulate_sensitivities"])(self._restore(problem), self)
 

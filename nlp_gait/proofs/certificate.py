@@ -120,10 +120,8 @@ def check_certificate(
             paths in a random one, the others in the one that contains a point near the best one.
         seed: of starts and paths.
 
-    Raises:
-        InputError: the proof is not closed, its numbers contradict each other, the problem has changed, the incumbent is
-            infeasible or has another objective, a shipped certificate contradicts this one, a feasible point is better than the
-            bound, or a path does not end.
+    Raises InputError that says what is wrong with the certificate, which feasible point is better than its bound, or that a path
+    does not end.
     """
     problem, target = _check_numbers(file)
     found = {"the incumbent": np.array(file.certificate.x), **_check_shipped(problem, file), **(points or {})}

@@ -157,10 +157,7 @@ class CompiledFunction:
 
         An argument is (P, n) for a vector, (P,) for a scalar, (P, r, c) for a matrix. One without the first axis is used in all
         rows. Results have shapes by the same rule; without any P, they are those of one evaluation. NaN and infinity are computed
-        with as by CasADi.
-
-        Raises:
-            InputError: an argument is missing, has another shape or another number of rows, or does not consist of numbers.
+        with as by CasADi. Raises InputError for a missing argument, another shape or number of rows, or what is not numbers.
         """
         if len(arguments) != len(self.argument_names):
             wanted = ", ".join(self.argument_names)
@@ -185,12 +182,7 @@ class CompiledFunction:
         """Return the compiled derivative of a result by an argument, as a function of the same arguments.
 
         It is (P, m, n) for a vector (m,) by a vector (n,), and (P, n), the gradient, for a scalar. Matrices count column by
-        column.
-
-        Raises:
-            UnknownNameError: no result or argument has this name.
-            InputError: the derivative uses an operation that is not supported.
-            CompilerError: the compiler fails.
+        column. Raises UnknownNameError, InputError for an operation that is not supported, or CompilerError.
         """
         i, k = _find("result", result, self.result_names), _find("argument", argument, self.argument_names)
         symbols, results = apply_to_symbols(self.function)
@@ -239,9 +231,7 @@ def compile_function(
         threads: largest number of threads for a large batch; None for all cores. Results do not depend on it.
         lanes: rows that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
 
-    Raises:
-        InputError: not a function, a sparse argument, an operation that is not supported, or a count that is not allowed.
-        CompilerError: there is no compiler, or it fails.
+    Raises InputError for a sparse argument, an operation that is not supported, or a count that is not allowed; CompilerError.
     """
     if not isinstance(function, ca.Function):
         raise InputError(f"function must be a casadi.Function, got {format_value(function)}")

@@ -188,9 +188,7 @@ class CompiledObjective:
 
         The cost is minimised: the objective, negated if the problem maximises it. The violation is summed over all
         constraint rows and bounds, each in units of its scale, zero if feasible. Both are infinite where X is not finite.
-
-        Raises:
-            InputError: X has another shape, or does not consist of numbers.
+        Raises InputError if X has another shape, or does not consist of numbers.
         """
         X = self._check(X)
         f, violation = np.empty(len(X)), np.empty(len(X))
@@ -247,9 +245,7 @@ def compile_objective(
         threads: largest number of threads for a large batch; None for all cores. Results do not depend on it.
         lanes: candidates that one instruction works on, 1, 2, 4 or 8; None for what the CPU does best.
 
-    Raises:
-        InputError: a thread or lane count that is not allowed, or a problem that is not searchable.
-        CompilerError: ``require_compiler``, and there is no compiler or it fails.
+    Raises InputError for a count that is not allowed or a problem that is not searchable; CompilerError for ``require_compiler``.
     """
     if not isinstance(problem, GaitProblem):
         raise InputError(f"problem must be a problem from load, got {format_value(problem)}")

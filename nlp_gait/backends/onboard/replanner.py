@@ -71,8 +71,7 @@ def replanner(
         predict: whether to start from the first optimum moved by its derivatives by the parameters, instead of the last result;
             saves steps only where the same bounds stay active.
 
-    Raises:
-        InputError: DAQP is not installed, ``near`` has no multipliers, or no start converges; ``predict``, but no derivatives.
+    Raises InputError without DAQP, an optimum with multipliers, or, with ``predict``, its derivatives.
     """
     problem = load(problem) if isinstance(problem, str) else problem
     if near is None:
@@ -129,8 +128,7 @@ class Replanner:
             time_limit_s: limit of wall time, checked after each step; with a limit IPOPT is not used.
             judge: whether the exact functions judge x, which takes about a millisecond.
 
-        Raises:
-            UnknownNameError, InputError: a parameter or x0 is not allowed.
+        Raises UnknownNameError or InputError for a parameter or x0 that is not allowed.
         """
         started = time.perf_counter()
         problem = self._change(p)

@@ -49,8 +49,7 @@ class GaitLibrary:
         Source:
             Guessab, Nouisser, Schmeisser (2006), "Multivariate approximation by a combination of modified Taylor polynomials".
 
-        Raises:
-            UnknownNameError, InputError: another axis, a value beyond the grid, or a corner without an optimum.
+        Raises UnknownNameError or InputError for another axis, a value beyond the grid, or a corner without an optimum.
         """
         x = self._average(at)
         if not np.isfinite(x).all():

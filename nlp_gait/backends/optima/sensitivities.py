@@ -104,10 +104,7 @@ def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, Gai
 
     They are central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
     problems are evaluated, not solved, and not at their own parameter values. A pair consists of the problem with more of a
-    quantity, the problem with less of it, and the difference.
-
-    Raises:
-        InputError: the optimum has no sensitivities, or another model has other constraints.
+    quantity, the problem with less of it, and the difference. Raises InputError if there are none, or for other constraints.
     """
     _require_derivatives(optimum)
     columns = []

@@ -18,12 +18,7 @@ SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptS
 
 
 def make_solver(name: str, /, **settings: Any) -> Solver:
-    """Make an NLP solver by its name, with settings that differ from the defaults.
-
-    Raises:
-        UnknownNameError: there is no such solver or setting.
-        InputError: a setting has a wrong type or value.
-    """
+    """Make an NLP solver by its name, with settings that differ from the defaults; raises UnknownNameError and InputError."""
     known = list_settings(name)
     for setting in settings:
         if not known:
