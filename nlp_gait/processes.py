@@ -1,8 +1,7 @@
 """Child processes: forks that share some work, one isolated fork, or joblib's workers. None of them outlives its parent.
 
 A fork has everything that its parent has and starts within milliseconds; only its results are pickled. Workers start afresh:
-their functions are pickled too. Python files in the working folder never run by themselves, and user code that changes the folder
-changes nothing else.
+their functions are pickled too. Python files in the working folder never run by themselves.
 """
 
 from __future__ import annotations

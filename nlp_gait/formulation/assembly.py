@@ -14,8 +14,7 @@ from nlp_gait.errors import InputError, format_value, unknown
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 Expression = TypeVar("Expression", MX, SX, DM)
-# What rows of a motion refer to: each instant, the change over each interval, a mean over time, a root mean square, neighbouring
-# samples (not defined between them), or no time at all.
+# What rows refer to: an instant, changes over intervals, a mean over time, a root mean square, neighbouring samples, or no time.
 Over: TypeAlias = Literal["instant", "interval", "mean", "root-mean-square", "samples", "once"]
 
 
@@ -88,8 +87,7 @@ class Grid:
 
     intervals: int  #: equal parts to which limits on changes apply
     samples_per_interval: int = 1  #: above 1 for more samples than these limits need
-    #: Option of the problem's maker to multiply for a denser grid; None if the variables depend on the grid, so that it cannot
-    #: be refined
+    #: Option of the problem's maker to multiply for a denser grid; None if the variables depend on the grid
     refined_by: Literal["intervals", "samples_per_interval"] | None = None
 
     def __post_init__(self) -> None:
@@ -261,7 +259,6 @@ class RowsOverTime:
     #: From the values of variables and parameters by name to the start and the end of the phase [s]
     times: Callable[[Mapping[str, float]], tuple[float, float]]
     intervals: int = 1  #: equal parts to which limits on changes apply
-    #: Indexes that are means or integrals over time; with all samples at one time, the value that is averaged. Those of the
-    #: same name in several phases are added.
+    #: Indexes that are means or integrals; with all samples at one time, the averaged value. Those of one name are added.
     means: tuple[str, ...] = ()
     kinks: tuple[float, ...] = ()  #: fractions of the phase at which a formula changes, such as a spline's knots

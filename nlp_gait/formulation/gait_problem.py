@@ -44,8 +44,7 @@ ROUNDING = 1e-6
 class SolverHints:
     """What solvers may use; it changes no problem."""
 
-    #: Start point (n,) for gradient methods from the parameters by name and a generator; None for a uniform one within the
-    #: bounds
+    #: Start point (n,) for gradient methods from the parameters by name and a generator; None for a uniform one
     start: Start | None = None
     #: Of the Lagrangian, exact or approximated where that was measured to be better
     hessian: Literal["exact", "limited-memory"] = "exact"

@@ -1,8 +1,7 @@
 """Certificates: files of proven bounds, the shipped ones, and their checks.
 
-A check looks for a better point, follows paths of the proof again, or repeats it as a whole. The boxes that refute a false bound
-surround the better points, and a random path seldom meets them. So a check first looks for a better point, and half of its paths
-lead towards the best one that is known.
+A check looks for a better point, follows paths of the proof again, or repeats it as a whole. Boxes that refute a false bound
+surround the better points, and random paths seldom meet them: so half of the paths lead towards the best point that is known.
 """
 
 from __future__ import annotations
@@ -120,8 +119,7 @@ def check_certificate(
             paths in a random one, the others in the one that contains a point near the best one.
         seed: of starts and paths.
 
-    Raises InputError that says what is wrong with the certificate, which feasible point is better than its bound, or that a path
-    does not end.
+    Raises InputError that says what is wrong with the certificate, which point is better, or that a path does not end.
     """
     problem, target = _check_numbers(file)
     found = {"the incumbent": np.array(file.certificate.x), **_check_shipped(problem, file), **(points or {})}

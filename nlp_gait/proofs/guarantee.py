@@ -39,8 +39,7 @@ class RowViolation:
 class Guarantee:
     """What is proven about a gait between its samples."""
 
-    # True if all rows over time are satisfied at all times, to 1e-6 in their units; False if a violation is proven; None if
-    # neither is proven
+    # True if all rows over time are satisfied at all times, to 1e-6 in their units; False if a violation is proven; else None
     satisfied: bool | None
     # Rows that are not proven to be satisfied, by the time at which that begins
     violations: tuple[RowViolation, ...] = ()

@@ -34,8 +34,6 @@ MEAN_SHARPNESS = 4e-3
 MOST_MEAN_PIECES = 800
 # Widens sums over pieces: far more than their rounding errors.
 ROUNDING = 1e-12
-# Replaces an infinite end where only the other one matters.
-LARGEST = 1e300
 
 
 def make_pieces(kinks: Sequence[float], shift: float | None) -> Array:
@@ -55,14 +53,10 @@ def halve_pieces(pieces: Array) -> Array:
 
 def bound_violation(lower: Array, upper: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Return the largest and the least possible violation of the bounds lower and upper by values between low and high."""
-    most = np.maximum(
-        np.where(np.isneginf(lower), -np.inf, np.where(np.isneginf(low), np.inf, lower - np.maximum(low, -LARGEST))),
-        np.where(np.isposinf(upper), -np.inf, np.where(np.isposinf(high), np.inf, np.minimum(high, LARGEST) - upper)),
-    )
-    least = np.maximum(
-        np.where(np.isneginf(lower), -np.inf, lower - np.minimum(high, LARGEST)),
-        np.where(np.isposinf(upper), -np.inf, np.maximum(low, -LARGEST) - upper),
-    )
+    no_lower, no_upper = np.isneginf(lower), np.isposinf(upper)
+    with np.errstate(invalid="ignore"):  # the difference of two infinite ends is not used
+        most = np.maximum(np.where(no_lower, -np.inf, lower - low), np.where(no_upper, -np.inf, high - upper))
+        least = np.maximum(np.where(no_lower, -np.inf, lower - high), np.where(no_upper, -np.inf, low - upper))
     return most, least
 
 

@@ -10,8 +10,7 @@ from casadi import DM, SX
 
 from nlp_gait.symbolic.dynamics import Wrench
 
-# In free fall there is no ZMP. The ground force is at least this share of the weight: the ZMP is then far outside any sole, and
-# finite.
+# In free fall there is no ZMP. With at least this share of the weight as ground force it is far outside any sole, and finite.
 LEAST_LOAD = 1e-3
 # Static friction that is commonly required of a walkway (UL 410); rubber on a dry floor has more.
 SOLE_FRICTION = 0.5

@@ -1,8 +1,7 @@
 """Inverse kinematics of a leg with six revolute joints for any pose of the torso, over a flat sole: root and rates.
 
 The chain begins at the foot, whose axes are the world's, and ends at the torso. Newton's method starts at the nearest leg with a
-spherical hip and a universal ankle, and works on pairs (cosine, sine) of the angles: there is one transcendental function for
-each joint, at the end.
+spherical hip and a universal ankle, and works on cosines and sines: each joint has one transcendental function, at the end.
 """
 
 from __future__ import annotations

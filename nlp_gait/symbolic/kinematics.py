@@ -96,9 +96,8 @@ def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops
     ankle [m], and the reach margin on the cosine of the knee angle (see ``Nonsmooth.acos``).
 
     Source:
-        Gupta, Pratihar, Deb (2023), eqs. (5)-(14) with the hip yaw-pitch angle at zero; the arcsine of eq. (9) replaced by
-        the two-argument arctangent, velocities and accelerations by differentiating in closed form: (K.5)
-        to (K.17) in docs/model.
+        Gupta, Pratihar, Deb (2023), eqs. (5)-(14) with the hip yaw-pitch angle at zero; the arcsine of eq. (9) replaced by the
+        two-argument arctangent, rates by differentiating in closed form: (K.5) to (K.17) in docs/model.
     """
     (x, y, z), (xd, yd, zd), (xdd, ydd, zdd) = (ca.vertsplit(part) for part in hip_to_ankle)
 

@@ -20,8 +20,7 @@ BRAKE_POWER = 8
 
 # A contact fades in over this height [m], and out again as its force falls below this one [N]: no branch, no jump.
 FADE_HEIGHT, FADE_FORCE = 2e-4, 1.0
-# Springs yield beyond this depth [m]: a point far below the ground has entered through the riser of a step, and must not be
-# accelerated upwards.
+# Springs yield beyond this depth [m]: a point far below the ground came through a riser, and must not be accelerated upwards.
 YIELD_DEPTH = 0.02
 # A slower contact sticks: it creeps at this speed times the ratio of its load to the friction limit [m/s].
 CREEP_SPEED = 5e-3
@@ -65,8 +64,7 @@ def implicit_equations(
     given motion has no contacts; its mass includes the terms of other implicit forces.
 
     Source:
-        Bhardwaj et al., eqs. (33)-(35), (44)-(46), taken at the end of the quantum; the printed explicit scheme is stable
-        only for k dt / 2 < c < 2 m / dt.
+        Bhardwaj et al., eqs. (33)-(35), (44)-(46), at the quantum's end; as printed, stable for k dt / 2 < c < 2 m / dt only.
     """
     mass, force = motion
     k, c, mu = ground

@@ -33,8 +33,7 @@ def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
     The coefficients are (m, k), with m = spans + 1, or 0 for zero curves.
 
     Source:
-        Basis functions of Cox and de Boor on uniform knots with clamped ends; derivatives by de Boor's formula:
-        (C.10) to (C.13) in docs/model.
+        Cox and de Boor's basis functions and derivatives on uniform knots, clamped ends: (C.10) to (C.13) in docs/model.
     """
     m, k = coefficients.shape
     if m == 0:
@@ -46,7 +45,9 @@ def spline(coefficients: SX, duration: SX, phase: SX) -> Motion:
 def basis(spans: int, phase: SX, order: int) -> SX:
     """Return (m,) derivatives of order 0 to 5 of the basis functions with respect to the phase, in [0, 1]."""
     knots = np.concatenate([np.zeros(DEGREE), np.linspace(0.0, 1.0, spans + 1), np.ones(DEGREE)])
-    values = _start_basis(spans, phase)
+    # Of degree 0: 1 on one span, 0 at multiple end knots. The outer spans include the outside.
+    after = [SX(1), *(phase >= k / spans for k in range(1, spans)), SX(0)]
+    values = [SX(0)] * DEGREE + [after[k] - after[k + 1] for k in range(spans)] + [SX(0)] * DEGREE
     for degree in range(1, DEGREE + 1):
         step = _raise_degree if degree <= DEGREE - order else _differentiate
         values = step(values, knots, degree, phase)
@@ -76,13 +77,6 @@ def tabulate_basis(spans: int, phases: Array, order: int = 0) -> Array:
 def _basis_function(spans: int, order: int) -> ca.Function:
     phase = SX.sym("phase")
     return ca.Function("basis", [phase], [basis(spans, phase, order)])
-
-
-def _start_basis(spans: int, phase: SX) -> list[SX]:
-    """Return the basis functions of degree 0: 1 on one span, 0 at multiple end knots. The outer spans include the outside."""
-    after = [SX(1), *(phase >= k / spans for k in range(1, spans)), SX(0)]
-    inner = [after[k] - after[k + 1] for k in range(spans)]
-    return [SX(0)] * DEGREE + inner + [SX(0)] * DEGREE
 
 
 def _raise_degree(values: list[SX], knots: Array, degree: int, phase: SX) -> list[SX]:
@@ -120,8 +114,7 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
     ``phase`` is time / duration; the duration [s] must not be zero.
 
     Source:
-        Gupta, Pratihar, Deb (2023), Tables 3 and 5 (four boundary conditions each), in Hermite form:
-        (C.2) to (C.6) in docs/model.
+        Gupta, Pratihar, Deb (2023), Tables 3 and 5 (four conditions each), in Hermite form: (C.2) to (C.6) in docs/model.
     """
     rise, v0, v1 = end - start, start_velocity * duration, end_velocity * duration
     c2 = 3 * rise - 2 * v0 - v1
@@ -136,8 +129,7 @@ def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX
 def cubic_of_sums(start: SX | float, end: SX | float, half_sum: SX, half_difference: SX, phase: SX) -> Motion:
     """Return the cubic polynomial over unit time with given ends [u]: ``cubic`` with other coefficients [u].
 
-    In unit time velocities are multiplied by the duration; the sum and the difference are those of the velocities at phase 0 and
-    at phase 1.
+    In unit time velocities are multiplied by the duration; the sum and the difference are those of both ends' velocities.
     """
     rise, bow = end - start, phase * (1 - phase)
     return Motion(

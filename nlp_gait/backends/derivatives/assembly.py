@@ -130,8 +130,7 @@ class NlpPlan:
 
     plan: DerivativePlan  #: with steps of three phases
     parameters: int  #: k, their number
-    #: Place of the variables (n,); likewise ``p`` (k,), ``rows`` (1 + m,) of cost and g, ``weights`` (1 + m,) of these in the
-    #: Lagrangian
+    #: Place of the variables (n,); likewise ``p`` (k,), ``rows`` (1 + m,) of cost and g, their ``weights`` in the Lagrangian
     w: int
     p: int
     rows: int

@@ -95,16 +95,14 @@ class SampleDerivatives(NamedTuple):
     hessian: ca.Sparsity  #: sparsity (ma, ma) of the second derivatives of any sum of outputs, symmetric
     directional: bool  #: whether ``first`` and ``second`` take a direction
     first: ca.Function  #: (u, du) to dv; or u to the nonzeros of the Jacobian
-    #: (u, weights of the outputs, du) to their gradient and its change; or (u, weights) to the gradient and the nonzeros of
-    #: the Hessian
+    #: (u, weights of the outputs, du) to their gradient and its change; or (u, weights) to that and the Hessian's nonzeros
     second: ca.Function
 
 
 def derive_sample(function: ca.Function, active: Integers, used: Integers, directions: int) -> SampleDerivatives:
     """Return the derivatives of a function of vectors in the cheapest form.
 
-    ``active`` inputs vary, ``used`` outputs are read; ``directions`` is the largest number of directions of a sample, where
-    these are not its active inputs.
+    ``active`` inputs vary, ``used`` outputs are read; a sample has at most so many ``directions``, or one for each active input.
     """
     u = function.sx_in(0)
     v = function.call([u])[0][used.tolist()]

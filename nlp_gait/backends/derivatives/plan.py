@@ -24,19 +24,18 @@ _UNARY = "EXP LOG SQRT SIN COS TAN ASIN ACOS ATAN SINH COSH TANH FLOOR CEIL FABS
 _BINARY = "POW CONSTPOW LT LE EQ NE AND OR FMOD COPYSIGN IF_ELSE_ZERO FMIN FMAX ATAN2 HYPOT"
 _NAMES = {"CONSTPOW": "pow", "LT": "less", "LE": "at_most", "EQ": "equal", "NE": "unequal"}  # others have CasADi's
 # {f} is the prefix of functions: of lanes or of numbers (``native/operations.hpp``).
-EXPRESSIONS: dict[int, str] = {
-    ca.OP_ASSIGN: "{0}",
-    ca.OP_ADD: "{0} + {1}",
-    ca.OP_SUB: "{0} - {1}",
-    ca.OP_MUL: "{0} * {1}",
-    ca.OP_DIV: "{0} / {1}",
-    ca.OP_NEG: "-{0}",
-    ca.OP_SQ: "{0} * {0}",
-    ca.OP_TWICE: "{0} + {0}",
-    ca.OP_INV: "{f}number(1.0) / {0}",
-    **{getattr(ca, f"OP_{name}"): f"{{f}}{name.lower()}({{0}})" for name in _UNARY.split()},
-    **{getattr(ca, f"OP_{name}"): f"{{f}}{_NAMES.get(name, name.lower())}({{0}}, {{1}})" for name in _BINARY.split()},
+_TEXTS = {
+    "ASSIGN": "{0}",
+    "ADD": "{0} + {1}",
+    "SUB": "{0} - {1}",
+    "MUL": "{0} * {1}",
+    "DIV": "{0} / {1}",
+    "NEG": "-{0}",
 }
+_TEXTS |= {"SQ": "{0} * {0}", "TWICE": "{0} + {0}", "INV": "{f}number(1.0) / {0}"}
+_TEXTS |= {name: f"{{f}}{name.lower()}({{0}})" for name in _UNARY.split()}
+_TEXTS |= {name: f"{{f}}{_NAMES.get(name, name.lower())}({{0}}, {{1}})" for name in _BINARY.split()}
+EXPRESSIONS: dict[int, str] = {getattr(ca, f"OP_{name}"): text for name, text in _TEXTS.items()}
 CODES = {operation: code for code, operation in enumerate(EXPRESSIONS)}
 # Operations in one C++ function: longer ones take the compiler longer per operation, shorter ones pass more values in memory.
 PIECE = 500

@@ -129,8 +129,7 @@ def write_rows_source(kernel: ca.Function) -> str:
 class CompiledFunction:
     """A CasADi function as native code, for many rows at once.
 
-    Several threads and forked processes may call it. It can be pickled: it is compiled, or loaded from the cache folder, where it
-    is unpickled.
+    Several threads and forked processes may call it. It can be pickled: it is compiled or loaded again where it is unpickled.
     """
 
     def __init__(self, function: ca.Function, kernel: ca.Function, threads: int, lanes: int) -> None:

@@ -154,8 +154,7 @@ MOST_THREADS = 1024
 class CompiledObjective:
     """Objective and total violation of many candidates at once.
 
-    Several threads and forked processes may call it. It can be pickled if its problem can be: it is compiled, or loaded from the
-    cache folder, where it is unpickled.
+    Several threads and forked processes may call it. It can be pickled if its problem can, and is compiled or loaded again.
     """
 
     def __init__(
@@ -236,8 +235,7 @@ def compile_objective(
 ) -> CompiledObjective:
     """Return the exact objective and violation of a problem for batches of candidates.
 
-    The library is built once and stored in the user's cache folder; other parameter values, bounds or fixed variables need no
-    other library.
+    The library is built once and stored in the user's cache folder; other parameter values and bounds need no other library.
 
     Args:
         problem: with the parameter values to use.

@@ -26,9 +26,8 @@ HOW_TO_GET_ONE = (
     "to get a compiler: pip install 'nlp-gait[compiler]', or your system's g++ or clang++, or name one in the environment "
     "variable CXX"
 )
-# No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing here: so results
-# are the virtual machine's bit for bit, except where vector functions of libm round differently. Hidden symbols let the compiler
-# inline CasADi's helpers.
+# No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing: so results are
+# the virtual machine's bits, except where vector functions of libm round differently. Hidden symbols: CasADi's helpers are inlined.
 BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
 
 # Runs a program that ends with this process, however this process ends: then the pipe on its standard input is closed.

@@ -22,8 +22,7 @@ from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, ConstraintValue, Guess, Outcome, Solution
 
-# A step is the last one if it misses the predicted cost by less than this share, violates less than this total, and is shorter
-# than this share of the variables' ranges.
+# The last step misses the predicted cost by less than this share, violates less than this total, is shorter than this share.
 COST_ERROR, VIOLATION, SHORT = 1e-7, 1e-8, 1e-3
 CORRECTED = 3e-4  # longest step that is corrected: a longer one needs new derivatives
 SOLVES = 1000  # planned, for IPOPT's decision whether compilation pays

@@ -34,8 +34,7 @@ class Sensitivities:
     objective: Array  #: (k,) of the optimal objective, in the problem's sense
     x: Array  #: (n, k) of x*
     defined: Array  #: (k,) False where dependent active bounds contradict each other: no derivative exists
-    #: (2, k) change of the quantity downwards (<= 0) and upwards at which, to first order, the next bound becomes active or
-    #: an active one is released: there x* changes direction
+    #: (2, k) change of the quantity, down (<= 0) and up, at which, to first order, the next bound becomes active or is released
     reach: Array
 
 

@@ -102,8 +102,7 @@ class IpoptSettings(Solver):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
     def choose_settings(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
-        # The cache folder has no influence: compiled and interpreted functions differ in the last bits, and the same call must
-        # give the same result.
+        # Whatever is cached: compiled and interpreted functions differ in the last bits, and the same call gives the same result.
         pays = solves * build_nlp(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
         compiled = pays if self.compiled is None else self.compiled
         few_rows = compiled if self.few_rows is None else self.few_rows
