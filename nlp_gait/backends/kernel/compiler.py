@@ -27,7 +27,7 @@ HOW_TO_GET_ONE = (
     "variable CXX"
 )
 # No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing: so results are
-# the virtual machine's bits, except where vector functions of libm round differently. Hidden symbols: CasADi's helpers are inlined.
+# the virtual machine's bits, except where libm's vector functions round differently. Hidden symbols: its helpers are inlined.
 BASE_FLAGS = ("-std=c++17", "-O2", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-w")
 
 # Runs a program that ends with this process, however this process ends: then the pipe on its standard input is closed.
