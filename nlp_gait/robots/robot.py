@@ -150,6 +150,21 @@ class Joint:
                 raise RobotDataError(f"{owner}: {name} must be ordered (lower < upper), got [{low}, {high}]")
 
 
+def make_free_joint(name: str, parent: str, child: str, origin_m: Vector, axis: Vector, torque_Nm: float) -> Joint:
+    """Return a joint of a robot whose source has no limits of angles and speeds."""
+    return Joint(
+        name=name,
+        parent=parent,
+        child=child,
+        origin_m=origin_m,
+        axis=axis,
+        limits_rad=(-math.pi, math.pi),
+        planning_limits_rad=(-math.pi, math.pi),
+        velocity_limit_rad_s=100.0,
+        torque_limit_Nm=torque_Nm,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Foot:
     """Flat sole under an ankle; distances are from the ankle's projection on the ground."""

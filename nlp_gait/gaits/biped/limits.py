@@ -73,15 +73,11 @@ class JointLimits(Limit):
 
     def __init__(self, robot: Robot, planned: tuple[str, ...]) -> None:
         self._planned = planned
+        bounds = [(robot.joint(joint).planning_limits_rad, joint) for joint in planned]
         self.parameters = tuple(
-            Parameter(
-                name=f"{joint}_rad.{end}",
-                unit="rad",
-                default=robot.joint(joint).planning_limits_rad[side],
-                description=f"{end} limit of {joint}",
-            )
-            for joint in planned
-            for side, end in enumerate(("lower", "upper"))
+            Parameter(name=f"{joint}_rad.{end}", unit="rad", default=value, description=f"{end} limit of {joint}")
+            for both, joint in bounds
+            for end, value in zip(("lower", "upper"), both, strict=True)
         )
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:

@@ -199,6 +199,11 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
     return loads
 
 
+SWITCH_LOAD = (
+    "largest load, in weights, of the foot that has just landed and of the one about to lift; no limit by default"
+)
+
+
 class FootLimits(Limit):
     """What both soles can bear at every sample, and how fast load may pass from the left to the right foot.
 
@@ -210,14 +215,7 @@ class FootLimits(Limit):
     parameters = table(
         ("friction_coefficient", "1", balance.SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
         ("load_rate_limit_1_s", "1/s", 12.5, "fastest change of a foot's load, in weights per second", 0.0, math.inf),
-        (
-            "switch_load_limit",
-            "1",
-            1.0,
-            "largest load, in weights, of the foot that has just landed and of the one about to lift; no limit by default",
-            0.0,
-            math.inf,
-        ),
+        ("switch_load_limit", "1", 1.0, SWITCH_LOAD, 0.0, math.inf),
     )
 
     def __init__(self, body: Body, load_slope: Trace) -> None:

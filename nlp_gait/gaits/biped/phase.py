@@ -93,33 +93,28 @@ class Phase:
             found = [planned, reach, torque, qd * moving, zmp, MX(0, n), *wrenches, q, qd, qdd, *seen]
             reads_motion = True
         columns = [[part] if len(ats) == 1 else ca.horzsplit(part, part.shape[1] // len(ats)) for part in found]
-        return [
-            self._make_samples(at, [part[k] for part in columns], reads_wrenches, reads_motion, tuple(traces), phases)
-            for k, at in enumerate(ats)
-        ]
-
-    def _make_samples(
-        self, at: Point, found: list[MX], wrenches: bool, motion: bool, traces: tuple[str, ...], phases: MX | None
-    ) -> Samples:
-        planned, reach, torque, power, zmp, miss, *rest = found
-        pushes, moved, seen = (
-            [rest.pop(0) for _ in range(count)] for count in (len(BOTH_FEET) * wrenches, 3 * motion, len(traces))
-        )
-        return Samples(
-            joints=self.body.joints,
-            moving=self.moving,
-            per_interval=self.grid.samples_per_interval if phases is None else 1,
-            duration=at[self.duration],
-            planned=planned,
-            reach=reach,
-            torque=torque,
-            power=power,
-            zmp=zmp,
-            miss=miss,
-            wrenches=dict(zip(BOTH_FEET, pushes, strict=False)),
-            traces=dict(zip(traces, seen, strict=True)),
-            **dict(zip(("q", "qd", "qdd"), moved, strict=False)),
-        )
+        counts, several = (len(BOTH_FEET) * reads_wrenches, 3 * reads_motion, len(traces)), list[Samples]()
+        for k, at in enumerate(ats):
+            planned, reach, torque, power, zmp, miss, *rest = (part[k] for part in columns)
+            pushes, moved, seen = ([rest.pop(0) for _ in range(count)] for count in counts)
+            several.append(
+                Samples(
+                    joints=self.body.joints,
+                    moving=self.moving,
+                    per_interval=self.grid.samples_per_interval if phases is None else 1,
+                    duration=at[self.duration],
+                    planned=planned,
+                    reach=reach,
+                    torque=torque,
+                    power=power,
+                    zmp=zmp,
+                    miss=miss,
+                    wrenches=dict(zip(BOTH_FEET, pushes, strict=False)),
+                    traces=dict(zip(traces, seen, strict=True)),
+                    **dict(zip(("q", "qd", "qdd"), moved, strict=False)),
+                )
+            )
+        return several
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """Return the phase as functions of time, after those of the durations ``begins``; nothing with finite differences."""
@@ -133,16 +128,11 @@ class Phase:
             start = sum(max(values[earlier], LEAST_DURATION) for earlier in begins)
             return start, start + max(values[self.duration], LEAST_DURATION)
 
-        return (
-            RowsOverTime(
-                name=name,
-                assemble=assemble,
-                times=times,
-                intervals=self.grid.intervals,
-                means=("power_W", "paper_power_W", "dbm_x_mean_m", "dbm_y_mean_m"),
-                kinks=self.kinks,
-            ),
+        intervals, means = self.grid.intervals, ("power_W", "paper_power_W", "dbm_x_mean_m", "dbm_y_mean_m")
+        rows = RowsOverTime(
+            name=name, assemble=assemble, times=times, intervals=intervals, means=means, kinks=self.kinks
         )
+        return (rows,)
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""

@@ -55,6 +55,7 @@ class RecordedPhase(Phase):
         torque, zmp, _, hip, hip_rate, ankle, corners, *_ = self._instant.map(self.grid.parts + 1)(q, qd, qdd)
         rows_of = [self.body.joints.index(name) for name in self.moving]
         planned = [self.body.joints.index(name) for name in self.body.planned]
+        sole = {"heights": corners[2::3, :], "sides": corners[1::3, :], "ground": ankle[:2, :]}
         return Samples(
             joints=self.body.joints,
             moving=self.moving,
@@ -68,13 +69,7 @@ class RecordedPhase(Phase):
             q=q[rows_of, :],
             qd=qd[rows_of, :],
             qdd=qdd[rows_of, :],
-            traces={
-                "hip": hip,
-                "hip_rate": hip_rate,
-                "heights": corners[2::3, :],
-                "sides": corners[1::3, :],
-                "ground": ankle[:2, :],
-            },
+            traces={"hip": hip, "hip_rate": hip_rate, **sole},
         )
 
     def signals(self, at: NumericPoint) -> Signals:

@@ -34,6 +34,7 @@ from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack
 
 INTERVALS = 8
 EDGES = 6  # of the hull of two soles that point forward
+EDGE = ("x", "1", 1.0, "its normal's x"), ("y", "1", 0.0, "its normal's y"), ("m", "m", 1.0, "distance from the origin")
 OUTSIDE, BEYOND = "zmp_outside_m", "beyond_reach"
 MISS, MISS_END = ("dcm_miss_x_m", "dcm_miss_y_m"), ("dcm_miss_x_end_m", "dcm_miss_y_end_m")
 RATE, RISE, REACH = "dcm_rate_per_s", ("floor_rise_x", "floor_rise_y"), "zmp_reach_m"
@@ -109,11 +110,7 @@ class ZmpPolygon(limits.Limit):
                 name=f"edge_{k}_{what}", unit=unit, default=value, description=f"edge {k} of the polygon: {words}"
             )
             for k in range(EDGES)
-            for what, unit, value, words in (
-                ("x", "1", 1.0, "its normal's x"),
-                ("y", "1", 0.0, "its normal's y"),
-                ("m", "m", 1.0, "distance from the origin"),
-            )
+            for what, unit, value, words in EDGE
         ),
     )
 

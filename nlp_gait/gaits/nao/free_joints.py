@@ -117,6 +117,7 @@ class FreePhase(Phase):
         torque, zmp, along, heights, sides = (tie_entries(part, ops) for part in self.free.instant.map(n)(motions))
         rows = (dict(zip(CURVES, ca.vertsplit(part), strict=True)) for part in ca.vertsplit(motions, len(CURVES)))
         q, qd, qdd = ({n: part[YAW_PITCH if n in YAW_PITCHES else n] for n in MOVING} for part in rows)
+        others = ca.vertcat(*(q[name] for name in OTHERS))
         return Samples(
             joints=JOINTS,
             moving=MOVING,
@@ -130,12 +131,7 @@ class FreePhase(Phase):
             q=ca.vertcat(*q.values()),
             qd=ca.vertcat(*qd.values()),
             qdd=ca.vertcat(*qdd.values()),
-            traces={
-                "others": ca.vertcat(*(q[name] for name in OTHERS)),
-                "along": along,
-                "heights": heights,
-                "sides": sides,
-            },
+            traces={"others": others, "along": along, "heights": heights, "sides": sides},
         )
 
 

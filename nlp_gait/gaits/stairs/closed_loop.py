@@ -167,16 +167,12 @@ class ClosedLoop:
         motion = biped.biped_dynamics(q, v, q, self.base_point)
         momentum = sum((biped.rod(link).mass_kg * middle for link, middle in biped.centres(found).items()), SX(2, 1))
         stair = Stair(parts["size"][0], parts["size"][1])
-        contacts = [
-            Contact(
-                found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, self.kind),
-                ca.jacobian(found[name][1], q).T,
-                ca.jacobian(found[name][0], q).T,
-                speed[::-1],
-            )
-            for name in CONTACTS
-            if name != self.base_point
-        ]
+
+        def touch(point: SX) -> Contact:
+            height = point[1] - stair_height(point[0], stair, SETBACK, EDGE_WIDTH, self.kind)
+            return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
+
+        contacts = [touch(found[name]) for name in CONTACTS if name != self.base_point]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
         inertia = ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push  # of links that the base accelerates
         disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) - inertia + parts["torque"]

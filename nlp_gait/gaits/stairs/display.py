@@ -17,30 +17,21 @@ from nlp_gait.formulation.display import LEFT, RIGHT, SIMULATED, TRUNK, Limb, Sk
 from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.stair import SETBACK
-from nlp_gait.robots import Foot, Joint, Link, Robot
-from nlp_gait.robots.robot import Vector
+from nlp_gait.robots import Foot, Link, Robot
+from nlp_gait.robots.robot import Vector, make_free_joint
 
 LINES = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), TRUNK: ("H", "U")}
 # The paper has no motors. The largest torque of each is the robot's weight at a lever as long as what the joint moves: leg,
 # shank, foot, toe. NAO's motors give 0.8 to 1.6 times that at stall (hip pitch; knee and ankle).
 FOOT_HALF_WIDTH = 0.05  # [m]; has no effect in the plane
-RANGE = (-np.pi, np.pi)  # of every joint [rad]; the plans satisfy the paper's limits
-RATE_LIMIT = 100.0  # [rad/s]; not used
 TORSO = "torso"
 # Links of a leg from the hip down, by the name of the joint before them, with the paper's name and the link in front.
 LEG = {"Hip": ("thigh", "HK"), "Knee": ("shank", "KA"), "Ankle": ("sole", "AS"), "Toe": ("toe", "ST")}
 SIDES = {"L": ("left", "'"), "R": ("right", "")}
 JOINTS = tuple(f"{letter}{joint}" for letter in SIDES for joint in LEG)
 # The model's joint for each of these, and whether it turns the same way; it has none for the toe that stands.
-MODEL_JOINT = {
-    "LHip": ("hip'", 1.0),
-    "LKnee": ("knee'", -1.0),
-    "LAnkle": ("ankle'", -1.0),
-    "RHip": ("hip", 1.0),
-    "RKnee": ("knee", 1.0),
-    "RAnkle": ("ankle", 1.0),
-    "RToe": ("toe", 1.0),
-}
+MODEL_JOINT = {"LHip": ("hip'", 1.0), "LKnee": ("knee'", -1.0), "LAnkle": ("ankle'", -1.0)}
+MODEL_JOINT |= {"RHip": ("hip", 1.0), "RKnee": ("knee", 1.0), "RAnkle": ("ankle", 1.0), "RToe": ("toe", 1.0)}
 
 
 @cache
@@ -57,16 +48,9 @@ def rigid_bodies() -> Robot:
             link, name = biped.rod(paper_name), f"{side} {part}"
             along: Vector = (0.0, 0.0, -1.0) if joint in ("Hip", "Knee") else (1.0, 0.0, 0.0)
             links[name] = _link(name, link, along)
-            joints[f"{letter}{joint}"] = Joint(
-                name=f"{letter}{joint}",
-                parent=parent,
-                child=name,
-                origin_m=origin,
-                axis=(0.0, 1.0, 0.0),
-                limits_rad=RANGE,
-                planning_limits_rad=RANGE,
-                velocity_limit_rad_s=RATE_LIMIT,
-                torque_limit_Nm=paper.mass_kg * biped.GRAVITY * levers[joint],
+            torque = paper.mass_kg * biped.GRAVITY * levers[joint]
+            joints[f"{letter}{joint}"] = make_free_joint(
+                f"{letter}{joint}", parent, name, origin, (0.0, 1.0, 0.0), torque
             )
             parent, origin = name, (link.length_m * along[0], link.length_m * along[1], link.length_m * along[2])
         feet[side], toes[side] = (

@@ -32,12 +32,9 @@ COLUMNS = {
     "power": Columns(unit="W", labels=JOINTS),
     "reach": Columns(unit="1", labels=("swing knee", "stance knee")),
     "stance_force": vector_columns("N", "xz"),
-    "stance_pressure": vector_columns("m", "x"),
-    "zmp": vector_columns("m", "x"),
-    "hip": vector_columns("m", "xz"),
-    "ankle": vector_columns("m", "xz"),
+    **{name: vector_columns("m", "x") for name in ("stance_pressure", "zmp")},
+    **{name: vector_columns("m", "xz") for name in ("hip", "ankle", "stance_ankle")},
     "stance_foot": Columns(unit="rad", labels=("A'S'", "S'T'")),
-    "stance_ankle": vector_columns("m", "xz"),
     "support": Columns(unit="m", labels=("rear", "front")),
 }
 

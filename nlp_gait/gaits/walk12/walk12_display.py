@@ -16,8 +16,8 @@ from casadi import SX
 from nlp_gait.formulation import Array, NumericPoint, Signals, SimulationModel, display
 from nlp_gait.gaits.walk12.walk12_model import GRAVITY, PointMassBiped, Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
-from nlp_gait.robots import Foot, Joint, Link, Robot
-from nlp_gait.robots.robot import Vector
+from nlp_gait.robots import Foot, Link, Robot
+from nlp_gait.robots.robot import Vector, make_free_joint
 from nlp_gait.robots.tree import inertia_moments, point_inertia, tree_from
 from nlp_gait.symbolic.dynamics import newton_euler
 
@@ -26,8 +26,6 @@ SOLE_SHARE = 0.1  # of the foot's mass that belongs to the sole; the ankle has t
 # Of its drives the paper prints a holding torque of 1.02 Nm, but no stiffness. Here the largest torque of each is the robot's
 # weight times the length of what the joint moves: leg, shank, front of the foot. NAO's motors have 0.8 to 1.6 times that at stall
 # (hip pitch; knee and ankle).
-RANGE = (-np.pi, np.pi)  # of every joint [rad]: the paper has no limits
-RATE_LIMIT = 100.0  # [rad/s], likewise; not used
 FINE_INTERVALS = 1000  # of a step
 BEARINGS = {  # joints by side: hip yaw, roll, pitch, knee, ankle pitch, ankle roll; pitches lean back (eqs. 2, 3)
     "left": ("theta_4", "theta_6", "theta_5", "theta_3", "theta_2", "theta_1"),
@@ -91,17 +89,7 @@ def make_rigid_bodies(robot: PointMassBiped) -> Robot:
         for name, (part, (axis, origin, moved, masses)) in zip(BEARINGS[side], leg.items(), strict=True):
             link = f"{side} {part}"
             contents[link] = masses
-            joints[name] = Joint(
-                name=name,
-                parent=parent,
-                child=link,
-                origin_m=origin,
-                axis=axis,
-                limits_rad=RANGE,
-                planning_limits_rad=RANGE,
-                velocity_limit_rad_s=RATE_LIMIT,
-                torque_limit_Nm=weight * moved,
-            )
+            joints[name] = make_free_joint(name, parent, link, origin, axis, weight * moved)
             parent = link
         feet[side] = Foot(
             link=f"{side} foot",

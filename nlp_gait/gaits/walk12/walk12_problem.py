@@ -36,20 +36,14 @@ VARIABLES = (  # (eq. 7)
     Variable(name="bending_height_m", unit="m", lower=0.001, upper=0.13, description="h, hip below a stretched leg"),
 )
 
+TURN = "K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging"
 PARAMETERS = parameters(
     ("lambda", "1", 0.15, "weight of stability against step length (eq. 11)", 0.0, 1.0),
     ("step_time_s", "s", 1.0, "T, time of one step", 0.01, math.inf),
     ("f1max", "1/(m^2 s)", F1MAX, "f1 that counts as 1 (eq. 11)", 1e-6, math.inf),
     ("f2max_m", "m", F2MAX, "step length that counts as 1", 1e-6, math.inf),
     ("reach_margin_rad", "rad", 0.05, "kappa, least angle of a knee", 0.0, 1.0),
-    (
-        "turn_rad",
-        "rad",
-        0.0,
-        "K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging",
-        0.0,
-        LARGEST_TURN,
-    ),
+    ("turn_rad", "rad", 0.0, TURN, 0.0, LARGEST_TURN),
 )
 
 
