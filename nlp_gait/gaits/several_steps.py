@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nlp_gait.errors import InputError
+from nlp_gait.errors import check_count
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign, partners
@@ -27,8 +27,7 @@ MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 
 def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
     """Return several steps of a cycle that ends in the mirror image of its start, each ``rise_m`` higher; InputError for none."""
-    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
-        raise InputError(f"steps must be a whole number >= 1, got {steps!r}")
+    steps = check_count("steps", steps)
     return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [step_length(cycle), 0.0, rise_m, 0.0]))
 
 

@@ -20,7 +20,7 @@ from casadi import SX
 from scipy.interpolate import PPoly
 from scipy.linalg import solve_discrete_are
 
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, check_count
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import CLOSURE_M
@@ -202,8 +202,7 @@ def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes
     body's ZMP from the planned one. The source has two.
     Raises InputError if a foot is out of reach of the hip.
     """
-    if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
-        raise InputError(f"passes must be a whole number >= 1, got {passes!r}")
+    passes = check_count("passes", passes)
     walker = Walker(cycles=cycles, footsteps=footsteps)
     planned = walker.planned_zmp
     # A first gait with the cart at the hip gives the place of the mass; the cart is then moved there.

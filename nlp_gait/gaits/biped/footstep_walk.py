@@ -18,10 +18,9 @@ from nlp_gait.formulation.assembly import Variable, parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
 from nlp_gait.gaits.biped.cycle_motion import between, make_cycle_variables, make_state_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
-from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
-from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.support_phases import compute_sole_means
@@ -199,18 +198,16 @@ def make_footstep_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     return tuple(found)
 
 
-def plan_footstep_walk(
-    body: Body, footholds: tuple[Foothold, ...], steps: int, grid: Grid, goal: Goal, sharing: LoadSharing
-) -> GaitProblem:
+def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, grid: Grid) -> GaitProblem:
     """Return the problem of a walk along footholds, the right foot's first, with least energy per metre."""
     if steps != len(footholds):
         raise InputError(f"steps must be the number of footholds, {len(footholds)}, got {steps}")
-    turning = any(foothold.yaw for foothold in footholds)
+    turning, loads = any(foothold.yaw for foothold in footholds), make_divided_loads(body, "lever")
     body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
     feet, (*others, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
     planners = [make_footstep_planner(body, turning, swings) for swings in (False, True)]
-    phases = make_walk_phases(body, (*others[:-1], *given), planners, sharing, grid, goal)
+    phases = make_walk_phases(body, (*others[:-1], *given), planners, grid, loads)
     sole, margins = body.robot.feet["left"], body.make_sole_margins((0.0, body.feet_y[0]))
     least = round((sole.back_m + sole.front_m) * LEAST_SHARE, 4), round((sole.left_m + sole.right_m) * LEAST_SHARE, 4)
     single = BalanceMargins(margins, compute_sole_means(sole), least)

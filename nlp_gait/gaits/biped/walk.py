@@ -22,7 +22,6 @@ from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, make_state_variables, read_state
 from nlp_gait.gaits.biped.flight import Flight
-from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.joined_phases import (
     ENERGY_PER_METRE,
     STAND,
@@ -32,10 +31,10 @@ from nlp_gait.gaits.biped.joined_phases import (
     list_rows_over_time,
 )
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
-from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.phase_problem import add_robot, make_phase_limits
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Planner, Samples
+from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, make_single_support_loads, make_support_box
 from nlp_gait.gaits.biped.walk_parts import (
     CYCLE_END,
@@ -205,34 +204,11 @@ def make_speed_row(name: str, speed: MX, least: MX, greatest: MX) -> Constraint:
     return Constraint(name=name, unit="m/s", scale=0.01, value=speed, lower=least, upper=greatest, over="once")
 
 
-def make_whole_walk(
-    body: Body, steps: int, sharing: LoadSharing, grid: Grid, goal: Goal, flight: Flight | None
-) -> WholeWalk:
-    """Return the phases of a walk of so many swings, joined."""
-
-    def read(at: InstantPoint, swings: bool) -> PhaseMotion:
-        begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
-        return PhaseMotion(begin, end, at[DURATION], at[RIGHT_FROM], at[STEP], at[LIFT] if swings else None)
-
-    planners = [make_planner(body, partial(read, swings=swings), flight) for swings in (False, True)]
-    phases = make_walk_phases(body, make_phase_variables(body), planners, sharing, grid, goal)
-    variables = make_walk_variables(body, steps)
-    if flight is not None:
-        flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
-        variables = tuple(_raise_lift(variable, body, flight) for variable in variables)
-    return WholeWalk(body=body, steps=steps, variables=variables, phases=phases, flight=flight)
-
-
 def make_walk_phases(
-    body: Body,
-    variables: tuple[Variable, ...],
-    planners: Sequence[Planner],
-    sharing: LoadSharing,
-    grid: Grid,
-    goal: Goal,
+    body: Body, variables: tuple[Variable, ...], planners: Sequence[Planner], grid: Grid, loads: Loader
 ) -> dict[str, Phase]:
-    """Return the phases by kind; planners are those of a right foot that stands, and of one that swings."""
-    margins = make_cycle_margins(body)
+    """Return the phases by kind; planners are those of a right foot that stands, with loads, and of one that swings."""
+    margins, goal = make_cycle_margins(body), make_goal(body, "power")
     box = make_support_box(body.robot, {"L": (0.0, body.feet_y[0]), "R": (0.0, body.feet_y[1])})
     return {
         kind: Phase(
@@ -240,7 +216,7 @@ def make_walk_phases(
             variables=variables,
             duration=DURATION,
             plan=planners[kind == "ssp"],
-            loads=make_single_support_loads(body) if kind == "ssp" else sharing.loads,
+            loads=make_single_support_loads(body) if kind == "ssp" else loads,
             grid=grid,
             limits=(*make_phase_limits(body, own), *body.motors.limits),
             goal=goal,
@@ -257,16 +233,23 @@ def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
     return replace(variable, lower=least, upper=round(least + body.lift_variable.upper, 4))
 
 
-def plan_whole_walk(
-    body: Body, steps: int, grid: Grid, goal: Goal, sharing: LoadSharing, flight: Flight | None = None
-) -> GaitProblem:
+def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:
     """Return the problem of a whole walk of least energy per metre; for the options see ``gaits.nao``."""
+
+    def read(at: InstantPoint, swings: bool) -> PhaseMotion:
+        begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
+        return PhaseMotion(begin, end, at[DURATION], at[RIGHT_FROM], at[STEP], at[LIFT] if swings else None)
+
     steps = check_count("steps", steps, at_least=HALF_STEPS, at_most=MOST_STEPS)
-    walk = make_whole_walk(body, steps, sharing, grid, goal, flight)
+    planners = [make_planner(body, partial(read, swings=swings), flight) for swings in (False, True)]
+    phases = make_walk_phases(body, make_phase_variables(body), planners, grid, make_divided_loads(body, "lever"))
+    variables = make_walk_variables(body, steps)
     if flight is None:
-        return make_walk_problem(walk, walk.variables)
-    treads = flight.list_treads(steps - 1)
-    return make_walk_problem(walk, walk.variables, lambda at, count: treads).fix(**{STEP: flight.run_m})
+        return make_walk_problem(WholeWalk(body=body, steps=steps, variables=variables, phases=phases), variables)
+    flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
+    variables, treads = tuple(_raise_lift(v, body, flight) for v in variables), flight.list_treads(steps - 1)
+    walk = WholeWalk(body=body, steps=steps, variables=variables, phases=phases, flight=flight)
+    return make_walk_problem(walk, variables, lambda at, count: treads).fix(**{STEP: flight.run_m})
 
 
 def make_walk_problem(

@@ -124,20 +124,19 @@ def humanoid_walk(
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
-    goal, sharing = make_goal(body, "power"), share_load(body, "lever")
     if footholds:
         if slope_deg or stair_rise_m or stair_run_m:
             raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")
         places = parse_footholds(footholds)
         check_turns(body, places)
-        return plan_footstep_walk(body, places, steps, grid, goal, sharing)
+        return plan_footstep_walk(body, places, steps, grid)
     flight = None
     if stair_rise_m or stair_run_m:
         foot, clearance_m = body.robot.feet["left"], body.scale_length(CLEARANCE_M)
         flight = Flight(rise_m=stair_rise_m, run_m=stair_run_m, foot=foot, clearance_m=clearance_m)
         if slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")
-    return plan_whole_walk(body, steps, grid, goal, sharing, flight)
+    return plan_whole_walk(body, steps, grid, flight)
 
 
 def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:

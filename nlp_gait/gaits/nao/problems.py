@@ -172,13 +172,12 @@ def nao_walk(
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
-    goal, sharing = make_goal(body, "power"), share_load(body, "lever")
     if not footholds:
-        return plan_whole_walk(body, steps, grid, goal, sharing)
+        return plan_whole_walk(body, steps, grid)
     places = parse_footholds(footholds)
     if slope_deg or any(place.yaw for place in places):
         raise InputError("footholds of NAO are on a level floor and all point forward; leave out slope_deg and angles")
-    return plan_footstep_walk(body, places, steps, grid, goal, sharing)
+    return plan_footstep_walk(body, places, steps, grid)
 
 
 @maker

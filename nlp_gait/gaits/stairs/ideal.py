@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.errors import InputError
+from nlp_gait.errors import InputError, check_count
 from nlp_gait.formulation import Array, Display, GaitProblem, Grid, NumericPoint, Objective, Signals, SolverHints, maker
 from nlp_gait.formulation.assembly import parameters
 from nlp_gait.formulation.blocks import Block, Layout
@@ -75,8 +75,7 @@ def stairs_ideal(
     Source:
         Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
     """
-    if intervals < 10:
-        raise InputError(f"intervals must be a whole number >= 10, got {intervals!r}")
+    intervals = check_count("intervals", intervals, at_least=10)
     if not 0 < sole_off_s < toe_off_s < STEP_TIME:
         raise InputError(f"times must satisfy 0 < sole_off_s < toe_off_s < {STEP_TIME}, got {sole_off_s}, {toe_off_s}")
     sole_off, toe_off = (max(1, round(time / STEP_TIME * intervals)) for time in (sole_off_s, toe_off_s))
