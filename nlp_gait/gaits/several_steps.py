@@ -32,11 +32,7 @@ def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.
 
 
 def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals:
-    """Return one walk of steps that all start on the left foot at x = 0: every second one is mirrored.
-
-    Places (K, 4) are where each step's origin is (x, y, z) [m] and its yaw [rad]; each begins in the state in which the previous
-    one ended.
-    """
+    """Return a walk of steps on the left foot at x = 0, every second mirrored, from places (K, 4): x, y, z [m], yaw [rad]."""
     arrays: dict[str, list[Array]] = {name: [] for name in steps[0].arrays}
     images: dict[int, Signals] = {}
     begin = 0.0

@@ -21,9 +21,7 @@ CLEAR_RANGE = 1.5  # a knee bends to the side on which its range is this many ti
 class Leg:
     """Six turning joints from the torso to a foot, at zero angles, in the torso's axes and from its origin [m].
 
-    Legs of equal content are equal.
-
-    Raises InputError without a bending knee, a hip with three different axes, or an ankle with two.
+    Legs of equal content are equal. Raises InputError without a knee, three different axes at the hip, or two at the ankle.
     """
 
     joints: tuple[str, ...]  # names, the hip's first

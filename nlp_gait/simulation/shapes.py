@@ -51,11 +51,7 @@ Shape: TypeAlias = Capsule | Prism
 
 
 def make_shapes(robot: Robot, sole: str = "rectangle", welded: Collection[str] = ()) -> dict[str, list[Shape]]:
-    """Return the shapes by link, in link axes: capsules between joints, a ball for a head, prisms for soles.
-
-    The shapes of the children of welded joints, which the simulated robot does not have, move to the parents. Raises InputError
-    for an unknown outline of the soles.
-    """
+    """Return capsules, a ball for a head and prisms for soles by link, in link axes; welded joints' move to the parents."""
     shapes: dict[str, list[Shape]] = {name: [] for name in robot.links}
     low = _find_low_joints(robot)
     for joint in robot.joints.values():

@@ -139,10 +139,7 @@ class Walker:
     def follow(
         self, zmp: Callable[[Array], Array], height_m: float, *, advances: bool = True
     ) -> Callable[[Array], Array]:
-        """Return the path (2, k) of the cart's mass in the cycle whose ZMP follows a repeating, mirrored one [m].
-
-        That ZMP (2, k) of a cycle is a function of times (k,). The walk advances by a step each time; a correction does not.
-        """
+        """Return the path (2, k) [m] of a cart whose ZMP follows a repeating, mirrored one, perhaps a step ahead each time."""
         period, begins = self.footsteps.period_s, self.cycle_step * self.footsteps.period_s
         t = np.arange(math.ceil((begins + period + PREVIEW_S) / self.sample_s) + 2) * self.sample_s
         step = np.floor(t / period + 1e-9)

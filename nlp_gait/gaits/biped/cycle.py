@@ -143,11 +143,7 @@ class WalkingCycle:
 def make_walking_cycle(
     body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool
 ) -> WalkingCycle:
-    """Return both phases of the cycle, joined.
-
-    The goal is that of each phase; the cycle's is their mean over time, or energy per metre. At a given speed the step length
-    follows from it.
-    """
+    """Return both phases of the cycle, joined, each with the goal; at a given speed the step length follows from it."""
     *motion, step = make_cycle_variables(body)
     variables = (*motion, *sharing.variables, step)
     plans, margins = make_cycle_planners(body), make_cycle_margins(body)
@@ -206,11 +202,7 @@ def plan_cycle(body: Body, grid: Grid, objective: CycleObjective, sharing: LoadS
 def make_cycle_problem(
     name: str, cycle: WalkingCycle, start: Start | None = None, *, rows_over_time: bool, repeats: bool
 ) -> GaitProblem:
-    """Return the problem of a cycle.
-
-    With ``rows_over_time`` its constraints are known between the samples, too; ``repeats`` says that the mirror image of a gait
-    is the next step. Without ``start`` any point within the bounds is a start point.
-    """
+    """Return the problem of a cycle, perhaps with rows between samples; ``repeats``: a gait's mirror image is the next step."""
     problem = GaitProblem(
         name=name,
         title=f"{cycle.body.title}, walking cycle: least {cycle.objective.name.replace('_', ' ')}",

@@ -205,10 +205,7 @@ def make_angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX
 
 
 class FootClearance(Limit):
-    """A planned swing foot above the ground between its ends, and high enough in the middle of its path halfway in time.
-
-    The path (3,) has the height above the ground, and ``middle`` is its x halfway [m]; the least height there is a variable.
-    """
+    """A planned swing foot above the ground between its ends, and high enough in the middle of its path, an x, at half time."""
 
     def __init__(self, path: Trace, middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height

@@ -205,11 +205,7 @@ SWITCH_LOAD = (
 
 
 class FootLimits(Limit):
-    """What both soles can bear at every sample, and how fast load may pass from the left to the right foot.
-
-    That the ground does not pull follows from friction and pressure together. ``load_slope`` is the derivative of the load on the
-    right sole with respect to the phase [N].
-    """
+    """What both soles can bear at every sample, how fast load may pass; ``load_slope`` is the right sole's by phase [N]."""
 
     reads_wrenches = True
     parameters = table(

@@ -41,10 +41,7 @@ def make_goal(body: Body, criterion: Criterion) -> Goal:
 
 
 def make_phase_limits(body: Body, balance: limits.BalanceMargins, *, solved: bool = True) -> tuple[limits.Limit, ...]:
-    """Return the limits of every phase (Gupta, Pratihar, Deb 2023, sections 4.1 and 4.2), and those of the robot's drives.
-
-    ``solved`` says that the legs' angles are computed from their feet.
-    """
+    """Return the limits of every phase (sections 4.1 and 4.2) and of the drives; ``solved``: angles follow from the feet."""
     size = body.torque_scale
     return (
         limits.JointLimits(body.robot, body.planned),
@@ -89,11 +86,7 @@ def add_robot(
     steps: int | None = None,
     ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None,
 ) -> GaitProblem:
-    """Return the problem with the robot that its gaits are drawn and simulated with.
-
-    ``repeats`` says that a gait is one step, whose mirror image is the next one; ``steps`` are those of a whole walk, and
-    ``ground`` its stairs.
-    """
+    """Return the problem with its robot for drawings and simulations; ``repeats``: a gait's mirror image is the next step."""
     simulated = replace(body.simulated, armatures_kgm2=body.robot.armatures_kgm2)
     model = SimulationModel(
         robot=simulated,

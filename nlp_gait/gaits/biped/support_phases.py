@@ -109,11 +109,7 @@ def place_soles(body: Body, step_m: float) -> dict[str, Point2]:
 
 
 def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
-    """Return the hip's place at both ends of double support in x and in y [m].
-
-    The hip moves from a sixth of a step ahead of the rear foot to a sixth behind the front one, and from halfway to the left
-    foot to halfway to the right one.
-    """
+    """Return the hip's x, from a sixth of a step ahead of the rear foot to one behind the front foot, and y, at both ends [m]."""
     (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
     sixth = (front_x - rear_x) / 6
     return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)

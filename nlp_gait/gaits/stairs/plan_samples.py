@@ -127,9 +127,8 @@ def phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
 def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample to the fields of ``PlanSamples``.
 
-    Its inputs are s, the current phase, governing parameters, size, reach margin and rear share.
-
-    The rear toe carries a share of the whole ground force, which falls from ``rear share`` to zero over the double support.
+    Its inputs are s, the current phase, governing parameters, size, reach margin and rear share: that of the
+    whole ground force on the rear toe at the start, which falls to zero over the double support.
     """
     inputs, plan, stair, step = _make_symbols(ops, kind)
     rear_share = SX.sym("rear_share")

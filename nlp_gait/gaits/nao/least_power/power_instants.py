@@ -144,11 +144,7 @@ def double_support_instants(
     rule: Division,
     cosine: float,
 ) -> PowerPhase:
-    """Return double support: each leg stands on its own foot.
-
-    Places of the ankles by side, and both ends of the torso's origin in x and in y, are in metres; arm joints move from angle to
-    angle [rad]. For the largest cosine of the knee's angle see ``leg_frames``.
-    """
+    """Return double support: each leg stands on its own foot at ``soles`` [m]; for ``cosine`` see ``leg_frames``."""
     ankles = {side: SX(DM([*xy, measure_leg(robot, side).ankle_height_m])) for side, xy in soles.items()}
     feet_y = (measure_leg(robot, "L").hip_m[1], measure_leg(robot, "R").hip_m[1])
     weight = robot.mass_kg * GRAVITY
