@@ -28,8 +28,13 @@ from nlp_gait.gaits.stairs.stair import GOVERNING_VARIABLES
 
 MATCH = 1e-3  # relative: a start that ends this close to the best has found it
 # Headings and formats of columns for each case, by their places in the text.
-CASE_COLUMNS = {"papers": "paper {}", "jerks": "least jerk {}", "energies": "least energy {}"}
-CASE_COLUMNS |= {"cases_4f": ".4f", "cases_6g": ".6g"}
+CASE_COLUMNS = {
+    "papers": "paper {}",
+    "jerks": "least jerk {}",
+    "energies": "least energy {}",
+    "cases_4f": ".4f",
+    "cases_6g": ".6g",
+}
 
 
 def _run_stairs(runner: Runner, effort: StairsEffort) -> StairsFindings:

@@ -31,8 +31,10 @@ _TEXTS = {
     "MUL": "{0} * {1}",
     "DIV": "{0} / {1}",
     "NEG": "-{0}",
+    "SQ": "{0} * {0}",
+    "TWICE": "{0} + {0}",
+    "INV": "{f}number(1.0) / {0}",
 }
-_TEXTS |= {"SQ": "{0} * {0}", "TWICE": "{0} + {0}", "INV": "{f}number(1.0) / {0}"}
 _TEXTS |= {name: f"{{f}}{name.lower()}({{0}})" for name in _UNARY.split()}
 _TEXTS |= {name: f"{{f}}{_NAMES.get(name, name.lower())}({{0}}, {{1}})" for name in _BINARY.split()}
 EXPRESSIONS: dict[int, str] = {getattr(ca, f"OP_{name}"): text for name, text in _TEXTS.items()}

@@ -43,8 +43,16 @@ HIP_PLACES = tuple(f"hip_{axis}_end_m" for axis in "xyz")
 HIP_RATES = tuple(f"hip_v{axis}_end_m_s" for axis in "xyz")
 # Distances from the planned end that cost 1: of the hip's place and velocity, of both along z, of the time, the foothold, and the
 # DCM from what the foothold makes up for; and the shift of the ZMP.
-UNITS = {"place": 0.01, "velocity": 0.06, "height": 0.01, "rise": 0.02, "time": 0.1}
-UNITS |= {"foot": 0.3, "miss": 0.03, "shift": 0.2}
+UNITS = {
+    "place": 0.01,
+    "velocity": 0.06,
+    "height": 0.01,
+    "rise": 0.02,
+    "time": 0.1,
+    "foot": 0.3,
+    "miss": 0.03,
+    "shift": 0.2,
+}
 # A ZMP outside its polygon costs OUTSIDE_COST for each of these units.
 OUTSIDE_UNIT, OUTSIDE_COST, BEYOND_COST = 0.001, 10.0, 3000.0
 

@@ -264,8 +264,13 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
     )
 
 
-DRAWN = {"Neck", "Head", *(f"{side}{link}" for side in "LR" for link in ("Pelvis", "Tibia", "Shoulder", "Elbow"))}
-DRAWN |= {"l_wrist", "r_wrist"}
+DRAWN = {
+    "Neck",
+    "Head",
+    *(f"{side}{link}" for side in "LR" for link in ("Pelvis", "Tibia", "Shoulder", "Elbow")),
+    "l_wrist",
+    "r_wrist",
+}
 LETTER = {LEFT: "L", RIGHT: "R"}
 
 

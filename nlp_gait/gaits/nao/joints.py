@@ -17,11 +17,21 @@ JOINTS = tuple(
 PLANNED_JOINTS = tuple(f"{side}{joint}" for side in "LR" for joint in LEG_JOINTS)
 KNEES = ("LKneePitch", "RKneePitch")
 # Section 3.1 [rad].
-HELD_ARM_ANGLES = {"LShoulderRoll": 0.26, "RShoulderRoll": -0.26, "LElbowYaw": -1.5, "RElbowYaw": 1.5}
-HELD_ARM_ANGLES |= {"LWristYaw": 0.0, "RWristYaw": 0.0}
+HELD_ARM_ANGLES = {
+    "LShoulderRoll": 0.26,
+    "RShoulderRoll": -0.26,
+    "LElbowYaw": -1.5,
+    "RElbowYaw": 1.5,
+    "LWristYaw": 0.0,
+    "RWristYaw": 0.0,
+}
 # All joints of arms that do not swing: in the middle of Table 3.
-RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {"LShoulderPitch": 1.5, "RShoulderPitch": 1.5}
-RESTING_ARM_ANGLES |= {"LElbowRoll": -0.53, "RElbowRoll": 0.53}
+RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {
+    "LShoulderPitch": 1.5,
+    "RShoulderPitch": 1.5,
+    "LElbowRoll": -0.53,
+    "RElbowRoll": 0.53,
+}
 
 FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)  # the axis about which each joint must turn
 AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))

@@ -31,8 +31,18 @@ N = len(biped.LINKS)
 # k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
 # slope and the share of the links' spin in the ZMP, torques besides the controller's. Nothing is ever differentiated with
 # respect to it.
-GIVEN = {"aim": 2 * N, "time": 1, "size": 2, "ground": 3, "gravity_share": 1, "disturbance": 1}
-GIVEN |= {"base": 6, "slope": 1, "spin": 1, "torque": N}
+GIVEN = {
+    "aim": 2 * N,
+    "time": 1,
+    "size": 2,
+    "ground": 3,
+    "gravity_share": 1,
+    "disturbance": 1,
+    "base": 6,
+    "slope": 1,
+    "spin": 1,
+    "torque": N,
+}
 TORSO = biped.LINKS.index("UH")
 # Controlled angles as sums of link angles, in the order of LINKS. Joint angles are between links; the ninth is that of the stance
 # sole, whose torque the ground gives. As printed, knees are relative to thighs (27), (28), other angles from the forward axis.

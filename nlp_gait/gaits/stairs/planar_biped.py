@@ -26,8 +26,17 @@ GRAVITY = 9.81  # [m/s^2]
 # Order of the angles, as in the paper's Table I: thigh, shank of both legs, torso, sole and toe of both feet.
 LINKS = ("HK", "KA", "HK'", "K'A'", "UH", "AS", "ST", "A'S'", "S'T'")
 # Ends of every link.
-ENDS = {"HK": ("H", "K"), "KA": ("K", "A"), "HK'": ("H", "K'"), "K'A'": ("K'", "A'"), "UH": ("H", "U")}
-ENDS |= {"AS": ("A", "S"), "ST": ("S", "T"), "A'S'": ("A'", "S'"), "S'T'": ("S'", "T'")}
+ENDS = {
+    "HK": ("H", "K"),
+    "KA": ("K", "A"),
+    "HK'": ("H", "K'"),
+    "K'A'": ("K'", "A'"),
+    "UH": ("H", "U"),
+    "AS": ("A", "S"),
+    "ST": ("S", "T"),
+    "A'S'": ("A'", "S'"),
+    "S'T'": ("S'", "T'"),
+}
 # Links in the order in which they are reached from a base, and whether they are passed from their far end.
 _SWING = (("UH", 1), ("HK", 1), ("KA", 1), ("AS", 1), ("ST", 1))
 _FOOT = (("A'S'", 1), ("S'T'", 1))

@@ -19,8 +19,15 @@ SETBACK = 0.06  # distance of an edge behind the ankle that stands on the step [
 CASES = {1: (0.5588, 0.64), 2: (0.508, 0.70), 3: (0.5588, 0.72)}
 
 # Absolute link angles [rad]: leg and foot clockwise from the forward axis, torso counter-clockwise.
-ANGLE_LIMITS = {"HK": (0.2, 2.4), "KA": (0.3, 3.2), "HK'": (0.3, 2.4), "K'A'": (0.8, 2.8)}
-ANGLE_LIMITS |= {"UH": (0.8, 1.75), "AS": (-0.6, 1.2), "ST": (-0.6, 1.2)}
+ANGLE_LIMITS = {
+    "HK": (0.2, 2.4),
+    "KA": (0.3, 3.2),
+    "HK'": (0.3, 2.4),
+    "K'A'": (0.8, 2.8),
+    "UH": (0.8, 1.75),
+    "AS": (-0.6, 1.2),
+    "ST": (-0.6, 1.2),
+}
 KNEE_LIMITS = (0.1, 2.5)  # [rad]
 KNEES = {"knee": ("HK", "KA"), "knee'": ("HK'", "K'A'")}
 
