@@ -245,7 +245,6 @@ def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:
 def _check_shares(
     phase: PhaseFindings, select: Callable[[Array], Any], is_most: Callable[[list[float]], bool], **values: Any
 ) -> Check:
-    """Check the shares of the searches' solutions that are selected: at the ends of their runs, and of all feasible ones."""
     holds = []
     for key, whole in (("shares", False), ("whole", True)):
         shares = {name: float(select(x).mean()) for name, x in phase.gather_solutions(whole=whole).items()}
@@ -267,7 +266,6 @@ def _check_lateral(phase: PhaseFindings, swarm: str) -> Check:
 
 
 def _check_wider(findings: NaoFindings, position: int, ranges: Sequence[str] = ()) -> Check:
-    """Check how much wider a velocity's range of cheap optima is in double support [%]; ``ranges`` are the printed ones."""
     share, printed = 5 * NEARLY_OPTIMAL, [PAPER.velocity_ranges[name] for name in ranges]
     ssp, dsp = (float(np.ptp(phase.range_within(position, share))) for phase in findings.phases)
     values = {"share": 100 * share, "ssp": ssp, "dsp": dsp, "factor": dsp / ssp if ssp else math.inf}

@@ -124,7 +124,6 @@ def _draw_swing(findings: NaoFindings) -> Figure:
 
 
 def _draw_gait(phase: PhaseFindings) -> Figure:
-    """Fig. 20: IPOPT's gait from behind and from the side."""
     x = np.array(get_point(phase.optimum))
     duration, every_s = float(x[phase.paper.duration]), phase.paper.poses_every_s
     skeleton = make_skeleton(Result(problem=phase.problem, x=x), POSE_SAMPLES / duration)

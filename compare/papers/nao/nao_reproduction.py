@@ -64,7 +64,6 @@ def _run_phases(runner: Runner, effort: NaoEffort) -> dict[str, Any]:
 
 
 def _load_all_points(store: Store, phase: PrintedPhase, searches: Sequence[Task]) -> dict[str, FeasiblePoints]:
-    """Feasible solutions of all runs, by search."""
     points = {}
     for name in nao.SEARCHES:
         tasks = [task for task in searches if (task.problem.title, task.title) == (phase.problem, name)]
@@ -284,7 +283,6 @@ def _list_indexes(phase: PhaseFindings) -> Rows:
 
 
 def _list_choices(phase: PhaseFindings) -> Rows:
-    """The printed solutions and IPOPT's optimum with each other choice."""
     rows, every = [], {"": phase.printed_here, **phase.printed_by_choice}
     for choice, printed in every.items():
         title = PAPER.choices[choice].title if choice else "as here"

@@ -150,7 +150,6 @@ def collect_points(front: Sequence[FrontPoint], runs: Iterable[Sequence[Snapshot
 
 
 def _check(is_true: Callable[[dict[str, Measures]], Tested], findings: ParetoFindings) -> Check:
-    """Check a claim about the searches in each phase with each budget."""
     cases = {}
     for phase, budget in [(p, budget) for p in findings.phases for budget in p.budgets]:
         runs = {name: phase.measures[name, budget] for name in ALGORITHMS}
@@ -159,7 +158,6 @@ def _check(is_true: Callable[[dict[str, Measures]], Tested], findings: ParetoFin
 
 
 def _check_extreme(findings: ParetoFindings, search: str, ends: Mapping[str, str]) -> Check:
-    """Check whether a search has the least or the greatest median of each measure, significantly before the next."""
     return _check(partial(_is_extreme_at_ends, search, ends), findings)
 
 
@@ -221,7 +219,6 @@ def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], 
 
 
 def _find_medians(runs: dict[str, Measures], measure: str) -> dict[str, float]:
-    """Return the median over all runs of a measure at their ends, by search."""
     return {name: float(np.median(m.get_end(measure))) for name, m in runs.items()}
 
 

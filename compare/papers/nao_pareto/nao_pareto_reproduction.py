@@ -107,7 +107,6 @@ def _make_constraints(phase: PhaseFronts) -> Rows:
 
 
 def _make_running(phase: PhaseFronts) -> Rows:
-    """Medians at each look of the runs with the largest budget."""
     chosen = [m for (_, budget), m in phase.measures.items() if budget == phase.budgets[-1]]
     columns = [chosen[0].evaluations]
     columns += [100 * np.median(m.hypervolume, axis=0) for m in chosen] + [np.median(m.igd, axis=0) for m in chosen]
@@ -145,7 +144,6 @@ def _draw_running(phase: PhaseFronts) -> Figure:
 
 
 def _draw_fronts(phase: PhaseFronts) -> Figure:
-    """The true front with its knees, and the ends of all runs with the largest budget, a panel for each algorithm."""
     budget, criterion = phase.budgets[-1], phase.criterion
     line = np.array([(p.value, p.power_W) for p in phase.front])
     figure = new_figure(6.6, 4.6)

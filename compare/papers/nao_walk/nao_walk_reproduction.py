@@ -163,7 +163,6 @@ def _draw_speeds(findings: NaoWalkFindings) -> Figure:
 
 
 def _draw_drives(findings: NaoWalkFindings) -> Figure:
-    """Energy, falls and largest speed of the robot's own walk over the stiffness of its drives."""
     figure = new_figure(6.3, 2.8)
     energy, falls, speed = figure.subplots(1, 3)
     shares = findings.effort.stiffnesses

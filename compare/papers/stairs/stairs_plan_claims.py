@@ -66,7 +66,6 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
 
 
 def _collect(findings: StairsFindings, what: str) -> dict[str, Series]:
-    """Return variables and indexes of the best plans of all cases."""
     best = [{**run.x, **run.verdict.indexes} for run in (findings.best(what, case) for case in findings.cases)]
     return {name: Series(one[name] for one in best) for name in best[0]}
 
@@ -378,7 +377,6 @@ def _differentiate_ankle(findings: StairsFindings, what: str, case: int) -> tupl
 
 
 def _check_cycloid_begin(findings: StairsFindings) -> Check:
-    """At t = 0 by (2) and (3), and where the ankle catches the cycloid."""
     start = 6 * TABLE_3["sole_angle_rad"] / TABLE_3["t1_s"] ** 2 * toe_foot_biped().sole_m
     caught = float(np.linalg.norm(_differentiate_ankle(findings, "jerk", DRAWN_CASE)[1][-1, 0]))
     return compare_levels([0.0, 0.0], [start, caught], start=start, caught=caught)
@@ -391,7 +389,6 @@ def _check_cycloid_end(findings: StairsFindings) -> Check:
 
 
 def _check_jerk_terms(_: StairsFindings) -> Check:
-    """Shares of the jerk terms in (31) and (32), of the acceleration terms, with the maxima of Table IV."""
     ratios = [100 * row.jerk * QUANTUM / row.acceleration for row in TABLE_4.values()]
     speeds, places = (Series(ratio / part for ratio in ratios) for part in (2, 3))
     return decide(ClaimVerdict.UNTESTABLE, speeds=speeds, places=places)

@@ -201,7 +201,6 @@ def _list_step(findings: StairsFindings, case: int, what: str) -> list[Value]:
 
 
 def _list_ideal(findings: StairsFindings, case: int) -> list[Value]:
-    """Efforts and energies of the ideal, both plans and the tracked step, and what becomes of the former in the engine."""
     runs = [findings.best(what, case) for what in CLIMBS]
     efforts, energies = [runs[0].verdict.objective], [run.verdict.indexes["energy_J"] for run in runs]
     for what in CLIMBS[1:]:

@@ -103,7 +103,6 @@ def _list_table_3(findings: StairsFindings) -> Rows:
 
 
 def _list_plans(findings: StairsFindings, case: int) -> Rows:
-    """Best plan of each solver, with the ends of all its runs."""
     rows: list[Sequence[Value]] = []
     for what, solver in product(planning.PLANS, (IPOPT, *ALGORITHMS)):
         found, verdict = findings.runs[f"{what}-{case}", solver], findings.best(what, case, solver).verdict

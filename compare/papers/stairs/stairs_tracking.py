@@ -160,7 +160,6 @@ def _describe(values: Mapping[str, Series]) -> str:
 
 
 def _collect(findings: StairsFindings, index: str, names: Iterable[str] = READINGS) -> dict[str, Series]:
-    """Return a quantity in all cases under those of the named choices that were run."""
     run = [name for name in names if name in findings.effort.choices]
     return {name: Series(read_index(get_best(findings, case, name), index) for case in findings.cases) for name in run}
 
@@ -210,7 +209,6 @@ def _check_following(findings: StairsFindings) -> Check:
 
 
 def _get_instants(findings: StairsFindings, decides: Decides) -> dict[str, list[dict[str, Any]]]:
-    """Return what Algorithm 4 finds in all cases, by reading."""
     others, cases = findings.others, findings.cases
     return {name: [others[f"instants-{name}-{decides}-{case}"] for case in cases] for name in findings.effort.instants}
 
@@ -277,6 +275,5 @@ def _check_torso(findings: StairsFindings, index: str) -> Check:
 
 
 def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, float]]:
-    """Return the indexes of the best gains of a reading with an upright torso, in all cases."""
     pairs = [(make_choice_spec(findings, case, name), get_best(findings, case, name)) for case in findings.cases]
     return [evaluate(spec.load(), [*get_point(best)[:2], np.pi / 2]).indexes for spec, best in pairs]

@@ -104,7 +104,6 @@ def list_x(findings: Walk12Findings, solver: str = IPOPT, horizon: Horizon | Non
 
 
 def _check_x(findings: Walk12Findings, solver: str, names: str, horizon: Horizon | None = None) -> Check:
-    """Check the variables with these symbols [mm]."""
     columns = ["snHh".index(name) for name in names]
     printed = 1e3 * np.array([row.x for row in (TABLE_4 if horizon else TABLE_3)])[:, columns]
     ours = list_x(findings, solver, horizon)[:, columns]
@@ -147,7 +146,6 @@ def _check_ends(findings: Walk12Findings) -> Check:
 
 
 def _check_masses(_: Walk12Findings, motors_kg: Sequence[float]) -> Check:
-    """Check the mass of a motor by that of Table I; ``shares`` are what Table I has beyond twelve motors, over their mass [%]."""
     robot = load_point_mass_biped()
     mass = 2 * (robot.knee_mass_kg + robot.foot_mass_kg + robot.hip_mass_kg) + robot.waist_mass_kg
     shares = [100 * (mass / (12 * motor) - 1) for motor in motors_kg]
@@ -192,7 +190,6 @@ def _check_margin_by_print(_: Walk12Findings) -> Check:
 
 
 def _check_static_stability(findings: Walk12Findings) -> Check:
-    """Report when (8) is satisfied; no verdict, since it is for single support, whose times are not printed."""
     optima = [compute_stable_share(tuple(x / 1e3)).share for x in list_x(findings)]
     shares = [stable.share for stable in findings.stable]
     texts = [", ".join(f"{1 - share:.3f}" for share in values) for values in (shares, optima)]
@@ -201,7 +198,6 @@ def _check_static_stability(findings: Walk12Findings) -> Check:
 
 
 def _check_stable(findings: Walk12Findings, weights: Sequence[float], throughout: bool) -> Check:
-    """Check that printed gaits satisfy (8) throughout a step, and the optimum of the last lambda too, or that they do not."""
     shares = [stable.share for stable in findings.stable]
     chosen = [share for row, share in zip(TABLE_3, shares, strict=True) if row.weight in weights]
     optimum = compute_stable_share(tuple(list_x(findings)[-1] / 1e3)).share
@@ -251,7 +247,6 @@ def count_upright(walks: Sequence[WalkedGait], drives: str, by: str = "") -> str
 
 
 def _check_walks(findings: Walk12Findings, step_time_s: float) -> Check:
-    """Report which gaits walk; no verdict, since the drives decide."""
     walks = [walk for walk in findings.walks if walk.step_time_s == step_time_s]
     same = [row.weight for row in TABLE_3 if row.weight < 0.9]
     texts = []
@@ -271,7 +266,6 @@ def _describe_walks(walks: Sequence[WalkedGait]) -> str:
 
 
 def _check_same_fate(findings: Walk12Findings) -> Check:
-    """Report how many walks do not fall at both step times, with all drives of ten set-points for each step; no verdict."""
     drives = [name for name, (_, set_points, *_) in DRIVES.items() if set_points]
     texts = [f"{name}: {count_upright(findings.walks, name, 'paper')}" for name in drives]
     return decide(ClaimVerdict.UNTESTABLE, found="; ".join(texts) if findings.walks else NO_ENGINE)

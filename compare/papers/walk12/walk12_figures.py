@@ -42,7 +42,6 @@ def draw_figures(findings: Walk12Findings) -> dict[str, Figure]:
 
 
 def _gaits(findings: Walk12Findings, weight: float) -> dict[str, Sequence[float]]:
-    """Return x of the paper's gait and IPOPT's at a lambda, by label."""
     return {"paper's gait": find_row(weight).x, "IPOPT": get_point(findings.optimum(PAPER, weight))}
 
 
@@ -110,7 +109,6 @@ def _draw_zmp(gaits: Mapping[str, Sequence[float]]) -> Figure:
 
 
 def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) -> Figure:
-    """The Pareto front of Q and s next to the optima of the weighted sum, and the latter over lambda."""
 
     def plane_of(path: Sequence[PathPoint]) -> tuple[list[float], list[float]]:
         return [MILLIMETRES * at.step_length_m for at in path], [1e3 * at.Q_m2s for at in path]
@@ -134,7 +132,6 @@ def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) ->
 
 
 def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
-    """Footprints and the waist's path over one full circle, seen from above."""
     arrays = follow(x, steps=int(np.ceil(2 * np.pi / turn_rad)), intervals=20, turn_rad=turn_rad)
     figure = new_figure(3.6, 3.4)
     axes = figure.subplots()

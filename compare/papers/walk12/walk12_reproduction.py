@@ -190,7 +190,6 @@ def _describe_reading(findings: Walk12Findings, zmp: Zmp) -> str:
 
 
 def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
-    """Effects of the reach limit, the quadrature and the GA's settings that are not as printed."""
     weights = runs.BENT_FREELY_WEIGHTS
     unbent = [findings.best(f"no-reach-margin-{weight:g}") for weight in weights]
     simpson = [findings.best(f"simpson-{row.weight:g}") for row in TABLE_3]
@@ -225,7 +224,6 @@ def _compute_ga_gaps(findings: Walk12Findings, titles: Iterable[str]) -> tuple[f
 
 
 def _list_simulator_numbers() -> dict[str, Any]:
-    """Return the numbers of the simulated robot that the paper does not print."""
     world = Xml.fromstring(resources.files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     contact, drive = world.find("default/geom"), Drive()
     assert contact is not None  # in our own file
@@ -246,7 +244,6 @@ def _list_simulator_numbers() -> dict[str, Any]:
 
 
 def _find_bound(record: RunRecord) -> float | None:
-    """Return the shipped proven bound on f of a record's problem."""
     return find_reference(record.definition["problem"]).bound
 
 
@@ -281,7 +278,6 @@ def _make_tables(findings: Walk12Findings) -> dict[str, Rows]:
 
 
 def _list_quadratures(findings: Walk12Findings) -> Rows:
-    """Optimal f under the paper's normalisation by each rule for Q, with the shipped proven bounds."""
     rows = []
     for row in TABLE_3:
         best, simpson = findings.optimum(PAPER, row.weight), findings.best(f"simpson-{row.weight:g}")
