@@ -130,37 +130,30 @@ class Reproduction(Generic[E, F]):
 
     def write_report(self, folder: Path, findings: F, effort: E, runner: Runner, sessions: Sequence[Session]) -> None:
         """Write the report, tables, figures and ``summary.json``."""
-        template = resources.files("compare.papers") / self.name / f"{self.name}_report.md"
-        values = self.values(findings)
+        template = (resources.files("compare.papers") / self.name / f"{self.name}_report.md").read_text(
+            encoding="utf-8"
+        )
+        values, records = self.values(findings), runner.records
         claims = self.check_claims(findings, values)
         differences = fill_differences(self.printed.differences, values)
         with style():
             figures = self.figures(findings)
+        whole = [make_claims_table(claims.values()), make_differences_table(differences)]
         document = fill_template(
-            template.read_text(encoding="utf-8"),
-            values=values,
-            tables=self.tables(findings),
-            figures=figures,
-            whole_tables=[make_claims_table(claims.values()), make_differences_table(differences)],
+            template, values=values, tables=self.tables(findings), figures=figures, whole_tables=whole
         )
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
-        provenance = Section(
-            title="Versions, machine, seeds and settings",
-            parts=(
-                text_table(
-                    ("effort", "value"), [(k, format_settings(v)) for k, v in asdict(effort).items()], prose=True
-                ),
-                TERMS,
-                make_reference_table(runner.records),
-                make_solver_table(runner.records),
-                *(make_session_section(k, session) for k, session in enumerate(sessions, start=1)),
-            ),
-        )
+        settings = [(name, format_settings(value)) for name, value in asdict(effort).items()]
+        parts = (text_table(("effort", "value"), settings, prose=True), TERMS, make_reference_table(records))
+        calls = (make_session_section(k, session) for k, session in enumerate(sessions, start=1))
+        title = "Versions, machine, seeds and settings"
+        provenance = Section(title=title, parts=(*parts, make_solver_table(records), *calls))
+        citations = make_citation_section(record.definition["problem"] for record in records)
         document = replace(
             document,
             title=document.title if label == "full" else f"{document.title} ({label})",
             verdict=[*NOTES[label], count_verdicts(claims)],
-            parts=(*document.parts, provenance, make_citation_section(r.definition["problem"] for r in runner.records)),
+            parts=(*document.parts, provenance, citations),
         )
         write_document(folder, document)
         write_parts(folder, self.csv_tables(findings))

@@ -56,7 +56,8 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
 
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         if self._strategy is None:
-            self._strategy = self._begin(self._centre(X[rule.best(f, violation)]))
+            idle = np.full(max(0, 2 - self._cube.size), 0.5)
+            self._strategy = self._begin(np.concatenate([self._cube.shares(X[rule.best(f, violation)]), idle]))
         else:
             self._strategy.tell(self._asked, self._costs(X, f, violation, rule))
             if self._strategy.stop():
@@ -90,10 +91,6 @@ class CmaEsSearch(PopulationSearch[CmaEs]):
             "verb_log": 0,
         }
         return CMAEvolutionStrategy(centre, self._settings.sigma, options)
-
-    def _centre(self, x: Array) -> Array:
-        """Position (max(2, free),) of a point in the unit cube."""
-        return np.concatenate([self._cube.shares(x), np.full(max(0, 2 - self._cube.size), 0.5)])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -106,24 +106,20 @@ class PymooSearch(PopulationSearch[Pymoo]):
             individual.data["raw"] = values
         members = () if self._algorithm.pop is None else self._algorithm.pop
         members = [individual for individual in members if "raw" in individual.data]
-        self._set_values([*members, *self._infills], rule)
+        individuals = [*members, *self._infills]
+        raw = np.array([individual.data["raw"] for individual in individuals])
+        violations, objectives = rule.keys(raw[:, 0], raw[:, 1])
+        # Finite, for the sums and differences that some algorithms take: failed evaluations still come last.
+        finite = (np.nan_to_num(values, posinf=1e30) for values in (objectives, violations))
+        for individual, value, violated_by in zip(individuals, *finite, strict=True):
+            individual.F, individual.G, individual.H = np.array([value]), np.array([violated_by]), np.zeros(0)
+            individual.evaluated = {"F", "G", "H"}
         self._algorithm.tell(infills=self._infills)
         self._infills = self._algorithm.ask()
         self._X = fill_fixed(self._infills.get("X"), self._start.lower, self._start.upper)
 
     def stop(self) -> tuple[str, ...]:
         return ("all variables are fixed",) if self._algorithm is None else ()
-
-    @staticmethod
-    def _set_values(individuals: list[Any], rule: Rule) -> None:
-        """Objective and violation of each individual under the rule in force."""
-        raw = np.array([individual.data["raw"] for individual in individuals])
-        violation, objective = rule.keys(raw[:, 0], raw[:, 1])
-        # Finite, for the sums and differences that some algorithms take: failed evaluations still come last.
-        objective, violation = (np.nan_to_num(values, posinf=1e30) for values in (objective, violation))
-        for individual, value, violated_by in zip(individuals, objective, violation, strict=True):
-            individual.F, individual.G, individual.H = np.array([value]), np.array([violated_by]), np.zeros(0)
-            individual.evaluated = {"F", "G", "H"}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

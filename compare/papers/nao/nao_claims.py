@@ -218,20 +218,14 @@ def _check_velocity(phase: PhaseFindings, name: str) -> Check:
         cheap = f"{low:z.4f} to {high:z.4f}" if math.isfinite(low) else "no point of the sweep"
         near.append(f"{symbol} = {[*phase.optimum.x.values()][i]:z.4f} ({cheap})")
     ends = np.concatenate([x[:, chosen] for x in phase.gather_solutions(whole=False).values()])
-    values = {
-        "low": printed.low,
-        "high": printed.high,
-        "ends": (ends.min(), ends.max()),
-        "nearly": 100 * NEARLY_OPTIMAL,
-    }
-    values |= {"symbols": " and ".join(symbols.values()), "near": ", ".join(near)}
+    values: dict[str, Any] = {"low": printed.low, "high": printed.high, "nearly": 100 * NEARLY_OPTIMAL}
+    values |= {"symbols": " and ".join(symbols.values()), "near": ", ".join(near), "ends": (ends.min(), ends.max())}
     values["outside"] = f" (but {', '.join(outside)} in print)" if outside else ""
-    return _check_shares(
-        phase,
-        lambda x: (printed.low <= x[:, chosen]) & (x[:, chosen] <= printed.high),
-        lambda shares: float(np.mean(shares)) >= MOST,
-        **values,
-    )
+
+    def select(x: Array) -> Any:
+        return (printed.low <= x[:, chosen]) & (x[:, chosen] <= printed.high)
+
+    return _check_shares(phase, select, lambda shares: float(np.mean(shares)) >= MOST, **values)
 
 
 def _check_signs(phase: PhaseFindings, signs: Mapping[str, int]) -> Check:

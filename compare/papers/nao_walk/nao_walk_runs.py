@@ -95,16 +95,11 @@ def make_walk_computations(effort: NaoWalkEffort, optima: Mapping[str, Mapping[s
         "own-plain": {"feed_forward": "none", "heat": "", "x": {}},
         **{f"optimum-{heat}": {"feed_forward": "torque", "heat": heat, "x": dict(x)} for heat, x in optima.items()},
     }
-    make, steps = partial(make_computation, spec=SPECS["paper"]), effort.walked
-    found = [make(f"joints-{name}", function=simulate_joints, **how, steps=steps) for name, how in gaits.items()]
+    make = partial(make_computation, spec=SPECS["paper"], steps=effort.walked)
+    found = [make(f"joints-{name}", function=simulate_joints, **how) for name, how in gaits.items()]
+    make = partial(make, function=simulate_drives, lengths=effort.steps_m, disturbed=effort.disturbed)
     for fed, share in product(FEED_FORWARD, effort.stiffnesses):
-        how: dict[str, Any] = {
-            "feed_forward": fed,
-            "stiffness": share,
-            "lengths": effort.steps_m,
-            "disturbed": effort.disturbed,
-        }
-        found.append(make(f"drives-{fed}-{share:g}", function=simulate_drives, steps=steps, **how))
+        found.append(make(f"drives-{fed}-{share:g}", feed_forward=fed, stiffness=share))
     return found
 
 
