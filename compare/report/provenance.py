@@ -67,8 +67,6 @@ def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
     return text_table(header, rows, "Best known values", prose=True)
 
 
-# Recorded as the solver chose it.
-CHOSEN = "linear_solver"
 SETTINGS = ("evaluations allowed", "changed settings", "default settings")
 
 
@@ -85,7 +83,9 @@ def compare_with_defaults(record: RunRecord) -> tuple[str, str, str]:
     changed = {
         name: value
         for name, value in settings.items()
-        if name in defaults and value != defaults[name] and not (name == CHOSEN and name not in given)
+        if name in defaults
+        and format_settings(value) != format_settings(defaults[name])  # a stored tuple is a list
+        and (name in given or defaults[name] is not None)  # None: recorded as the solver chose it
     }
     texts = [
         f"{name}: {format_settings(value)} (default {format_settings(defaults[name])})"

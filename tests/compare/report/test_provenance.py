@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 from compare.report.provenance import compare_with_defaults
 from compare.study.record import RunRecord
 from compare.study.run_task import run_task
@@ -32,3 +35,9 @@ def test_handling_and_gradient_methods_are_described_too() -> None:
     assert changed.startswith("constraint handling: ") and "weight: 2.0" in changed and "(default Deb)" in changed
     budget, changed, defaults = compare_with_defaults(run(solver="ipopt", settings={"few_rows": False}))
     assert budget == "no limit" and changed == "few_rows: false (default null)" and "few_rows" not in defaults
+
+
+def test_neither_what_a_solver_chooses_nor_a_stored_tuple_is_a_change() -> None:
+    record = run(solver="ipopt")
+    stored = replace(record, settings=json.loads(json.dumps(record.settings)))
+    assert [compare_with_defaults(of)[1] for of in (record, stored)] == ["none", "none"]
