@@ -1,7 +1,5 @@
 """Tables of numbers from CSV files of other programs."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Collection

@@ -3,8 +3,6 @@
 Numbers that are not finite are written as null, so null becomes NaN for a ``float``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields, is_dataclass

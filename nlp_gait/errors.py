@@ -1,7 +1,5 @@
 """Errors for users: each message gives what is wrong, the value, what is allowed and what to do."""
 
-from __future__ import annotations
-
 import difflib
 import errno
 import logging

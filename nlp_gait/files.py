@@ -6,8 +6,6 @@ replaced, never followed. An operating system holds writes in memory for some se
 name of its folder reach the disk independently. So its folder is flushed, too, and the file survives a power cut.
 """
 
-from __future__ import annotations
-
 import csv
 import errno
 import io

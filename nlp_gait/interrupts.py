@@ -3,8 +3,6 @@
 The command line imports this module before everything else, so it imports nothing that takes time.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Display of results in notebooks: small HTML tables, and pandas for data frames."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from html import escape
 from types import ModuleType

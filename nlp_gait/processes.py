@@ -4,8 +4,6 @@ A fork has everything that its parent has and starts within milliseconds; only i
 their functions are pickled too. Python files in the working folder never run by themselves.
 """
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import multiprocessing

@@ -4,8 +4,6 @@ Code runs because the user named it in a call, or because it is installed. A nam
 that was named in this process (``resolve_code``). A file runs once per content: after an edit it is another module.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import importlib

@@ -1,7 +1,5 @@
 """A problem under the exact interpretation, as one CasADi function that is compiled, searched and judged."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

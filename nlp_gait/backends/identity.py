@@ -1,7 +1,5 @@
 """Identity of a problem: hashes of its mathematics, its parameter values and its source."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from typing import Any

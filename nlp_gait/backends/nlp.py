@@ -6,8 +6,6 @@
 with x = default lower bound + z * default range. Samples are mapped, never unrolled.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Plan a whole walk from standing to standing, and say what stops it."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

@@ -4,8 +4,6 @@
 Threads are no alternative: CasADi and MUMPS work for one caller at a time (see ``formulation/locking.py``).
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import sys
 import threading

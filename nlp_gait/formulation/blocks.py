@@ -1,7 +1,5 @@
 """Blocks of variables: one value per row (a link, a component) and column (an instant)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

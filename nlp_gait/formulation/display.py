@@ -1,7 +1,5 @@
 """What shows the gaits of a problem: time histories, stick figures, and what a physics engine needs to simulate them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

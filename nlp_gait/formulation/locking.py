@@ -4,8 +4,6 @@ CasADi releases Python's lock while it works, and solvers in its wheel (MUMPS) u
 results or crash, also on different problems. Compiled kernels need no lock.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Hashable
@@ -47,6 +45,5 @@ class Cache:
 
 if hasattr(os, "register_at_fork"):
     # A fork waits until no other thread is inside CasADi: the child has this thread only and could not finish the others' work.
-    os.register_at_fork(
-        before=CASADI_LOCK.acquire, after_in_parent=CASADI_LOCK.release, after_in_child=CASADI_LOCK.release
-    )
+    release = CASADI_LOCK.release
+    os.register_at_fork(before=CASADI_LOCK.acquire, after_in_parent=release, after_in_child=release)

@@ -1,7 +1,5 @@
 """Numbers that users pass, validated."""
 
-from __future__ import annotations
-
 import math
 import sys
 from numbers import Real

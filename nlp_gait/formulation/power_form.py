@@ -1,7 +1,5 @@
 """A least-power problem in other variables, for proofs: its formulas have narrower bounds over boxes than the exact functions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

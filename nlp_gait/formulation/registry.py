@@ -1,7 +1,5 @@
 """Gait problems by name, and ``maker``, which turns a function with options into a maker of problems."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import math

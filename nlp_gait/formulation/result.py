@@ -1,7 +1,5 @@
 """Results: a point of a problem, read from the file of `solve --out`, a study's record or a few lines by hand; its signals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

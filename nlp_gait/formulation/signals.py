@@ -1,7 +1,5 @@
 """Time histories of a gait, each with its unit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ A check looks for a better point, follows paths of the proof again, or repeats i
 surround the better points, and random paths seldom meet them: so half of the paths lead towards the best point that is known.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Guarantees: what is proven about the limits of a gait between its samples."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -3,8 +3,6 @@
 The pieces are halved until every row is proven to be satisfied or its violation is known well enough.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from typing import Any, NamedTuple

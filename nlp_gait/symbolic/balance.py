@@ -1,7 +1,5 @@
 """Zero-moment point, and the limits of the wrench between a sole and the ground."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Inverse dynamics of a tree of bodies by the recursive Newton-Euler algorithm, and Lagrange's equations of a mechanism."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple

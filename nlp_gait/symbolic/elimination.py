@@ -1,7 +1,5 @@
 """Linear equations of a few unknowns as expressions: elimination with pivots that are chosen once, from numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Formulas that are built once and inserted where they are used."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache, wraps
 

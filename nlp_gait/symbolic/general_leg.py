@@ -4,8 +4,6 @@ The chain begins at the foot, whose axes are the world's, and ends at the torso.
 spherical hip and a universal ankle, and works on cosines and sines: each joint has one transcendental function, at the end.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Any, NamedTuple

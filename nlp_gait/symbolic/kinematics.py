@@ -1,7 +1,5 @@
 """Kinematics of a tree of bodies, and in closed form of a leg with two axes at the hip, a knee, and two axes at the ankle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 

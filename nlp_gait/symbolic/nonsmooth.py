@@ -6,8 +6,6 @@ exact where the sense allows it (``backends/nlp.py`` checks the sense); only a t
 solution is solved by Newton's method under ``Exact``; its unknowns are variables under ``Lifted``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce

@@ -3,8 +3,6 @@
 Contacts are springs and dampers with Coulomb friction; implicit, they are stable at every stiffness and gain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 Rewritten expressions cost fewer and cheaper operations, with the same values up to rounding.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

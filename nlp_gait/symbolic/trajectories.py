@@ -5,8 +5,6 @@ one span it is a polynomial of degree five. A cubic through given end positions 
 degree five with these ends; zero coefficients leave the cubic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
@@ -20,6 +18,14 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 DEGREE = 5  # positions have four continuous derivatives, so torques and their rates are smooth
 # The first two and the last two basis functions move an end or its velocity.
 FIXED = 2
+
+
+class Motion(NamedTuple):
+    """A quantity with its first and second time derivative (scalars or vectors of one unit: u, u/s, u/s^2)."""
+
+    position: SX
+    velocity: SX
+    acceleration: SX
 
 
 def count_coefficients(spans: int) -> int:
@@ -98,14 +104,6 @@ def _differentiate(values: list[SX], knots: Array, degree: int, _: SX) -> list[S
 
 def _divide(part: SX, width: float) -> SX:
     return part / float(width) if width > 0.0 else SX(0)  # 0 on a span without width
-
-
-class Motion(NamedTuple):
-    """A quantity with its first and second time derivative (scalars or vectors of one unit: u, u/s, u/s^2)."""
-
-    position: SX
-    velocity: SX
-    acceleration: SX
 
 
 def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX, phase: SX) -> Motion:

@@ -5,8 +5,6 @@ outputs' weights of each sample, H = sum D' (d2v/du2) D, and what the glue adds.
 than it has inputs, directions are the columns of D; else they are its inputs, and D is multiplied in afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias

@@ -3,8 +3,6 @@
 The C++ source has the plan's tables, functions of one sample over lanes, and the code that executes the steps.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache

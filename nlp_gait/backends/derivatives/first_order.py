@@ -3,8 +3,6 @@
 Those of the inputs of its samples come from the glue, those of their outputs from the chain rule.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ copies initial values, executes a tape of scalar operations (the glue), adds pro
 or calls a function of one sample for all pairs of a sample and a direction, as many at once as there are lanes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

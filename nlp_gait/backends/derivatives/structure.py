@@ -3,8 +3,6 @@
 y = (w, v_1, ..., v_K),  u_k = glue_k(w, p, v_1, ..., v_{k-1}),  v_k = function_k(u_k) sample by sample,  (f, g) = glue(w, p, v).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain

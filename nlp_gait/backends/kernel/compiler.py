@@ -1,7 +1,5 @@
 """The C++ compiler of this machine, its version and flags; it runs with a time limit."""
 
-from __future__ import annotations
-
 import functools
 import os
 import platform

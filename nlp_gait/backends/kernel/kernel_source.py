@@ -1,7 +1,5 @@
 """C++ source of a problem's kernel: CasADi's generated code over a vector type, and a loop over candidates."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

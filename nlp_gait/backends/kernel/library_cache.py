@@ -5,8 +5,6 @@ another name and renamed, so that several processes may build it at once. A file
 A library is hashed and loaded through one descriptor of its folder, so that no other user can exchange it in between.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import ctypes

@@ -1,7 +1,5 @@
 """An NLP's values and derivatives in arrays that are allocated once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

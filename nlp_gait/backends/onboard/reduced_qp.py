@@ -11,8 +11,6 @@ zero, if each other v stays on the row that has its price in the last program, w
 to second order costs little next to the step's decrease, and is tolerated.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass

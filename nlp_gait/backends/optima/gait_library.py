@@ -1,7 +1,5 @@
 """Optimal gaits at the points of a grid with their derivatives, and gaits between these points, judged by the exact functions."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Mapping

@@ -7,8 +7,6 @@ of the NLP, then the scaled variables; with multipliers lam (positive at an uppe
     L(w, p, lam) = f(w, p) + lam' values(w, p) - max(lam, 0)' upper(p) - max(-lam, 0)' (-lower(p)).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any

@@ -5,8 +5,6 @@ linearised first-order conditions with the active bounds as equations (Fiacco (1
 Stability Analysis in Nonlinear Programming, theorem 3.2.2).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path

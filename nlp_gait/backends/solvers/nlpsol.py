@@ -1,7 +1,5 @@
 """Other NLP solvers of the CasADi wheel on the same lifted NLP as IPOPT."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import math

@@ -1,7 +1,5 @@
 """SLSQP with finite differences on the compiled objective: a baseline without symbolic derivatives."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -5,8 +5,6 @@ the result is a local optimum of the whole NLP; the multipliers of rows that wer
 converge on some of the rows, it starts again with all of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
