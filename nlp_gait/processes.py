@@ -64,18 +64,18 @@ def keep_working_folder() -> Iterator[None]:
 def _fork(work: Callable[[Connection], None]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("fork")
     results, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_begin, args=(work, sender), daemon=True)
+
+    def begin() -> None:
+        multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
+        work(sender)
+
+    process = context.Process(target=begin, daemon=True)
     with warnings.catch_warnings():
         # Python warns of forks of a process with threads. The locks that the work takes are free in the child.
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
     sender.close()
     return results, process
-
-
-def _begin(work: Callable[[Connection], None], sender: Connection) -> None:
-    multiprocessing.current_process().daemon = False  # it may fork, too: a robot file is read in a child
-    work(sender)
 
 
 def run_in_forks(

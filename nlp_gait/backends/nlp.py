@@ -117,20 +117,17 @@ def _build(problem: GaitProblem) -> NlpModel:
         row_bounds=bounds,
         lift_start=ca.Function("lift_start", [z, p, width], [ca.vertcat(*exact)]),
         lifted=lifted.shape[0],
-        tie_upper=_per_row(ops.lifts, [0.0 if lift.tight else np.inf for lift in ops.lifts]),
+        tie_upper=_repeat([0.0 if lift.tight else np.inf for lift in ops.lifts], [lift.rows for lift in ops.lifts]),
         tie_owner=np.concatenate(owners),
-        lift_sense=_per_variable(ops.lifts, [lift.sense for lift in ops.lifts]),
+        lift_sense=_repeat([lift.sense for lift in ops.lifts], [lift.variable for lift in ops.lifts]),
         smoothed=ops.smoothed,
         build_s=time.perf_counter() - started,
     )
 
 
-def _per_row(lifts: list[Lift], values: Sequence[float]) -> Array:
-    return np.repeat(np.array(values, dtype=float), np.array([lift.rows.shape[0] for lift in lifts], dtype=int))
-
-
-def _per_variable(lifts: list[Lift], values: Sequence[float]) -> Array:
-    return np.repeat(np.array(values, dtype=float), np.array([lift.variable.shape[0] for lift in lifts], dtype=int))
+def _repeat(values: Sequence[float], columns: Sequence[MX]) -> Array:
+    """Return each value as often as its column has rows."""
+    return np.repeat(np.array(values, dtype=float), np.array([column.shape[0] for column in columns], dtype=int))
 
 
 def _check_sense(
@@ -149,15 +146,15 @@ def _check_sense(
     """
     loose = [i for i, lift in enumerate(lifts) if not lift.tight]
     variables = ca.vertcat(*(lift.variable for lift in lifts))
-    columns = _per_variable(lifts, list(range(len(lifts))))
-    senses = _per_variable(lifts, [lift.sense for lift in lifts])
+    lifted = [lift.variable for lift in lifts]
+    columns, senses = _repeat(range(len(lifts)), lifted), _repeat([lift.sense for lift in lifts], lifted)
     is_loose = np.isin(columns, loose)
     column_owner, away = columns[is_loose], senses[is_loose]
     outputs = ca.vertcat(cost, values, *(lift.rows for lift in lifts))
     moved = ca.vertcat(*(lifts[i].variable for i in loose))
     slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(outputs, moved)])
     lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
-    tight = _per_row(lifts, [lift.tight for lift in lifts]) > 0
+    tight = _repeat([lift.tight for lift in lifts], [lift.rows for lift in lifts]) > 0
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
     hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), tight - 1.0])
     two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), tight])

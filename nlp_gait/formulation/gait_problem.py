@@ -206,14 +206,9 @@ class GaitProblem:
     ) -> "GaitProblem":
         """Return a problem with other mathematics; time histories, start points and denser grids are adapted.
 
-        Args:
-            name: of the new problem; empty to keep it.
-            title: likewise.
-            objective: name, unit and sense, if ``change`` replaces the objective.
-            variables: additional ones, after the present ones.
-            parameters: additional ones.
-            change: makes the new assembly from this problem's, the point of all variables and parameters, and the
-                interpretation of non-smooth operations.
+        ``change`` makes the new assembly from this problem's, the point of all variables and parameters, and the interpretation
+        of non-smooth operations; ``objective`` is its name, unit and sense if that is replaced. Variables and parameters are
+        added after the present ones; an empty name or title keeps the present one.
         """
 
         def assemble(point: Point, ops: Nonsmooth) -> Assembly:

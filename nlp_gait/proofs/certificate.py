@@ -109,13 +109,9 @@ def check_certificate(
 ) -> CertificateCheck:
     """Look for a point that is better than the bound, then follow paths of the proof.
 
-    Args:
-        file: of a closed proof.
-        points: more points (n,) to compare with the bound, by their source in words.
-        starts: number of IPOPT's starts, of which the first begins at the incumbent.
-        paths: number of paths. On each, both halves of a box are bounded, and the path continues in one that remains: half of the
-            paths in a random one, the others in the one that contains a point near the best one.
-        seed: of starts and paths.
+    IPOPT's first start is the incumbent; ``points`` are more points (n,) to compare with the bound, by their source
+    in words. On each path both halves of a box are bounded, and the path continues in one that remains: half of the paths in a
+    random one, the others in the one that contains a point near the best one.
 
     Raises InputError that says what is wrong with the certificate, which point is better, or that a path does not end.
     """
