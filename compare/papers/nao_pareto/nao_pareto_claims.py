@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -13,7 +13,7 @@ from compare.analysis.record_statistics import rank_sum
 from compare.papers.claims import SIGNIFICANT, Check, ClaimVerdict, decide
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, ParetoEffort
 from compare.questions.pareto.competing import CompetingObjective
-from compare.questions.pareto.front import Bends, FrontPoint, find_bends, select_front
+from compare.questions.pareto.front import Bends, FrontPoint, find_bends
 from compare.questions.pareto.pareto_front import SEARCH_NAMES
 from compare.questions.pareto.searches import REFERENCE, Challenge, Scale
 from metaheuristics.interface import Array
@@ -136,17 +136,6 @@ def spread_evenly(front: Array) -> Array:
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(front, axis=0).T))])
     places = np.linspace(0.0, along[-1], EVEN_POINTS)
     return np.column_stack([np.interp(places, along, column) for column in front.T])
-
-
-def collect_points(front: Sequence[FrontPoint], runs: Iterable[Sequence[Snapshot]]) -> list[FrontPoint]:
-    """Return the points of all runs that no other point dominates."""
-    scale = Scale(front)
-    found = []
-    for run in runs:
-        values, powers = scale.undo(run[-1].F)
-        for value, power, x in zip(values.tolist(), powers.tolist(), run[-1].X.tolist(), strict=True):
-            found.append(FrontPoint(demanded=value, value=value, power_W=power, violation=0.0, x=tuple(x)))
-    return select_front(found)
 
 
 def _check(is_true: Callable[[dict[str, Measures]], Tested], findings: ParetoFindings) -> Check:

@@ -18,7 +18,7 @@ from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, CRITERION, Par
 from compare.papers.paper_runs import Runner
 from compare.papers.reproduction import Reproduction
 from compare.questions.pareto.pareto_front import SEARCH_COLOURS, ParetoFront
-from compare.questions.pareto.searches import REFERENCE, Challenge, challenge_front
+from compare.questions.pareto.searches import REFERENCE, Challenge, Scale, challenge_front, select_best
 from compare.questions.question import Work, find
 from compare.report.document import Rows, Value
 from compare.study.store import Computation, Store
@@ -46,7 +46,8 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFronts:
     code = (runs, constrained_moead, dynamic_nsga3, pymoo)
     results = runner.compute([search for of_case in searches.values() for search in of_case], code)
     done = {case: [runs.make_run(results[search.name]) for search in of_case] for case, of_case in searches.items()}
-    points = nao_pareto_claims.collect_points(front, (run for of_case in done.values() for run in of_case))
+    scale, ends = Scale(front), [run[-1] for of_case in done.values() for run in of_case]
+    points = select_best((*scale.undo(end.F), end.X) for end in ends)
     solve = partial(challenge_front, problem, criterion, front, points, work.solver(), work.progress)
     given = {"front": [asdict(point) for point in front], "points": [asdict(point) for point in points]}
     inputs = {**fingerprint(problem), "criterion": CRITERION, **given}
@@ -59,7 +60,6 @@ def _compute_values(findings: ParetoFindings) -> dict[str, Any]:
     ssp, _ = findings.phases
     effort, verdicts = findings.effort, [claim.verdict for claim in REPRODUCTION.check_claims(findings).values()]
     return {
-        "effort": effort,
         "budgets": join_words(f"{budget:,}" for budget in effort.budgets),
         "largest": f"{effort.budgets[-1]:,}",
         "samples": effort.intervals + 1,

@@ -66,7 +66,6 @@ def _compute_values(findings: NaoWalkFindings) -> dict[str, Any]:
         "torso_mm": 1000 * runs.TORSO_M,
         "lift_mm": 1000 * runs.LIFT_M,
         "stretched_mm": 1000 * runs.STRETCHED_M,
-        "effort": effort,
         "full_error": Drive().full_error_rad,
         **{name: join_words(f"{value:g}" for value in values) for name, values in disturbances.items()},
         "lengths": join_words(f"{1000 * length:.0f}" for length in effort.steps_m),

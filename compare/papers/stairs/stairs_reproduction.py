@@ -58,7 +58,6 @@ def _compute_values(findings: StairsFindings) -> dict[str, Any]:
     effort = findings.effort
     (end_rate,) = [variable for variable in GOVERNING_VARIABLES if variable.name == "end_rate_rad_s"]
     return {
-        "effort": effort,
         **{name: " | ".join(words.format(case) for case in effort.cases) for name, words in CASE_COLUMNS.items()},
         "evaporation": EVAPORATION,
         "usual_spread": AntColony().spread,

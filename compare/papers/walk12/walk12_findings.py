@@ -29,7 +29,6 @@ KNEES = ("theta_3", "theta_10")
 class Walk12Findings:
     """All results of the reproduction."""
 
-    effort: walk12_runs.Walk12Effort  # what was computed
     runs: Runs  # by title of the problem and solver
     weighted: Sequence[PathPoint]  # optima of the weighted sum over lambda
     front: Sequence[PathPoint]  # largest f1 for each step length

@@ -54,7 +54,6 @@ def _run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     optima = {weight: get_point(choose_best(done)) for weight, done in starts.items()}
     walks = runner.compute(runs.make_walks(effort, optima), code=(walk12_walks,))
     return Walk12Findings(
-        effort=effort,
         runs=records,
         weighted=weighted,
         front=front,
@@ -79,7 +78,6 @@ def _compute_values(findings: Walk12Findings) -> dict[str, Any]:
     lengths = [problem.value(f"step_length_m.{end}") for end in ("lower", "upper")]
     every = {n: [run for row in TABLE_3 for run in findings.records(PAPER, row.weight, n)] for n in ("ga", IPOPT)}
     return {
-        "effort": findings.effort,
         "steps": WALKED_STEPS,
         "own": robot,
         "bounds": problem.variables,
@@ -203,7 +201,6 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "ga_gap": _compute_ga_gaps(findings, [runs.title_table_3(PAPER, row.weight) for row in TABLE_3]),
         "ga_gap_4": _compute_ga_gaps(findings, [runs.title_table_4(row, "step") for row in TABLE_4]),
         "simulator": _list_simulator_numbers(),
-        "perturbed": findings.effort.perturbed_starts,
         "bent_weights": join_words(f"{weight:g}" for weight in weights),
         "unbent": join_words(f"{f:.6f}" for f in list_objectives(unbent)),
         "bent": join_words(f"{findings.optimum(PAPER, weight).verdict.objective:.6f}" for weight in weights),

@@ -106,7 +106,8 @@ class ParetoFront(Question[FoundFront]):
             searches = run_searches(problem, criterion, Scale(front), **options, work=work)  # type: ignore[arg-type]
 
             def challenge() -> Challenge:
-                return challenge_front(problem, criterion, front, select_best(searches), solver, work.progress)
+                points = select_best((found.values, found.powers, found.X) for found in searches)
+                return challenge_front(problem, criterion, front, points, solver, work.progress)
 
             inputs = {**inputs, "searches": {name: list(b) for name, b in self.searches.items()}, "runs": self.runs}
             outcome = work.compute(Challenge, f"challenge-{criterion.name}-{{key}}", inputs, challenge, code=code)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -118,12 +118,15 @@ def _run_search(
     return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
 
 
-def select_best(fronts: Sequence[SearchFront]) -> list[FrontPoint]:
-    """Return the nondominated points of all runs: if none of these betters the true front, no point does."""
+def select_best(fronts: Iterable[tuple[Array, Array, Array]]) -> list[FrontPoint]:
+    """Return the nondominated points of all runs, given by criterion (k,), power (k,) and points (k, n).
+
+    If none of these betters the true front, no point does.
+    """
     points = [
         FrontPoint(demanded=v, value=v, power_W=w, violation=0.0, x=tuple(x))
-        for front in fronts
-        for v, w, x in zip(front.values.tolist(), front.powers.tolist(), front.X.tolist(), strict=True)
+        for values, powers, X in fronts
+        for v, w, x in zip(values.tolist(), powers.tolist(), X.tolist(), strict=True)
     ]
     return select_front(points)
 
