@@ -37,7 +37,8 @@ class ExternalProgram:
     It first receives `{"names", "lower", "upper", "evaluations", "seed", "settings"}`. Then it sends `{"x": [[...], ...]}`, one
     point or many, and receives `{"f": [...], "violation": [...], "cost": [...]}`, again and again, until it receives
     `{"stop": true}`, sends `{"stop": "its reason"}` or ends with status 0. `cost` combines f and violation, see `PlainFunction`.
-    A value of a failed evaluation is null.
+    A value of a failed evaluation is null. The run is a SearchError if the program cannot be started, ends with another status, is
+    silent for too long, or sends a line that is no proposal.
     """
 
     command: tuple[str, ...]  #: program and arguments
@@ -49,25 +50,17 @@ class ExternalProgram:
     def __post_init__(self) -> None:
         check_number(self, "answer_s", above=0.0)
 
-    def start(self, start: Start) -> ProgramSearch:
+    def start(self, start: Start) -> _ProgramSearch:
         """Begin a run; see `Algorithm.start`."""
-        return ProgramSearch(self, start)
+        return _ProgramSearch(self, start)
 
 
-class ProgramSearch(CallingSearch):
-    """A run of `ExternalProgram`."""
-
+class _ProgramSearch(CallingSearch):
     def __init__(self, settings: ExternalProgram, start: Start) -> None:
         self._settings, self._start = settings, start
         self._lines: queue.Queue[bytes | None] = queue.Queue(maxsize=MOST_WAITING)
 
     def run(self, evaluate: Evaluate) -> str:
-        """Answer the program until it ends or `evaluate` raises `Ended`; return the reason for ending.
-
-        Raises:
-            SearchError: it cannot be started, ends with another status than 0, is silent for too long, or sends a line that is
-                no proposal.
-        """
         start, settings = self._start, self._settings
         with tempfile.TemporaryFile() as messages:
             pipe = subprocess.PIPE

@@ -91,9 +91,9 @@ class PlainFunction:
         """What a tuner may choose, see ``metaheuristics.settings.list_ranges``: the function's own attribute."""
         return getattr(self.function, "ranges", {})
 
-    def start(self, start: Start) -> FunctionSearch:
+    def start(self, start: Start) -> _FunctionSearch:
         """Begin a run; see `Algorithm.start`."""
-        return FunctionSearch(self, start)
+        return _FunctionSearch(self, start)
 
 
 def takes_function_arguments(function: Callable[..., object], settings: Mapping[str, Any]) -> bool:
@@ -111,15 +111,12 @@ def combine(f: Array, violation: Array, rule: Rule) -> Array:
     return np.where(np.isfinite(f), np.where(major > 0.0, INFEASIBLE + major, minor), FAILED)
 
 
-class FunctionSearch(CallingSearch):
-    """A run of `PlainFunction`."""
-
+class _FunctionSearch(CallingSearch):
     def __init__(self, settings: PlainFunction, start: Start) -> None:
         self._settings = settings
         self._start = start
 
     def run(self, evaluate: Evaluate) -> str:
-        """Call the function until it returns or `evaluate` raises `Ended`; return the reason for ending."""
         n = len(self._start.lower)
 
         def f(x: Any) -> Any:

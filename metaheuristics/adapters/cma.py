@@ -108,13 +108,11 @@ class CmaLagrangian(CmaEs):
 
     name: ClassVar[str] = "cma-al"
 
-    def start(self, start: Start) -> CmaLagrangianSearch:
-        return CmaLagrangianSearch(self, start)
+    def start(self, start: Start) -> _CmaLagrangianSearch:
+        return _CmaLagrangianSearch(self, start)
 
 
-class CmaLagrangianSearch(CmaEsSearch):
-    """A run of `CmaLagrangian`; see `Search`."""
-
+class _CmaLagrangianSearch(CmaEsSearch):
     def __init__(self, settings: CmaEs, start: Start) -> None:
         super().__init__(settings, start)
         self._fitness: Any = None

@@ -34,8 +34,8 @@ class ScipyStarts:
         check_number(self, "margin", at_least=0.0)
         check_count(self, "iterations", at_least=1)
 
-    def start(self, start: Start) -> ScipyStartsSearch:
-        return ScipyStartsSearch(self, start)
+    def start(self, start: Start) -> _ScipyStartsSearch:
+        return _ScipyStartsSearch(self, start)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -106,9 +106,7 @@ class _Functions:
         return np.minimum(f, UNKNOWN), finite
 
 
-class ScipyStartsSearch(CallingSearch):
-    """A run of `ScipyStarts`; see `CallingSearch`."""
-
+class _ScipyStartsSearch(CallingSearch):
     def __init__(self, settings: ScipyStarts, start: Start) -> None:
         self._settings, self._start = settings, start
 

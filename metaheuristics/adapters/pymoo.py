@@ -139,16 +139,14 @@ class MultiObjective(PymooSettings):
         """The algorithm's."""
         return self.algorithm
 
-    def start(self, start: Start, objectives: int) -> PymooFrontSearch:
+    def start(self, start: Start, objectives: int) -> _PymooFrontSearch:
         search = self.begin(start, objectives)
         if self.algorithm == "CMOPSO":
             _seed_elites(search)
-        return PymooFrontSearch(search, start)
+        return _PymooFrontSearch(search, start)
 
 
-class PymooFrontSearch:
-    """A run of pymoo's; see `FrontSearch`."""
-
+class _PymooFrontSearch:
     def __init__(self, search: Any, start: Start) -> None:
         self._search, self._start = search, start
         self._infills: Any = None

@@ -41,8 +41,8 @@ class AntColony:
         check_count(self, "archive", at_least=2)
         check_number(self, "locality", "spread", above=0.0)
 
-    def start(self, start: Start) -> AntColonySearch:
-        return AntColonySearch(self, start)
+    def start(self, start: Start) -> _AntColonySearch:
+        return _AntColonySearch(self, start)
 
 
 def kernel_probabilities(count: int, locality: float) -> Array:
@@ -69,9 +69,7 @@ def deviations(archive: Array, picked: Array, spread: float) -> Array:
     return spread / (len(archive) - 1) * distance
 
 
-class AntColonySearch(PopulationSearch[AntColony]):
-    """A run of `AntColony`; see `Search`."""
-
+class _AntColonySearch(PopulationSearch[AntColony]):
     def __init__(self, settings: AntColony, start: Start) -> None:
         super().__init__(settings, start)
         self._archive = Points.none(start.initial.shape[1])
@@ -120,8 +118,8 @@ class AntColonyGrid:
         check_count(self, "depositors", at_least=1, at_most=self.population + 1)
         check_number(self, "exploration", at_least=0.0, at_most=1.0)
 
-    def start(self, start: Start) -> AntColonyGridSearch:
-        return AntColonyGridSearch(self, start)
+    def start(self, start: Start) -> _AntColonyGridSearch:
+        return _AntColonyGridSearch(self, start)
 
 
 def renew(pheromone: Array, chosen: NDArray[np.intp], weights: Array, evaporation: float) -> Array:
@@ -148,9 +146,7 @@ def pick(probability: Array, u: Array) -> NDArray[np.intp]:
     return levels
 
 
-class AntColonyGridSearch(PopulationSearch[AntColonyGrid]):
-    """A run of `AntColonyGrid`; see `Search`."""
-
+class _AntColonyGridSearch(PopulationSearch[AntColonyGrid]):
     def __init__(self, settings: AntColonyGrid, start: Start) -> None:
         super().__init__(settings, start)
         self._best = Points.none(start.initial.shape[1])

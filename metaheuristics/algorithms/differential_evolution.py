@@ -56,8 +56,8 @@ class DifferentialEvolution:
         check_number(self, "mutation_high", above=0.0, at_most=1.99)
         check_number(self, "recombination", at_least=0.0, at_most=1.0)
 
-    def start(self, start: Start) -> DifferentialEvolutionSearch:
-        return DifferentialEvolutionSearch(self, start)
+    def start(self, start: Start) -> _DifferentialEvolutionSearch:
+        return _DifferentialEvolutionSearch(self, start)
 
 
 def cross_over(
@@ -78,9 +78,7 @@ def cross_over(
     return np.where(taken, mutants, members)
 
 
-class DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
-    """A run of `DifferentialEvolution`; see `Search`."""
-
+class _DifferentialEvolutionSearch(PopulationSearch[DifferentialEvolution]):
     def __init__(self, settings: DifferentialEvolution, start: Start) -> None:
         super().__init__(settings, start)
         self._members: Points | None = None
@@ -152,8 +150,8 @@ class LShade:
         check_number(self, "best", above=0.0, at_most=1.0)
         check_count(self, "memory", at_least=1)
 
-    def start(self, start: Start) -> LShadeSearch:
-        return LShadeSearch(self, start)
+    def start(self, start: Start) -> _LShadeSearch:
+        return _LShadeSearch(self, start)
 
 
 def lehmer_mean(values: Array, weights: Array) -> float:
@@ -181,9 +179,7 @@ def gains(before: tuple[Array, Array], after: tuple[Array, Array]) -> Array:
     return found
 
 
-class LShadeSearch(PopulationSearch[LShade]):
-    """A run of `LShade`; see `Search`."""
-
+class _LShadeSearch(PopulationSearch[LShade]):
     def __init__(self, settings: LShade, start: Start) -> None:
         super().__init__(settings, start)
         self._members = Points.none(start.initial.shape[1])

@@ -183,8 +183,8 @@ class GeneticAlgorithm:
         crossover, mutation = SinglePoint(probability=0.8), Flip(probability=0.1)
         return cls(population=30, crossover=crossover, mutation=mutation, survival="generational")
 
-    def start(self, start: Start) -> GeneticSearch:
-        return GeneticSearch(self, start)
+    def start(self, start: Start) -> _GeneticSearch:
+        return _GeneticSearch(self, start)
 
 
 def tournaments(places: int, population: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
@@ -199,9 +199,7 @@ def tournaments(places: int, population: int, size: int, rng: np.random.Generato
     return winners
 
 
-class GeneticSearch(PopulationSearch[GeneticAlgorithm]):
-    """A run of `GeneticAlgorithm`; see `Search`."""
-
+class _GeneticSearch(PopulationSearch[GeneticAlgorithm]):
     def __init__(self, settings: GeneticAlgorithm, start: Start) -> None:
         super().__init__(settings, start)
         self._parents = Points.none(start.initial.shape[1])

@@ -44,8 +44,8 @@ class ParticleSwarm:
         check_number(self, "inertia", "cognitive", "social", at_least=0.0)
         check_number(self, "inertia_damping", "velocity_limit", above=0.0, at_most=1.0)
 
-    def start(self, start: Start) -> ParticleSwarmSearch:
-        return ParticleSwarmSearch(self, start)
+    def start(self, start: Start) -> _ParticleSwarmSearch:
+        return _ParticleSwarmSearch(self, start)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -74,9 +74,7 @@ def reflect(X: Array, V: Array, lower: Array, upper: Array) -> tuple[Array, Arra
     return inside, np.where(inside == X, V, -V)
 
 
-class ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
-    """A run of `ParticleSwarm`; see `Search`."""
-
+class _ParticleSwarmSearch(PopulationSearch[ParticleSwarm]):
     def __init__(self, settings: ParticleSwarm, start: Start) -> None:
         super().__init__(settings, start)
         self._limit = settings.velocity_limit * (start.upper - start.lower)

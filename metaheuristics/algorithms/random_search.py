@@ -22,13 +22,11 @@ class RandomSearch:
     def __post_init__(self) -> None:
         check_count(self, "population", at_least=1)
 
-    def start(self, start: Start) -> RandomSearchRun:
-        return RandomSearchRun(self, start)
+    def start(self, start: Start) -> _RandomSearchRun:
+        return _RandomSearchRun(self, start)
 
 
-class RandomSearchRun(PopulationSearch[RandomSearch]):
-    """A run of `RandomSearch`; see `Search`."""
-
+class _RandomSearchRun(PopulationSearch[RandomSearch]):
     def tell(self, X: Array, f: Array, violation: Array, rule: Rule) -> None:
         start = self._start
         width = start.upper - start.lower
@@ -52,13 +50,11 @@ class SobolPoints:
         check_count(self, "population", at_least=1)
         check_count(self, "batch", at_least=1)
 
-    def start(self, start: Start) -> SobolRun:
-        return SobolRun(self, start)
+    def start(self, start: Start) -> _SobolRun:
+        return _SobolRun(self, start)
 
 
-class SobolRun(PopulationSearch[SobolPoints]):
-    """A run of `SobolPoints`; see `Search`."""
-
+class _SobolRun(PopulationSearch[SobolPoints]):
     def __init__(self, settings: SobolPoints, start: Start) -> None:
         from scipy.stats.qmc import Sobol
 

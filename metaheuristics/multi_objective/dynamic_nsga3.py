@@ -43,8 +43,8 @@ class DynamicConstrainedNsga3:
         check_number(self, "crossover_index", "mutation_index", at_least=3.0, at_most=30.0)
         check_installed(self.name, "pymoo")
 
-    def start(self, start: Start, objectives: int) -> DynamicNsga3Search:
-        return DynamicNsga3Search(self, start, objectives)
+    def start(self, start: Start, objectives: int) -> _DynamicNsga3Search:
+        return _DynamicNsga3Search(self, start, objectives)
 
 
 def compute_boundary(first: Array, generation: int, generations: int, decrease: float) -> Array:
@@ -59,9 +59,7 @@ def compute_boundary(first: Array, generation: int, generations: int, decrease: 
     return np.asarray(np.maximum(0.0, first * np.exp(-fall) - LEAST))
 
 
-class DynamicNsga3Search:
-    """A run of `DynamicConstrainedNsga3`; see `FrontSearch`."""
-
+class _DynamicNsga3Search:
     def __init__(self, settings: DynamicConstrainedNsga3, start: Start, objectives: int) -> None:
         self._settings, self._start = settings, start
         self._directions = directions(settings.population, objectives)
