@@ -37,8 +37,8 @@ class ExternalProgram:
     It first receives `{"names", "lower", "upper", "evaluations", "seed", "settings"}`. Then it sends `{"x": [[...], ...]}`, one
     point or many, and receives `{"f": [...], "violation": [...], "cost": [...]}`, again and again, until it receives
     `{"stop": true}`, sends `{"stop": "its reason"}` or ends with status 0. `cost` combines f and violation, see `PlainFunction`.
-    A value of a failed evaluation is null. The run is a SearchError if the program cannot be started, ends with another status, is
-    silent for too long, or sends a line that is no proposal.
+    A value of a failed evaluation is null. A run raises SearchError if the program cannot be started, ends with another status,
+    is silent for too long, or sends a line that is no proposal.
     """
 
     command: tuple[str, ...]  #: program and arguments

@@ -10,7 +10,7 @@ import numpy as np
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import Ranking
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, ecdf, performance_profile
-from compare.drawing.figures import Look, add_legend_below, assign_looks, new_figure, style, use_log_axes
+from compare.drawing.figures import Look, add_legend_below, assign_looks, new_axes, new_figure, style, use_log_axes
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
@@ -100,8 +100,7 @@ def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
     """Plot the share of problems, runs and targets solved within evaluations per variable; solvers that ran on all."""
     solvers, shared = index_solvers(comparisons)
     with style():
-        figure = new_figure(7.4, 3.6)
-        axes = figure.subplots()
+        figure, axes = new_axes(7.4, 3.6)
         drawn = {}
         for name in shared:
             runs = [(curve, len(s[name].records[0].x) or 1) for s in solvers for curve in s[name].curves]
@@ -121,9 +120,8 @@ def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
 def plot_final_gaps(comparison: Comparison, *, column: bool = False) -> Figure:
     """Plot the final gap of each run, one row per solver; infeasible runs are counted at the right edge."""
     with style():
-        figure = new_figure(None if column else 7.4)
+        figure, axes = new_axes(None if column else 7.4)
         figure.set_figheight(0.8 + 0.28 * len(comparison.solvers))
-        axes = figure.subplots()
         names = [solver.name for solver in comparison.solvers]
         for row, (solver, look) in enumerate(zip(comparison.solvers, assign_looks(names).values(), strict=True)):
             gaps = np.array([comparison.gap(cost) for cost in solver.costs])
@@ -149,8 +147,7 @@ def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
     """Plot the performance profile of expected running times over problems and targets; solvers that ran on all."""
     with style():
         costs = list_expected_costs(comparisons)
-        figure = new_figure(4.6, 2.8)
-        axes = figure.subplots()
+        figure, axes = new_axes(4.6, 2.8)
         profile = performance_profile(costs)
         last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
         for name, look in assign_looks(profile).items():
@@ -175,8 +172,7 @@ def plot_critical_difference(ranking: Ranking) -> Figure:
     bars = [(first, last) for first, last in enumerate(ends) if last > first and last not in ends[:first]]
     half = (len(names) + 1) // 2  # names to the left; the others are to the right, from below
     with style():
-        figure = new_figure(7.4, 0.9 + 0.14 * len(bars) + 0.2 * half)
-        axes = figure.subplots()
+        figure, axes = new_axes(7.4, 0.9 + 0.14 * len(bars) + 0.2 * half)
         for height, (first, last) in enumerate(bars, start=1):
             axes.plot(ranks[[first, last]] + [-0.03, 0.03], [-0.5 * height] * 2, color="black", linewidth=3.0)
         for place, (name, look) in enumerate(assign_looks(names).items()):

@@ -107,6 +107,12 @@ def new_figure(width_in: float | None = 6.3, height_in: float = 3.0) -> Figure:
     return NotebookFigure(figsize=None if width_in is None else (width_in, height_in))
 
 
+def new_axes(width_in: float | None = 6.3, height_in: float = 3.0) -> tuple[Figure, Axes]:
+    """Return an empty figure of a size [inch], see ``new_figure``, and its only axes."""
+    figure = new_figure(width_in, height_in)
+    return figure, figure.subplots()
+
+
 def add_legend_below(figure: Figure, axes: Axes | None = None) -> None:
     """Add the legend of some axes, by default the first ones, below the figure, which grows accordingly."""
     handles, labels = (axes or figure.axes[0]).get_legend_handles_labels()

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.best_known import relative_gap
 from compare.analysis.units import axis_label, with_unit
-from compare.drawing.figures import COLOURS, new_figure, style
+from compare.drawing.figures import COLOURS, new_axes, style
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Answer, Question, Work
 from compare.report.document import Figure, text_table
@@ -237,8 +237,7 @@ def plot_evidence(evidence: FoundCertainty) -> Drawing:
     shown = evidence.optima[:DRAWN]
     values, shares = [o.objective for o in shown], [100 * o.share for o in shown]
     with style():
-        figure = new_figure(5.6, 3.6)
-        axes = figure.subplots()
+        figure, axes = new_axes(5.6, 3.6)
         axes.vlines(values, 0.0, shares, color=COLOURS["ipopt"], linewidth=1)
         label = f"distinct optima of {evidence.starts:,} starts of IPOPT ({len(shown)} of {len(evidence.optima)} shown)"
         axes.plot(values, shares, "o", color=COLOURS["ipopt"], label=label)

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import axis_label, quantity, units_of, with_unit
-from compare.drawing.figures import COLOURS, new_figure, style
+from compare.drawing.figures import COLOURS, new_axes, style
 from compare.questions.question import Answer, Question, Work, make_csv_table
 from compare.report.document import Figure, Table, Value, text_table
 from compare.study.record import RunRecord, parse_record
@@ -267,8 +267,7 @@ def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem, solver: str) 
     lines = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
     with style():
         shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(lines)))
-        figure = new_figure(4.2 if not others else 6.3, 3.0)
-        axes = figure.subplots()
+        figure, axes = new_axes(4.2 if not others else 6.3, 3.0)
         for key, shade in zip(lines, shades, strict=True):
             line = [point for point in points if tuple(point.at[name] for name in others) == key]
             label = ", ".join(quantity(name, units[name], value) for name, value in zip(others, key, strict=True))

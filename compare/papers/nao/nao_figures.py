@@ -9,7 +9,7 @@ import numpy as np
 
 from compare.analysis.units import axis_label
 from compare.drawing.animation import plot_poses
-from compare.drawing.figures import COLOURS, new_figure
+from compare.drawing.figures import COLOURS, new_axes, new_figure
 from compare.drawing.gait_figure import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, FeasiblePoints, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_runs import ALGORITHMS, PAPER, SEARCHES
@@ -107,8 +107,7 @@ def _draw_swing(findings: NaoFindings) -> Figure:
     """Price of a higher swing foot: the true sweep, and what the search histories of the paper and ours show."""
     phase = findings.ssp
     heights = [held.at for held in findings.swing]
-    figure = new_figure(5.2, 3.2)
-    axes = figure.subplots()
+    figure, axes = new_axes(5.2, 3.2)
 
     def plot(power: Sequence[float] | Array, line: str, colour: str, label: str) -> None:
         axes.plot(heights, np.array(power) / np.nanmin(power), line, color=colour, label=label)

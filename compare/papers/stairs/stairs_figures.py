@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from compare.drawing.figures import add_legend_below, new_figure
+from compare.drawing.figures import add_legend_below, new_axes, new_figure
 from compare.papers.paper_runs import get_point
 from compare.papers.stairs.stairs_paper import TABLE_4
 from compare.papers.stairs.stairs_planning import move
@@ -63,8 +63,7 @@ def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
 
 
 def _draw_segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tuple[float, float]) -> Figure:
-    figure = new_figure(height_in=3.6)
-    axes = figure.subplots()
+    figure, axes = new_axes(height_in=3.6)
     _draw_stair(axes, step, 3)
     place = arrays["ankle"] + np.array(step)
     ends = [0.0, plan["t1_s"], plan["t2_s"], plan["t_bc_s"], plan["t3_s"]]
@@ -127,8 +126,7 @@ def _draw_stairs_compared(findings: StairsFindings) -> Figure:
 
 
 def _draw_pose_times(network: Mapping[str, Any], case: int) -> Figure:
-    figure = new_figure()
-    axes = figure.subplots()
+    figure, axes = new_axes()
     for rule, found in network.items():
         label = f"{rule}: {found['converged']} of {found['poses']} poses"
         axes.plot(np.array(found["time_s"]) * 1e3, label=label, linewidth=0.9)
@@ -157,8 +155,7 @@ def _draw_tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit:
 
 
 def _draw_zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mapping[str, float]]) -> Figure:
-    figure = new_figure()
-    axes = figure.subplots()
+    figure, axes = new_axes()
     foot = toe_foot_biped().foot_m
     axes.axhspan(0.0, foot, color="0.9", label="stance foot")
     for case, arrays in followed.items():

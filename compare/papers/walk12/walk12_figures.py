@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, new_figure
+from compare.drawing.figures import COLOURS, new_axes, new_figure
 from compare.papers.paper_runs import get_point
 from compare.papers.walk12.walk12_findings import Walk12Findings, follow
 from compare.papers.walk12.walk12_paper import find_row
@@ -50,8 +50,7 @@ def _colour(label: str) -> str:
 
 
 def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
-    figure = new_figure(4.2, 2.8)
-    axes = figure.subplots()
+    figure, axes = new_axes(4.2, 2.8)
     runs = np.array([run.history.objective for run in ga], dtype=float)
     epochs, paint = np.arange(runs.shape[1]), dict[str, Any](where="post", color=COLOURS["ga"])
     axes.step(epochs, runs.T, **paint, alpha=0.3, linewidth=0.8)
@@ -133,8 +132,7 @@ def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) ->
 
 def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
     arrays = follow(x, steps=int(np.ceil(2 * np.pi / turn_rad)), intervals=20, turn_rad=turn_rad)
-    figure = new_figure(3.6, 3.4)
-    axes = figure.subplots()
+    figure, axes = new_axes(3.6, 3.4)
     axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")
     for side, stance, colour in (("left", 1.0, COLOURS["pso"]), ("right", 0.0, COLOURS["ga"])):
         prints = np.unique(np.round(arrays[f"{side}_ankle"][arrays["left_stance"] == stance], 9), axis=0)

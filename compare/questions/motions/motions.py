@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.drawing.figures import COLOURS, add_legend_below, new_figure, style
+from compare.drawing.figures import COLOURS, add_legend_below, new_axes, new_figure, style
 from compare.questions.motions.motion import (
     COARSE_KIND,
     FREE_ORDERS,
@@ -163,8 +163,7 @@ def _make_csv(stem: str, motions: Sequence[SolvedMotion]) -> Table:
 def plot_powers(motions: Sequence[SolvedMotion]) -> Drawing:
     """Plot the power over the number of free coefficients, with the limit of the richest motions."""
     with style():
-        figure = new_figure(4.6, 3.0)
-        axes = figure.subplots()
+        figure, axes = new_axes(4.6, 3.0)
         for kind, (colour, line, words) in LOOKS.items():
             drawn = [m for m in motions if m.task.kind == kind]
             if not drawn:

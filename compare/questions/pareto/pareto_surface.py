@@ -15,7 +15,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import axis_label
-from compare.drawing.figures import new_figure, style
+from compare.drawing.figures import new_axes, style
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import solve_ends
 from compare.questions.question import Answer, Question, Work
@@ -138,8 +138,7 @@ def _satisfies(point: SurfacePoint, other: SurfacePoint) -> bool:
 def plot_surface(points: tuple[SurfacePoint, ...], first: CompetingObjective, second: CompetingObjective) -> Drawing:
     """Plot the power over the first criterion, in lines of equal demand on the second one."""
     with style():
-        figure = new_figure(5.6, 3.4)
-        axes = figure.subplots()
+        figure, axes = new_axes(5.6, 3.4)
         levels = sorted({p.demanded[1] for p in points})
         norm = Normalize(levels[0], levels[-1] if levels[-1] > levels[0] else levels[0] + 1.0)
         colours = matplotlib.colormaps["viridis"]

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import axis_label, units_of, with_unit
-from compare.drawing.figures import new_figure, style
+from compare.drawing.figures import new_axes, style
 from compare.questions.perturbed_problem import rebuild
 from compare.questions.question import Work, make_csv_table, make_table
 from compare.questions.walk.cheapest_cycle import Gait, describe_end, simulate_walk
@@ -263,8 +263,7 @@ def _describe_violations(planned: Sequence[PlannedGait]) -> list[Part]:
 def plot_planners(name: str, problem: GaitProblem, planned: Sequence[PlannedGait]) -> Drawing:
     """Plot the energy per metre along the axis, with a colour for each planner."""
     with style():
-        figure = new_figure(6.3, 3.2)
-        axes = figure.subplots()
+        figure, axes = new_axes(6.3, 3.2)
         for planner, colour in COLOURS.items():
             rows = [row for row in planned if row.planner == planner]
             for where, line in zip(PLACES, ("o-", "s--"), strict=True):
