@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -246,7 +246,7 @@ def as_json(data: Any) -> Any:
     return json.loads(json.dumps(data, allow_nan=False))
 
 
-FLOATS = tuple(field.name for field in fields(Outcome) if field.type == "float")
+FLOATS = tuple(name for name, hint in get_type_hints(Outcome).items() if hint is float)
 
 
 def store_runs(store: Store, solver: Solver | None = None) -> Solver:
