@@ -19,8 +19,15 @@ from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 
 # Usual suffix of a file by format.
-FORMATS = {"webots": ".motion", "csv": ".csv", "json": ".signals.json", "mjcf": ".xml"}
-FORMATS |= {"mujoco-keyframes": ".keyframes.xml", "naoqi": ".naoqi.json", "ros": ".trajectory.json"}
+FORMATS = {
+    "webots": ".motion",
+    "csv": ".csv",
+    "json": ".signals.json",
+    "mjcf": ".xml",
+    "mujoco-keyframes": ".keyframes.xml",
+    "naoqi": ".naoqi.json",
+    "ros": ".trajectory.json",
+}
 
 
 def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:

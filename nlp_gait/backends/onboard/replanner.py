@@ -178,8 +178,16 @@ class Replanner:
         elif found.feasible:
             return found
         violated = self._exact.find_violated(self._exact.at(outcome.x, problem.p))
-        result = {name: getattr(outcome, name) for name in ("x", "objective", "feasible", "converged")}
-        return replace(found, solver="ipopt", violated=violated, guess=outcome.guess or found.guess, **result)
+        return replace(
+            found,
+            x=outcome.x,
+            objective=outcome.objective,
+            feasible=outcome.feasible,
+            converged=outcome.converged,
+            solver="ipopt",
+            violated=violated,
+            guess=outcome.guess or found.guess,
+        )
 
 
 class _Run:
@@ -268,11 +276,16 @@ class _Run:
         if not self.converged and self._best is not None:
             self._go_to(self._best[1])
         feasible = self._violation <= FEASIBILITY_TOLERANCE and math.isfinite(at.cost[0])
-        w, problem, objective = self._w, self._problem, self._problem.objective.sign * float(at.cost[0])
-        x = np.clip(at.model.point(w), problem.lower, problem.upper)
-        guess = Guess(primal=w, bounds=np.zeros(len(w)), rows=self._multipliers.copy(), width=self._width)
-        run = {name: getattr(self, name) for name in ("converged", "iterations", "note")}
-        return Replan(x=x, objective=objective, feasible=feasible, guess=guess, **run)
+        w, rows = self._w, self._multipliers.copy()
+        return Replan(
+            x=np.clip(at.model.point(w), self._problem.lower, self._problem.upper),
+            objective=self._problem.objective.sign * float(at.cost[0]),
+            feasible=feasible,
+            converged=self.converged,
+            iterations=self.iterations,
+            note=self.note,
+            guess=Guess(primal=w, bounds=np.zeros(len(w)), rows=rows, width=self._width),
+        )
 
     def _go_to(self, w: Array) -> None:
         """Evaluate the functions at z within its bounds and the exact values of the lifted variables."""

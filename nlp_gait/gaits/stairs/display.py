@@ -30,8 +30,15 @@ LEG = {"Hip": ("thigh", "HK"), "Knee": ("shank", "KA"), "Ankle": ("sole", "AS"),
 SIDES = {"L": ("left", "'"), "R": ("right", "")}
 JOINTS = tuple(f"{letter}{joint}" for letter in SIDES for joint in LEG)
 # The model's joint for each of these, and whether it turns the same way; it has none for the toe that stands.
-MODEL_JOINT = {"LHip": ("hip'", 1.0), "LKnee": ("knee'", -1.0), "LAnkle": ("ankle'", -1.0)}
-MODEL_JOINT |= {"RHip": ("hip", 1.0), "RKnee": ("knee", 1.0), "RAnkle": ("ankle", 1.0), "RToe": ("toe", 1.0)}
+MODEL_JOINT = {
+    "LHip": ("hip'", 1.0),
+    "LKnee": ("knee'", -1.0),
+    "LAnkle": ("ankle'", -1.0),
+    "RHip": ("hip", 1.0),
+    "RKnee": ("knee", 1.0),
+    "RAnkle": ("ankle", 1.0),
+    "RToe": ("toe", 1.0),
+}
 
 
 @cache

@@ -99,8 +99,16 @@ def _move_points(q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tup
 
 def _joint_rate(name: str, v: SX) -> SX:
     """Return the rate of a joint from nine link rates: of the links on both its sides, torso counter-clockwise."""
-    pairs = {"ankle'": ("K'A'", "A'S'"), "knee'": ("HK'", "K'A'"), "hip'": ("HK'", "UH"), "hip": ("HK", "UH")}
-    pairs |= {"knee": ("KA", "HK"), "ankle": ("AS", "KA"), "toe": ("ST", "AS"), "toe'": ("A'S'", "S'T'")}
+    pairs = {
+        "ankle'": ("K'A'", "A'S'"),
+        "knee'": ("HK'", "K'A'"),
+        "hip'": ("HK'", "UH"),
+        "hip": ("HK", "UH"),
+        "knee": ("KA", "HK"),
+        "ankle": ("AS", "KA"),
+        "toe": ("ST", "AS"),
+        "toe'": ("A'S'", "S'T'"),
+    }
     first, second = (v[biped.LINKS.index(link)] for link in pairs[name])
     return first + second if "UH" in pairs[name] else first - second
 
