@@ -123,7 +123,7 @@ def compute_heights(heights: Sequence[float]) -> list[dict[str, float]]:
             continue
         kinds = _sum_planned(make_plan(walk)).values()
         energies = {f"{heat}_J_per_m": sum_energy(kinds, heat) for heat in SPECS}
-        found.append({"torso_m": height, **energies, "knee_deg": compute_knee_deg(walk)})
+        found.append({"torso_m": height, **energies, "knee_deg": _compute_knee_deg(walk)})
     return found
 
 
@@ -137,7 +137,7 @@ def solve_free_height(spec: ProblemSpec, starts: int) -> dict[str, Any]:
         found[name] = {
             "power_W": solution.objective,
             "hip_m": float(sample_finely(result).arrays["hip"][:, 2].mean()),
-            "knee_deg": compute_knee_deg(result),
+            "knee_deg": _compute_knee_deg(result),
         }
     return found
 
@@ -199,8 +199,7 @@ def plan_own_walk(footsteps: Footsteps) -> Result:
     return plan_cart_table_walk(make_nao_cycles(), footsteps)
 
 
-def compute_knee_deg(result: Result) -> float:
-    """Return the mean angle of both knees over a step [degrees]."""
+def _compute_knee_deg(result: Result) -> float:
     signals = sample_finely(result)
     t, q = signals.arrays["t"], signals.arrays["q"]
     knees = [column for column, joint in enumerate(signals.joints) if joint.endswith("KneePitch")]

@@ -43,7 +43,7 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
         "by_quanta": {what: _get_peaks(findings, "jerk", what, KINDS[0]) for what in PLANS},
         "times": {name: _describe_times(findings, name) for name in ("t1_s", "t2_s", "t_bc_s")},
         "between": "; ".join([*findings.best("jerk", case).verdict.violated, "none"][0] for case in findings.cases),
-        "eq": compute_printed(findings),
+        "eq": _compute_printed(findings),
         "drawn_case": DRAWN_CASE,
         "of": _name_cases(findings),
         "least_ratio": min(row.rise_run_ratio for row in TABLE_4.values()),
@@ -70,8 +70,7 @@ def _collect(findings: StairsFindings, what: str) -> dict[str, Series]:
     return {name: Series(one[name] for one in best) for name in best[0]}
 
 
-def compute_printed(findings: StairsFindings) -> dict[str, float]:
-    """Return by how much the printed equations miss in the drawn case."""
+def _compute_printed(findings: StairsFindings) -> dict[str, float]:
     best, arrays = findings.best("jerk", DRAWN_CASE), move(findings, "jerk", DRAWN_CASE)[0].arrays
     return measure_printed_equations(TABLE_4[DRAWN_CASE], arrays["ankle"][arrays["t"] > best.x["t2_s"]])
 
@@ -361,7 +360,7 @@ def _check_poses(findings: StairsFindings, share_of_first: float = math.inf, lim
 
 
 def _check_continuity(findings: StairsFindings) -> Check:
-    eq = compute_printed(findings)
+    eq = _compute_printed(findings)
     ends = _differentiate_ankle(findings, "jerk", DRAWN_CASE)[1]
     jumps = np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=1)
     return decide([eq["lift_off_m_s"] <= CONTINUOUS, max(jumps) <= CONTINUOUS], found=Series(jumps))

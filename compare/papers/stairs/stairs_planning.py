@@ -67,7 +67,7 @@ def _make_choice_spec(findings: StairsFindings, what: str, name: str) -> Problem
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield first steps, which end where the steps with a reverse double support start, and those that end anywhere."""
     for case in findings.cases:
-        spec, settings = make_first_spec(findings, case), findings.effort.plan_settings
+        spec, settings = _make_first_spec(findings, case), findings.effort.plan_settings
         random = make_start_tasks(spec, findings.effort.first_starts - 1, settings=settings)
         near = {**findings.best("landing", case).x, "zmp_start_m": ZMP_OF_STANDING, "zmp_end_m": ZMP_OF_STANDING}
         yield from (*random, Task(problem=spec, solver=IPOPT, settings=settings, start=near, run=len(random)))
@@ -82,8 +82,7 @@ def _make_task(spec: ProblemSpec, best: RunRecord, settings: Mapping[str, Any]) 
     return Task(problem=spec, solver=IPOPT, settings=settings, start=dict(zip(start, map(float, clipped), strict=True)))
 
 
-def make_first_spec(findings: StairsFindings, case: int) -> ProblemSpec:
-    """Return the planner of the first step before the step with a reverse double support."""
+def _make_first_spec(findings: StairsFindings, case: int) -> ProblemSpec:
     spec, following = make_plan_spec(findings.effort, case, "first"), findings.best("landing", case).x
     ends = fix("hip_height_m", following["hip_height_m"]) | fix("hip_start_m", following["hip_start_m"])
     return replace(spec, values={**spec.values, **ends})
@@ -93,7 +92,7 @@ def load_spec(findings: StairsFindings, what: str, case: int) -> ProblemSpec:
     """Return the problem of a plan, ``plan``, ``jerk``, ``landing`` or ``first``, or of the ``ideal``."""
     if what == "ideal":
         return stairs_runs.make_ideal_spec(findings.effort, case)
-    return make_first_spec(findings, case) if what == "first" else make_plan_spec(findings.effort, case, what)
+    return _make_first_spec(findings, case) if what == "first" else make_plan_spec(findings.effort, case, what)
 
 
 @lru_cache(maxsize=16)

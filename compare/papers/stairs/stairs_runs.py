@@ -115,7 +115,7 @@ def make_plan_spec(effort: StairsEffort, case: int, what: str = "plan") -> Probl
     Of least energy too: ``hip`` at the paper's height without our limits; ``upright`` torso.
     """
     options: dict[str, str | int | bool] = {"intervals": effort.plan_intervals}
-    values = get_stair(case)
+    values = _get_stair(case)
     if what in ("jerk", "first", "landing"):
         options["minimise"] = "jerk"
     if what in ("first", "landing"):
@@ -136,12 +136,12 @@ def fix(name: str, value: float) -> dict[str, float]:
 def make_ideal_spec(effort: StairsEffort, case: int) -> ProblemSpec:
     """Return the full trajectory optimisation of a case."""
     options = {"intervals": effort.ideal_intervals}
-    return ProblemSpec(name="stairs-ideal", options=options, values=get_stair(case), label=f"ideal-{case}")
+    return ProblemSpec(name="stairs-ideal", options=options, values=_get_stair(case), label=f"ideal-{case}")
 
 
 def make_track_spec(case: int, plan: Mapping[str, float], **options: str | bool) -> ProblemSpec:
     """Return the tracking of a plan, given by the planner's variables, in a case."""
-    values = {**get_stair(case), **{name: plan[name] for name in PLAN}}
+    values = {**_get_stair(case), **{name: plan[name] for name in PLAN}}
     return ProblemSpec(name="stairs-track", options=options, values=values, label=f"track-{case}")
 
 
@@ -152,8 +152,7 @@ def make_other_spec(effort: StairsEffort, tread: float, rise: float) -> ProblemS
     return ProblemSpec(name="stairs-plan", options=options, values=values, label=f"stairs-plan-{tread:g}-{rise:g}")
 
 
-def get_stair(case: int) -> dict[str, float]:
-    """Return the stair's parameters in a case of Table IV."""
+def _get_stair(case: int) -> dict[str, float]:
     row = TABLE_4[case]
     return {"stair_length_m": row.stair_length_m, "rise_run_ratio": row.rise_run_ratio}
 

@@ -68,13 +68,12 @@ def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation
             yield make_computation(f"powerless-{name}-{case}", spec, function, evaluations=effort.track_evaluations)
         for name, decides in effort.instant_searches:
             spec, plan = make_choice_spec(findings, case, name), findings.plan(case, CHOICES[name].plan)
-            title, function = f"instants-{name}-{decides}-{case}", partial(run_algorithm_4, spec)
+            title, function = f"instants-{name}-{decides}-{case}", partial(_run_algorithm_4, spec)
             settings = {"torso_rad": plan["torso_pitch_rad"], "evaluations": effort.instant_evaluations}
             yield make_computation(title, spec, function, decides=decides, **settings)
 
 
-def run_algorithm_4(spec: ProblemSpec, torso_rad: float, decides: Decides, evaluations: int) -> dict[str, Any]:
-    """Track a step by a search at every instant."""
+def _run_algorithm_4(spec: ProblemSpec, torso_rad: float, decides: Decides, evaluations: int) -> dict[str, Any]:
     options = {name: spec.options[name] for name in ("base", "coordinates", "rates") if name in spec.options}
     problem = spec.load()
     quanta = round(problem.value("t3_s") / QUANTUM)

@@ -112,12 +112,12 @@ def _compute_normalisation(findings: Walk12Findings) -> dict[str, Any]:
     leads = {}
     for label in (PAPER, MODEL):
         pairs = zip(_list_optima(findings, label), findings.f_of_printed_gaits(label), strict=True)
-        leads[f"lead_{label}"] = compute_range(get_dense(optimum)["f"] - f for optimum, f in pairs)
+        leads[f"lead_{label}"] = compute_range(_get_dense(optimum)["f"] - f for optimum, f in pairs)
     last_f1 = findings.f1_by()[-1]
     return {
         **leads,
         "own_f1max": findings.own_f1max,
-        "dense_f1max": get_dense(findings.optimum(PAPER, 1.0))["f1_per_m2s"],
+        "dense_f1max": _get_dense(findings.optimum(PAPER, 1.0))["f1_per_m2s"],
         "ga_f1": (min(ga) * F1MAX, max(ga) * F1MAX),
         "ga_f1_median": float(np.median(ga)) * F1MAX,
         "last_f1": last_f1,
@@ -206,7 +206,7 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
         "bent": join_words(f"{findings.optimum(PAPER, weight).verdict.objective:.6f}" for weight in weights),
         "straightest": min(compute_knees(get_point(best)).min() for best in _list_optima(findings, PAPER)),
         "printed_step": f"the optima at λ = {', '.join(findings.printed_step)} change by at most {max(shifts):.0e} in f",
-        "simpson_claim": max(r.verdict.objective - get_dense(r)["f"] for r in simpson),
+        "simpson_claim": max(r.verdict.objective - _get_dense(r)["f"] for r in simpson),
         "simpson_f1max": simpson[-1].verdict.objective * F1MAX,
         **{name: "none is shipped" if bound is None else f"{bound:.6f}" for name, bound in bounds.items()},
         "ga_900": float(np.median([f for f in earlier if f is not None])),
@@ -244,8 +244,7 @@ def _find_bound(record: RunRecord) -> float | None:
     return find_reference(record.definition["problem"]).bound
 
 
-def get_dense(record: RunRecord) -> Mapping[str, float]:
-    """Return the judge's indexes on the dense grid, which this problem has."""
+def _get_dense(record: RunRecord) -> Mapping[str, float]:
     return record.verdict.dense or {}
 
 
@@ -279,7 +278,7 @@ def _list_quadratures(findings: Walk12Findings) -> Rows:
     for row in TABLE_3:
         best, simpson = findings.optimum(PAPER, row.weight), findings.best(f"simpson-{row.weight:g}")
         ours = [best.verdict.objective, _find_bound(best), findings.printed_step.get(f"{row.weight:g}")]
-        rows.append([row.weight, *ours, simpson.verdict.objective, get_dense(simpson)["f"], _find_bound(simpson)])
+        rows.append([row.weight, *ours, simpson.verdict.objective, _get_dense(simpson)["f"], _find_bound(simpson)])
     return rows
 
 
@@ -308,7 +307,7 @@ def _list_table_3(findings: Walk12Findings, label: str) -> Rows:
         agreeing = sum(r.claimed and abs(r.verdict.objective - f_best) < SAME_OPTIMUM for r in begun)
         solved = (findings.records(label, row.weight, "ga"), begun)
         times = [float(np.median([run.time_s.solve for run in done])) for done in solved]
-        rows.append([*cells, f_best, get_dense(optimum)["f"], agreeing, *times])
+        rows.append([*cells, f_best, _get_dense(optimum)["f"], agreeing, *times])
     return rows
 
 
@@ -318,7 +317,7 @@ def _list_gaits(findings: Walk12Findings) -> Rows:
         rows.append([row.weight, "paper", *row.x, f1, stable.share])
         for solver in (*SEARCHES, IPOPT):
             found = choose_best(findings.records(PAPER, row.weight, solver))
-            figures = get_dense(found)
+            figures = _get_dense(found)
             rows.append([row.weight, solver.upper(), *get_point(found), figures["f1_per_m2s"], figures["stable_share"]])
     return rows
 
