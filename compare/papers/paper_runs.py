@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -99,11 +100,11 @@ def make_start_tasks(
 
 
 def make_search_tasks(
-    problem: ProblemSpec, label: str, algorithm: Algorithm, runs: int, evaluations: int
+    problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, evaluations: int
 ) -> list[Task]:
-    """Return tasks of a search; run k has seed k."""
-    stop = Stop(evaluations=evaluations)
-    return [Task(problem=problem, solver=algorithm, label=label, stop=stop, run=run) for run in range(runs)]
+    """Return tasks of searches by label; run k has seed k."""
+    stop, searches = Stop(evaluations=evaluations), product(algorithms.items(), range(runs))
+    return [Task(problem=problem, solver=solver, label=label, stop=stop, run=k) for (label, solver), k in searches]
 
 
 def choose_best(records: Iterable[RunRecord]) -> RunRecord:

@@ -202,8 +202,7 @@ def make_first_tasks(effort: StairsEffort) -> Iterator[Task]:
         for what, starts in (("plan", effort.plan_starts), ("jerk", effort.jerk_starts)):
             spec = make_plan_spec(effort, case, what)
             yield from make_start_tasks(spec, starts, settings=settings)
-            for name, algorithm in ALGORITHMS.items():
-                yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.plan_evaluations)
+            yield from make_search_tasks(spec, ALGORITHMS, effort.runs, effort.plan_evaluations)
     for tread, rise in effort.other_stairs:
         settings = {"iterations": 100} if rise >= IMPOSSIBLE_RISE_M else effort.plan_settings
         spec = make_other_spec(effort, tread, rise)
@@ -215,8 +214,7 @@ def make_track_tasks(findings: StairsFindings) -> Iterator[Task]:
     effort = findings.effort
     for case in effort.cases:
         spec = make_track_spec(case, findings.plan(case))
-        for name, algorithm in ALGORITHMS.items():
-            yield from make_search_tasks(spec, name, algorithm, effort.runs, effort.track_evaluations)
+        yield from make_search_tasks(spec, ALGORITHMS, effort.runs, effort.track_evaluations)
         if effort.track_ipopt:
             yield Task(problem=spec, solver=IPOPT, settings=effort.track_settings, start=TRACK_START)
 

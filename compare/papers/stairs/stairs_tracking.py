@@ -55,7 +55,7 @@ def make_tracking_tasks(findings: StairsFindings) -> Iterator[Task]:
     for case in effort.cases:
         for name in effort.choices:
             spec = make_choice_spec(findings, case, name)
-            yield from make_search_tasks(spec, ACO, ALGORITHMS[ACO], effort.runs, effort.track_evaluations)
+            yield from make_search_tasks(spec, {ACO: ALGORITHMS[ACO]}, effort.runs, effort.track_evaluations)
 
 
 def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation]:

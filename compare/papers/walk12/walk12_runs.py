@@ -117,8 +117,7 @@ def make_first_tasks(effort: Walk12Effort) -> Iterator[Task]:
         yield from _make_runs(effort, simpson)
     yield from _make_runs(effort, _make_spec("below", BELOW_WEIGHT, F1MAX))
     variants = _make_spec(title_table_3(PAPER, VARIANTS_WEIGHT), VARIANTS_WEIGHT, F1MAX)
-    for label, algorithm in GA_VARIANTS.items():
-        yield from make_search_tasks(variants, label, algorithm, effort.runs, GA_EVALUATIONS)
+    yield from make_search_tasks(variants, GA_VARIANTS, effort.runs, GA_EVALUATIONS)
     corner = _make_spec("corner", 0.15, F1MAX)
     yield Task(problem=corner, solver=IPOPT, start=dict.fromkeys(corner.load().names, CORNER_M))
 
@@ -140,9 +139,9 @@ def _make_table_3(effort: Walk12Effort, label: str, f1max: float) -> Iterator[Ta
 def _make_runs(effort: Walk12Effort, spec: ProblemSpec, *searches: str) -> Iterator[Task]:
     yield from make_start_tasks(spec, effort.starts)
     if "ga" in searches:
-        yield from make_search_tasks(spec, "ga", GA, effort.runs, GA_EVALUATIONS)
+        yield from make_search_tasks(spec, {"ga": GA}, effort.runs, GA_EVALUATIONS)
     if "pso" in searches:
-        yield from make_search_tasks(spec, "pso", ParticleSwarm(), effort.runs, effort.pso_evaluations)
+        yield from make_search_tasks(spec, {"pso": ParticleSwarm()}, effort.runs, effort.pso_evaluations)
 
 
 def _make_spec(
