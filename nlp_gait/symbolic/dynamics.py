@@ -89,17 +89,41 @@ def newton_euler(
         shared as Khalil and Kleinfinger (1987) do. Rotors add their inertia at the joint times its acceleration, without
         gyroscopic torques: Featherstone (2008), section 9.6. Equations (D.1) to (D.9) in docs/model.
     """
-    shares = shares or {}
+    shares, pushes = shares or {}, pushes or {}
     rotations = [relative_rotation(body, q) for body in tree]
-    inertias = regroup_inertias(tree, shares)
-    forces, moments = _accelerate(tree, inertias, rotations, qd, qdd, gravity, upright)
-    for i, body in enumerate(tree):
+    moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
+    # What the motion of each body needs, about its reference point, in its axes.
+    forces: list[SX] = []
+    moments: list[SX] = []
+    down = gravity if isinstance(gravity, tuple) else (0.0, 0.0, -gravity)
+    for body, inertia, rotation in zip(tree, regroup_inertias(tree, shares), rotations, strict=True):
+        spin, spin_rate = SX(3, 1), SX(3, 1)
+        if body.joint is None:
+            acceleration = SX(DM([0.0 - part for part in down]))  # gravity as an upward acceleration of the ground
+        else:
+            parent_spin, parent_spin_rate, parent_turning, parent_acceleration = moved[body.parent]
+            acceleration = rotation.T @ (parent_acceleration + parent_turning @ DM(body.offset_m))
+            if body.link.name not in upright:
+                axis = body.direction * DM(body.joint.axis)
+                rate, rate_rate = axis * qd[body.joint.name], axis * qdd[body.joint.name]
+                carried = rotation.T @ parent_spin
+                spin = carried + rate
+                spin_rate = rotation.T @ parent_spin_rate + ca.cross(carried, rate) + rate_rate
+        # From the position of a body's point to its acceleration, relative to the reference point.
+        (x, y, z), (a, b, c) = ca.vertsplit(spin), ca.vertsplit(spin_rate)
+        xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
+        turning = ca.blockcat(
+            [[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]]
+        )
+        moved.append((spin, spin_rate, turning, acceleration))
+        force = inertia.mass * acceleration + turning @ DM(inertia.first)
+        moment = ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, DM(inertia.second))
         if body.link.name in shares:  # force and moment are linear in mass and inertia
-            forces[i] *= shares[body.link.name]
-            moments[i] *= shares[body.link.name]
-        if pushes and body.link.name in pushes:  # its joint does not transmit them
-            forces[i] -= pushes[body.link.name].force
-            moments[i] -= pushes[body.link.name].moment
+            force, moment = force * shares[body.link.name], moment * shares[body.link.name]
+        if body.link.name in pushes:  # its joint does not transmit them
+            force, moment = force - pushes[body.link.name].force, moment - pushes[body.link.name].moment
+        forces.append(force)
+        moments.append(moment)
     torques: dict[str, SX] = {}
     for i in range(len(tree) - 1, 0, -1):
         body = tree[i]
@@ -144,47 +168,6 @@ def _inertia(body: TreeBody) -> Inertia:
     mass, com, about_com = body.link.mass_kg, np.array(body.com_offset_m), body.link.inertia_matrix
     spread = np.trace(about_com) / 2 * np.eye(3) - about_com  # second moments about the centre of mass
     return Inertia(mass, mass * com, spread + mass * np.outer(com, com))
-
-
-def _accelerate(
-    tree: Sequence[TreeBody],
-    inertias: Sequence[Inertia],
-    rotations: Sequence[SX],
-    qd: Mapping[str, SX],
-    qdd: Mapping[str, SX],
-    gravity: float | tuple[float, float, float],
-    upright: Collection[str],
-) -> tuple[list[SX], list[SX]]:
-    """Return force and moment that the motion of each body needs, about its reference point, in its axes."""
-    moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
-    forces: list[SX] = []
-    moments: list[SX] = []
-    down = gravity if isinstance(gravity, tuple) else (0.0, 0.0, -gravity)
-    for body, inertia, rotation in zip(tree, inertias, rotations, strict=True):
-        spin, spin_rate = SX(3, 1), SX(3, 1)
-        if body.joint is None:
-            acceleration = SX(DM([0.0 - part for part in down]))  # gravity as an upward acceleration of the ground
-        else:
-            parent_spin, parent_spin_rate, parent_turning, parent_acceleration = moved[body.parent]
-            acceleration = rotation.T @ (parent_acceleration + parent_turning @ DM(body.offset_m))
-            if body.link.name not in upright:
-                axis = body.direction * DM(body.joint.axis)
-                rate, rate_rate = axis * qd[body.joint.name], axis * qdd[body.joint.name]
-                carried = rotation.T @ parent_spin
-                spin = carried + rate
-                spin_rate = rotation.T @ parent_spin_rate + ca.cross(carried, rate) + rate_rate
-        turning = _compute_turning(spin, spin_rate)
-        moved.append((spin, spin_rate, turning, acceleration))
-        forces.append(inertia.mass * acceleration + turning @ DM(inertia.first))
-        moments.append(ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, DM(inertia.second)))
-    return forces, moments
-
-
-def _compute_turning(spin: SX, spin_rate: SX) -> SX:
-    """Return the matrix (3, 3) from the position of a body's point to its acceleration, relative to the reference point."""
-    (x, y, z), (a, b, c) = ca.vertsplit(spin), ca.vertsplit(spin_rate)
-    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
-    return ca.blockcat([[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]])
 
 
 @build_formula((3, 3), (3, 3))

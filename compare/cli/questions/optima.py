@@ -52,12 +52,7 @@ def certainty(
 
 def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: bool) -> None:
     from compare.questions.certainty import search_point
-    from nlp_gait.proofs.certificate import (
-        check_certificate,
-        load_certified_problem,
-        read_certificate,
-        repeat_proof,
-    )
+    from nlp_gait.proofs.certificate import check_certificate, load_certified_problem, read_certificate, repeat_proof
 
     file = read_certificate(path)
     proof, points = file.certificate, {"a search": search_point(load_certified_problem(file), seed)}

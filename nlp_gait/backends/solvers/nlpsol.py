@@ -122,7 +122,6 @@ def _build_solver(problem: GaitProblem, settings: CasadiSolver) -> tuple[ca.Func
         return ca.nlpsol(settings.name, settings.name, nlp, options), watch, time.perf_counter() - started
 
 
-@dataclass(frozen=True, kw_only=True)
 class Fatrop(CasadiSolver):
     """FATROP, which cannot be ended between iterations."""
 
@@ -138,20 +137,16 @@ class WatchedSolver(CasadiSolver):
     time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of other solvers
 
 
-@dataclass(frozen=True, kw_only=True)
 class Sqpmethod(WatchedSolver):
     """CasADi's sequential quadratic programming with qpOASES."""
 
     name: ClassVar[str] = "sqpmethod"
     quiet: ClassVar[Mapping[str, Any]] = {
-        "print_header": False,
-        "print_iteration": False,
-        "print_status": False,
+        **{f"print_{what}": False for what in ("header", "iteration", "status")},
         "qpsol_options": {"printLevel": "none", "error_on_fail": False},
     }
 
 
-@dataclass(frozen=True, kw_only=True)
 class Uno(WatchedSolver):
     """Uno with its default preset."""
 

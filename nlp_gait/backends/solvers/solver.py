@@ -69,17 +69,10 @@ def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others
 
 def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
     """Count calls by kind from CasADi's statistics; products with the Hessian count as gradients."""
-
-    def calls(*names: str) -> int:
-        return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
-
-    return Evaluations(
-        f=calls("nlp_f", "nlp_fg"),
-        g=calls("nlp_g", "nlp_fg"),
-        gradient=calls("nlp_grad_f", "nlp_jac_fg", "fwd1_nlp_grad_l"),
-        jacobian=calls("nlp_jac_g", "nlp_jac_fg"),
-        hessian=calls("nlp_hess_l"),
-    )
+    names = {"f": "nlp_f nlp_fg", "g": "nlp_g nlp_fg", "jacobian": "nlp_jac_g nlp_jac_fg", "hessian": "nlp_hess_l"}
+    names["gradient"] = "nlp_grad_f nlp_jac_fg fwd1_nlp_grad_l"
+    counts = {kind: sum(int(stats.get(f"n_call_{name}", 0)) for name in each.split()) for kind, each in names.items()}
+    return Evaluations(**counts)
 
 
 class IterationWatch(ca.Callback):
