@@ -8,7 +8,7 @@ with x = default lower bound + z * default range. Samples are mapped, never unro
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -96,8 +96,6 @@ def _build(problem: GaitProblem) -> NlpModel:
     bounds = ca.Function("row_bounds", [p], [ca.densify(lower), ca.densify(upper)])
     cost = problem.objective.sign * assembly.objective
     row_names = tuple(name for constraint in assembly.constraints for name in constraint.row_names)
-    if any(not lift.tight for lift in ops.lifts):
-        _check_sense(problem, ops.lifts, ca.vertcat(z, p, width), cost, values, bounds, row_names)
     lifted = ca.vertcat(*(lift.variable for lift in ops.lifts))
     ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
     exact: list[MX] = []
@@ -108,7 +106,7 @@ def _build(problem: GaitProblem) -> NlpModel:
         # Rows of a lift repeat the order of its variables.
         owners.append(count + np.arange(lift.rows.shape[0]) % max(1, lift.variable.shape[0]))
         count += lift.variable.shape[0]
-    return NlpModel(
+    model = NlpModel(
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
         variables=n,
         row_names=row_names,
@@ -121,8 +119,11 @@ def _build(problem: GaitProblem) -> NlpModel:
         tie_owner=np.concatenate(owners),
         lift_sense=_repeat([lift.sense for lift in ops.lifts], [lift.variable for lift in ops.lifts]),
         smoothed=ops.smoothed,
-        build_s=time.perf_counter() - started,
+        build_s=0.0,
     )
+    if model.lift_sense.any():
+        _check_sense(problem, model, ops.lifts)
+    return replace(model, build_s=time.perf_counter() - started)
 
 
 def _repeat(values: Sequence[float], columns: Sequence[MX]) -> Array:
@@ -130,31 +131,19 @@ def _repeat(values: Sequence[float], columns: Sequence[MX]) -> Array:
     return np.repeat(np.array(values, dtype=float), np.array([column.shape[0] for column in columns], dtype=int))
 
 
-def _check_sense(
-    problem: GaitProblem,
-    lifts: list[Lift],
-    inputs: MX,
-    cost: MX,
-    values: MX,
-    bounds: ca.Function,
-    row_names: tuple[str, ...],
-) -> None:
+def _check_sense(problem: GaitProblem, model: NlpModel, lifts: list[Lift]) -> None:
     """Check that moving a lifted variable away from its exact value never helps; only then is the lifting exact.
 
     The check uses the signs of the first derivatives of the cost, of each row and of the rows that define the other lifted
     variables, at points inside the bounds. A tight lift cannot move.
     """
-    loose = [i for i, lift in enumerate(lifts) if not lift.tight]
-    variables = ca.vertcat(*(lift.variable for lift in lifts))
-    lifted = [lift.variable for lift in lifts]
-    columns, senses = _repeat(range(len(lifts)), lifted), _repeat([lift.sense for lift in lifts], lifted)
-    is_loose = np.isin(columns, loose)
-    column_owner, away = columns[is_loose], senses[is_loose]
-    outputs = ca.vertcat(cost, values, *(lift.rows for lift in lifts))
-    moved = ca.vertcat(*(lifts[i].variable for i in loose))
-    slopes = ca.Function("slopes", [inputs, variables], [ca.jacobian(outputs, moved)])
-    lower, upper = (np.array(b).ravel() for b in bounds(problem.p))
-    tight = _repeat([lift.tight for lift in lifts], [lift.rows for lift in lifts]) > 0
+    nlp, is_loose = model.nlp, model.lift_sense != 0.0
+    column_owner = _repeat(range(len(lifts)), [lift.variable for lift in lifts])[is_loose]
+    away = model.lift_sense[is_loose]
+    moved = ca.vertcat(*(lift.variable for lift in lifts if not lift.tight))
+    slopes = ca.Function("slopes", [nlp["x"], nlp["p"]], [ca.jacobian(ca.vertcat(nlp["f"], nlp["g"]), moved)])
+    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
+    tight = model.tie_upper == 0.0
     # +1: growing hurts (cost, rows with an upper bound); -1: growing helps (rows with a lower bound); 0: no bound.
     hurts = np.concatenate([[1.0], np.isfinite(upper) * 1.0 - np.isfinite(lower), tight - 1.0])
     two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), tight])
@@ -163,15 +152,15 @@ def _check_sense(
     row, column = (np.array(part) for part in slopes.sparsity_out(0).get_triplet())
     foreign = row_owner[row] != column_owner[column]
     for share in SENSE_POINTS:
-        at = np.concatenate([np.full(len(problem.variables), share), problem.p, [1e-3]])
-        slope = foreign * np.array(slopes(at, np.zeros(len(columns))).nonzeros())
+        at = np.concatenate([np.full(model.variables, share), np.zeros(model.lifted)])
+        slope = foreign * np.array(slopes(at, np.append(problem.p, 1e-3)).nonzeros())
         helps = slope * away[column] * hurts[row] < -SENSE_TOLERANCE
         helps |= two_sided[row] & (np.abs(slope) > SENSE_TOLERANCE)
         if helps.any():
             first = int(row[helps].min())
             where = "another abs or min"
             if row_owner[first] < 0:
-                where = f"row {row_names[first - 1]}" if first else "the objective"
+                where = f"row {model.row_names[first - 1]}" if first else "the objective"
             raise LiftedSenseError(
                 f"{problem.name}: {where} gains from moving a lifted variable away from its exact value, so the lifted "
                 "NLP would be wrong; use abs only where it is minimised or bounded from above, min only where it is "
