@@ -30,9 +30,8 @@ from nlp_gait.progress import Progress, ignore_progress
 
 AT_BOUND = 1e-4  # share of a variable's range
 MANY_SOLVES = 10  # compiled functions pay, because they suit walks of any length and speed
-SENTENCES: Mapping[str, Mapping[str, Any]] = tomllib.loads(
-    files(__package__).joinpath("walk_remedies.toml").read_text(encoding="utf-8")
-)
+REMEDIES = files(__package__).joinpath("walk_remedies.toml")
+SENTENCES: Mapping[str, Mapping[str, Any]] = tomllib.loads(REMEDIES.read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

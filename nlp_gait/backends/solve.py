@@ -172,15 +172,15 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
         worst_violations=violations[:10],
         evaluations=sum((outcome.evaluations for outcome in outcomes), Evaluations()),
         time_s=SolveTime(build=best.build_s, compile=best.compile_s, solve=sum(outcome.time_s for outcome in outcomes)),
-        active_constraints=prices,
+        active_constraints=tuple(prices),
         starts=tuple(outcomes),
         seed=seed,
         **{name: getattr(best, name) for name in same},
     )
 
 
-def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[ActiveConstraint, ...]:
-    """Return the bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
+def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> Iterator[ActiveConstraint]:
+    """Yield the bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
 
     Equations of the problem are left out; a fixed variable has a price.
     """
@@ -189,7 +189,6 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[
     rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last
     slopes = -np.concatenate([at.rows[:rows], at.bounds[: len(problem.names)] / problem.scale])
     weights = np.abs(slopes) * np.concatenate([np.ones(rows), problem.scale])
-    found = []
     for i in np.argsort(-weights, kind="stable"):
         if weights[i] < PRICE_TOLERANCE:
             break
@@ -199,9 +198,7 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> tuple[
         side = "upper" if slopes[i] < 0 else "lower"
         name, row_unit, bound = exact.row_names[i], exact.row_units[i], float(getattr(values, side)[i])
         price, price_unit = float(problem.objective.sign * slopes[i]), f"{per}per {row_unit}"
-        active = ActiveConstraint(name=name, side=side, bound=bound, unit=row_unit, price=price, price_unit=price_unit)
-        found.append(active)
-    return tuple(found)
+        yield ActiveConstraint(name=name, side=side, bound=bound, unit=row_unit, price=price, price_unit=price_unit)
 
 
 class Continuation:

@@ -148,8 +148,7 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
 def hash_files(options: Mapping[str, Any]) -> dict[str, str]:
     """Return the hashes of the files that options of a problem name, by option."""
     names = FILE_HASHES.keys() & options.keys()
-    found = {name: import_object(FILE_HASHES[name])(options[name]) for name in names}
-    return {name: digest for name, digest in found.items() if digest}
+    return {name: digest for name in names if (digest := import_object(FILE_HASHES[name])(options[name]))}
 
 
 def _to_python(value: Any) -> Any:

@@ -26,7 +26,6 @@ from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import to_floats
 
-SCALAR_FUNCTIONS = ("-DNO_VECTOR_LIBM",)
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 # Candidates in one call of the virtual machine; more would only use more memory.
 BLOCKS = (64, 16, 4, 1)
@@ -42,7 +41,8 @@ class NativeKernel:
 
         With ``scalar_functions``, sines and the like take one lane after the other, so that no bit depends on the lane count.
         """
-        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *SCALAR_FUNCTIONS[: int(scalar_functions)])
+        more = ("-DNO_VECTOR_LIBM",) if scalar_functions else ()
+        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *more)
         loaded, self.library = load_library(write_kernel_source(kernel.function), compiler, flags, SYMBOLS)
         self._evaluate = loaded.nlp_gait_evaluate
         self._evaluate.argtypes = [_POINTER, _INTEGER, *[_POINTER] * 8]
@@ -141,7 +141,6 @@ class RowThreads:
         return pools[process]
 
 
-LOG = logging.getLogger("nlp_gait")
 # Detects a wrong library, not rounding: compiled and interpreted values agree to about 1e-12.
 CHECK_TOLERANCE = 1e-6
 CHECK_POINTS = 5
@@ -258,7 +257,8 @@ def compile_objective(
     except CompilerError as error:
         if require_compiler:
             raise
-        LOG.warning("the objective is interpreted, which is many times slower: %s", error)
+        slow = "the objective is interpreted, which is many times slower: %s"
+        logging.getLogger("nlp_gait").warning(slow, error)
         evaluator = problem.build_once(InterpretedKernel)
         used = 1  # the virtual machine does not release Python's lock
     rebuild = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)

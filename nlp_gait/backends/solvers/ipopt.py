@@ -25,8 +25,6 @@ from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Evaluations, Guess, Outcome
 from nlp_gait.interrupts import Stop, defer_interrupts, never
 
-LOG = logging.getLogger("nlp_gait")
-
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 # Sigmoid widths of further stages, used only if the exact functions find the point infeasible.
 NARROWER_WIDTHS = (1e-4, 2e-5)
@@ -117,7 +115,7 @@ class IpoptSettings(Solver):
         except CompilerError as error:
             if self.compiled:
                 raise
-            LOG.warning("IPOPT's functions are interpreted: %s", error)
+            logging.getLogger("nlp_gait").warning("IPOPT's functions are interpreted: %s", error)
             return replace(chosen, compiled=False).prepare(problem)
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
