@@ -40,6 +40,7 @@ LARGEST_PROGRAM = 64 * 2**20  # it may be compiled
 _allowed: dict[str, str] = {}
 # Files that another machine has sent, by the place that a reference names.
 _copies: dict[str, str] = {}
+_make_folder_of_copies = cache(lambda: TemporaryDirectory(prefix="nlp-gait-code-"))  # deleted when the process ends
 
 
 class PackedCode(NamedTuple):
@@ -171,11 +172,6 @@ def unpack_code(packed: PackedCode) -> None:
         if not path.exists():
             write_bytes(path, content).chmod(0o700)  # it may be a program
     _copies[packed.home] = str(folder / packed.file)
-
-
-@cache
-def _make_folder_of_copies() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="nlp-gait-code-")  # deleted when the process ends
 
 
 def hash_source(text: str, kind: Kind) -> str:
