@@ -109,12 +109,7 @@ def newton_euler(
                 carried = rotation.T @ parent_spin
                 spin = carried + rate
                 spin_rate = rotation.T @ parent_spin_rate + ca.cross(carried, rate) + rate_rate
-        # From the position of a body's point to its acceleration, relative to the reference point.
-        (x, y, z), (a, b, c) = ca.vertsplit(spin), ca.vertsplit(spin_rate)
-        xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
-        turning = ca.blockcat(
-            [[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]]
-        )
+        turning = _compute_turning(spin, spin * spin, spin_rate)
         moved.append((spin, spin_rate, turning, acceleration))
         force = inertia.mass * acceleration + turning @ DM(inertia.first)
         moment = ca.cross(SX(DM(inertia.first)), acceleration) + _compute_moment(turning, DM(inertia.second))
@@ -168,6 +163,14 @@ def _inertia(body: TreeBody) -> Inertia:
     mass, com, about_com = body.link.mass_kg, np.array(body.com_offset_m), body.link.inertia_matrix
     spread = np.trace(about_com) / 2 * np.eye(3) - about_com  # second moments about the centre of mass
     return Inertia(mass, mass * com, spread + mass * np.outer(com, com))
+
+
+@build_formula((3, 1), (3, 1), (3, 1))
+def _compute_turning(spin: SX, squared: SX, spin_rate: SX) -> SX:
+    """Return the matrix (3, 3) from the position of a body's point to its acceleration, relative to the reference point."""
+    (x, y, z), (xx, yy, zz), (a, b, c) = map(ca.vertsplit, (spin, squared, spin_rate))
+    xy, xz, yz = x * y, x * z, y * z
+    return ca.blockcat([[-(yy + zz), xy - c, xz + b], [xy + c, -(xx + zz), yz - a], [xz - b, yz + a, -(xx + yy)]])
 
 
 @build_formula((3, 3), (3, 3))

@@ -238,7 +238,7 @@ def _build_chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
     rotation = SX.eye(3)
     for i in reversed(range(n)):
         axes[i] = rotation @ DM(leg.axes[i])
-        rotation = rotation @ rotation_matrix(DM(leg.axes[i]), cosines[i], -sines[i])
+        rotation = rotation @ rotation_matrix(leg.axes[i], cosines[i], -sines[i])
         rotations[i] = rotation
         before = points[i - 1] if i else leg.hip_m
         step = before - points[i]

@@ -1,6 +1,7 @@
 """Kinematics of a tree of bodies, and in closed form of a leg with two axes at the hip, a knee, and two axes at the ankle."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -24,7 +25,7 @@ UP = (0.0, 0.0, 1.0)
 
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
     """Return the rotation (3, 3) about a fixed unit axis by an angle [rad]."""
-    return rotation_matrix(DM(axis), ca.cos(angle), ca.sin(angle))
+    return rotation_matrix(axis, ca.cos(angle), ca.sin(angle))
 
 
 def turn_quaternion(attitude: Iterable[Any], cos: Any, sin: Any) -> list[Any]:
@@ -33,10 +34,16 @@ def turn_quaternion(attitude: Iterable[Any], cos: Any, sin: Any) -> list[Any]:
     return [cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]
 
 
-def rotation_matrix(k: DM, cos: SX, sin: SX) -> SX:
+def rotation_matrix(axis: Sequence[float], cos: SX, sin: SX) -> SX:
     """Return the rotation (3, 3) about a fixed unit axis (Rodrigues); coordinate axes need no superfluous terms."""
+    return _build_rotation(tuple(axis))(cos, sin)
+
+
+@lru_cache
+def _build_rotation(axis: tuple[float, ...]) -> ca.Function:
+    k, cos, sin = DM(axis), SX.sym("cos"), SX.sym("sin")
     along = k @ k.T
-    return SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)
+    return ca.Function("rotation", [cos, sin], [SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)])
 
 
 def relative_rotation(body: TreeBody, q: Mapping[str, SX]) -> SX:
