@@ -99,11 +99,9 @@ def make_start_tasks(
     ]
 
 
-def make_search_tasks(
-    problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, evaluations: int
-) -> list[Task]:
+def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, budget: int) -> list[Task]:
     """Return tasks of searches by label; run k has seed k."""
-    stop, searches = Stop(evaluations=evaluations), product(algorithms.items(), range(runs))
+    stop, searches = Stop(evaluations=budget), product(algorithms.items(), range(runs))
     return [Task(problem=problem, solver=solver, label=label, stop=stop, run=k) for (label, solver), k in searches]
 
 
