@@ -44,8 +44,8 @@ def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
     return claims.require_significance(check, RANK_SUM, test.p_two_sided)
 
 
-def _check_left_tail(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
-    p = phase.test(f"{swarm}{kind}", f"ga{kind}").p_less
+def _check_left_tail(phase: PhaseFindings, swarm: str) -> Check:
+    p = phase.test(swarm, "ga").p_less
     shown = {p < claims.SIGNIFICANT: ClaimVerdict.HOLDS, p > 1 - claims.SIGNIFICANT: ClaimVerdict.FAILS}
     return decide(shown.get(True, ClaimVerdict.NOT_SHOWN), swarm=NAMES[swarm], p_less=p)
 

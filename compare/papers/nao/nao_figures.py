@@ -69,11 +69,12 @@ def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
     figure = new_figure(7.5, 0.5 + 2.1 * len(positions))
     grid = figure.subplots(len(positions), len(SEARCHES), sharey=True, sharex="row", squeeze=False)
     for k, (row, position) in enumerate(zip(grid, positions, strict=True)):
-        variable = phase.problem.variables[position]
+        variable, sweep = phase.problem.variables[position], phase.sweeps[position]
+        optima = np.array([(held.at, held.power_W if held.feasible else np.nan) for held in sweep]).T
         label = rf"$x_{{{position + 1}}}$: {axis_label(variable.name, variable.unit)}"
         for axes, name in zip(row, SEARCHES, strict=True):
             _plot_solutions(axes, phase.points[name], position, name)
-            _plot_optima(axes, phase, position)
+            axes.plot(*optima, color=COLOURS["ipopt"], linewidth=1.2)
             axes.set_xlabel(label)
             axes.locator_params(axis="x", nbins=4)
             if k == 0:
@@ -87,20 +88,11 @@ def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
 def _plot_solutions(axes: Axes, points: FeasiblePoints, position: int, name: str) -> None:
     """Plot feasible solutions, thinned to those that can be distinguished."""
     x, power = points.x[:, position], points.power_W
-    cells = np.stack([_assign_cells(x), _assign_cells(np.log(power))])
-    shown = np.unique(cells, axis=1, return_index=True)[1]
+    values = np.column_stack([x, np.log(power)])
+    span = np.ptp(values, axis=0)
+    cells = np.round((values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0) * CELLS)
+    shown = np.unique(cells, axis=0, return_index=True)[1]
     axes.plot(x[shown], power[shown], ".", color=COLOURS[name], markersize=1.5, alpha=0.4, rasterized=True)
-
-
-def _assign_cells(values: Array) -> Array:
-    span = float(np.ptp(values)) or 1.0
-    return np.round((values - values.min()) / span * CELLS)
-
-
-def _plot_optima(axes: Axes, phase: PhaseFindings, position: int) -> None:
-    sweep = phase.sweeps[position]
-    power = [held.power_W if held.feasible else np.nan for held in sweep]
-    axes.plot([held.at for held in sweep], power, color=COLOURS["ipopt"], linewidth=1.2)
 
 
 def _draw_swing(findings: NaoFindings) -> Figure:
