@@ -45,7 +45,7 @@ def compute_planning_values(findings: StairsFindings) -> dict[str, Any]:
         "between": "; ".join([*findings.best("jerk", case).verdict.violated, "none"][0] for case in findings.cases),
         "eq": _compute_printed(findings),
         "drawn_case": DRAWN_CASE,
-        "of": _name_cases(findings),
+        "of": f"case{'s' if len(findings.cases) > 1 else ''} {' / '.join(map(str, findings.cases))}",
         "least_ratio": min(row.rise_run_ratio for row in TABLE_4.values()),
         "slides": Series(filter(None, (measure_slide(*size) for size in findings.effort.other_stairs))),
         "reserve_mm": 1e3 * SAMPLING_RESERVE * (len(PHASES) / findings.effort.plan_intervals) ** 2,
@@ -82,16 +82,14 @@ def _get_networks(findings: StairsFindings) -> list[Mapping[str, Any]]:
     return [network["adam"], *printed, network[f"gradient {ONLINE.rate:g}"]]
 
 
-def _name_cases(findings: StairsFindings) -> str:
-    return f"case{'s' if len(findings.cases) > 1 else ''} {' / '.join(map(str, findings.cases))}"
-
-
 def compute_effects(findings: StairsFindings) -> dict[str, Any]:
     """Return numbers for the table of differences, as text; those of plans by plan, in the order of the cases or as above."""
     cases = findings.cases
     arrays = {what: move(findings, what, DRAWN_CASE)[0].arrays for what in PLANS}
     moments = {what: [_change_inertia(arrays[what], share) for share in INERTIAS] for what in PLANS}
     planned = {name or OURS: _describe_plans(findings, name) for name in ("", *stairs_paper.PLAN_CHOICES)}
+    ours = planned[OURS]
+    changed = {name: "unchanged" if text == ours else f"{text} instead of {ours}" for name, text in planned.items()}
     return {
         "inertia_J": {what: Series(energy for energy, _ in rows) for what, rows in moments.items()},
         "inertia_mm": {what: Series(margin for _, margin in rows) for what, rows in moments.items()},
@@ -110,7 +108,7 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
         "printed_effort": stairs_paper.ANTS * stairs_paper.ITERATIONS,
         "planned": planned,
         "tread_between": "".join(f" ({row} between samples)" for row in _list_between(findings, "tread")),
-        "plan_effect": {name: _compare_texts(text, planned[OURS]) for name, text in planned.items()},
+        "plan_effect": {name: f"case {DRAWN_CASE}: {text}" for name, text in changed.items()},
         "tracked": {name: _describe_step(findings, name) for name in stairs_paper.CHOICES},
     }
 
@@ -133,10 +131,6 @@ def _list_between(findings: StairsFindings, name: str) -> list[str]:
         stairs_planning.get_choice(findings, "jerk", name).verdict if name in findings.effort.plan_choices else None
     )
     return [*verdict.violated[:1]] if verdict is not None and verdict.feasible else []
-
-
-def _compare_texts(changed: str, ours: str) -> str:
-    return f"case {DRAWN_CASE}: {'unchanged' if changed == ours else f'{changed} instead of {ours}'}"
 
 
 def _describe_step(findings: StairsFindings, name: str) -> str:

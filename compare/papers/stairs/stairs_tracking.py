@@ -262,7 +262,10 @@ def _check_torso(findings: StairsFindings, index: str) -> Check:
     torso. A step whose ZMP leaves the polygon upright is no comparison of energies.
     """
     tuned, own = _collect(findings, index), findings.collect("printed", f"upright_{index}")
-    upright = {name: _measure_upright(findings, name) for name in tuned}
+    upright = {}
+    for name in tuned:  # the best gains of a reading with an upright torso
+        best = [(make_choice_spec(findings, case, name), get_best(findings, case, name)) for case in findings.cases]
+        upright[name] = [evaluate(s.load(), [*get_point(run)[:2], np.pi / 2]).indexes for s, run in best]
     values = {name: Series(row[index] for row in rows) for name, rows in upright.items()}
     stays = [name for name, rows in upright.items() if min(row["zmp_margin_min_m"] for row in rows) >= 0]
     names = stays if index == "energy_J" else tuned
@@ -271,8 +274,3 @@ def _check_torso(findings: StairsFindings, index: str) -> Check:
     found = "; ".join(f"{CHOICES[name].text}: {row} against {values[name]}" for name, row in tuned.items())
     changes = 100 * (1 - better / worse) if index == "energy_J" else 1e3 * (better - worse) / len(own)
     return require_change(changes[:, None], found=found, own=own)
-
-
-def _measure_upright(findings: StairsFindings, name: str) -> list[Mapping[str, float]]:
-    pairs = [(make_choice_spec(findings, case, name), get_best(findings, case, name)) for case in findings.cases]
-    return [evaluate(spec.load(), [*get_point(best)[:2], np.pi / 2]).indexes for spec, best in pairs]
