@@ -10,7 +10,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeVar, cast
+from typing import Any, Literal, NoReturn, TypeVar, cast
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -21,9 +21,6 @@ from rich.text import Text
 
 from nlp_gait.files import replace_nan
 from nlp_gait.interrupts import Interrupted
-
-if TYPE_CHECKING:
-    from compare.study.evidence import Exclusion
 
 T = TypeVar("T")
 
@@ -71,10 +68,10 @@ def fail(message: str, status: int = 1) -> NoReturn:
     raise typer.Exit(status)
 
 
-def end_if_excluded(excluded: Sequence[Exclusion]) -> None:
-    """Report records that are no evidence on stderr, and end with status 1 if there are any."""
-    for exclusion in excluded[:MOST_EXCLUDED]:
-        say_error(f"excluded {exclusion.sentence}")
+def end_if_excluded(excluded: Sequence[str]) -> None:
+    """Report sentences about records that are no evidence on stderr, and end with status 1 if there are any."""
+    for sentence in excluded[:MOST_EXCLUDED]:
+        say_error(f"excluded {sentence}")
     if excluded:
         more = f" ({len(excluded) - MOST_EXCLUDED} more are in the report)" if len(excluded) > MOST_EXCLUDED else ""
         count = f"{len(excluded)} record{'s were' if len(excluded) > 1 else ' was'} excluded{more}"

@@ -95,7 +95,7 @@ def report(
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     data = {**plain_simulations(simulated), "excluded": [exclusion.sentence for exclusion in evidence.excluded]}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
-    end_if_excluded(evidence.excluded)
+    end_if_excluded([each.sentence for each in evidence.excluded])
 
 
 @command

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from compare.study.description import split_sections
 from nlp_gait.decoding import decode
 from nlp_gait.errors import unknown
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.gaitbench.facts import BY_ID
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import is_user_code
+
+SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,3 +68,16 @@ def cite_problems(problems: Iterable[Mapping[str, Any]]) -> str:
     names = dict.fromkeys(instance if instance in BY_ID else name for name, instance in named)
     found = [find_citations(name) for name in names if name in BY_ID or name in PROBLEMS]
     return "\n\n".join(dict.fromkeys(entry for entries in found or [find_citations()[:1]] for entry in entries))
+
+
+def split_sections(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the sections of a Google docstring with their headings; the first has none."""
+    heading, lines = "", list[str]()
+    for line in inspect.cleandoc(text).splitlines():
+        found = SECTION.match(line)
+        if found:
+            yield heading, "\n".join(lines).strip("\n")
+            heading, lines = found[1], []
+        else:
+            lines.append(line)
+    yield heading, "\n".join(lines).strip("\n")

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from compare.study.citations import split_sections
 from compare.study.task import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from metaheuristics.registry import ADAPTERS, ALGORITHMS
 from nlp_gait.backends.solvers.registry import SOLVERS
 
-SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
 FIELD = re.compile(r"^    (\w+):")
 
 
@@ -64,19 +64,6 @@ def describe_solver(name: str) -> Description:
         settings=settings,
         source=" ".join(sections.get("Source", "").replace("``", "`").split()),
     )
-
-
-def split_sections(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the sections of a Google docstring with their headings; the first has none."""
-    heading, lines = "", list[str]()
-    for line in inspect.cleandoc(text).splitlines():
-        found = SECTION.match(line)
-        if found:
-            yield heading, "\n".join(lines).strip("\n")
-            heading, lines = found[1], []
-        else:
-            lines.append(line)
-    yield heading, "\n".join(lines).strip("\n")
 
 
 def _read_fields(kind: type) -> Iterator[tuple[str, str]]:
