@@ -16,6 +16,7 @@ from compare.cli import app
 from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.formulation import Array, Result, load
 from nlp_gait.robots import load_robot
+from nlp_gait.simulation import load_sharing
 from nlp_gait.simulation.load_sharing import (
     Sharing,
     Support,
@@ -200,7 +201,7 @@ def test_what_cannot_be_shared_is_reported(plan: Plan, monkeypatch: pytest.Monke
 
 
 @pytest.mark.slow
-def test_the_command_shares_load(tmp_path: Path) -> None:
+def test_the_command_shares_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Power that the model predicts falls, more so where load may jump."""
     pytest.importorskip("mujoco")
     problem = load("nao-dsp", torso_share="lever")
@@ -208,13 +209,20 @@ def test_the_command_shares_load(tmp_path: Path) -> None:
     file = tmp_path / "best.json"
     options = {"torso_share": "lever"}
     file.write_text(json.dumps({"problem": "nao-dsp", "options": options, "x": problem.by_name(x)}))
-    found = []
+    found, shared = [], []
+
+    def record(plan: Plan, sharing: Sharing) -> Plan:
+        shared.append((plan, sharing, share_loads(plan, sharing)))
+        return shared[-1][-1]
+
+    monkeypatch.setattr(load_sharing, "share_loads", record)
     for more in ([], ["--share-loads", "--load-rate", "0.5"]):
         done = CliRunner().invoke(app, ["simulate", str(file), "--json", *more])
         assert done.exit_code == 0, done.output
         found.append(json.loads(done.stdout))
     predicted = [sum(report["predicted"][part] for part in ("mechanical_W", "heat_W")) for report in found]
-    plan = make_plan(Result(problem=problem, x=x))
-    slow, jumping = (power(share_loads(plan, sharing)).mean() for sharing in (Sharing(load_rate_1_s=0.5), Sharing()))
+    ((plan, sharing, slowly),) = shared
+    assert sharing == Sharing(load_rate_1_s=0.5)
+    slow, jumping = power(slowly).mean(), power(share_loads(plan, Sharing())).mean()
     assert predicted[0] > predicted[1] == pytest.approx(slow, rel=1e-2) and slow > jumping
     assert not any(report["fallen"] for report in found)
