@@ -14,7 +14,7 @@ from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
-from nlp_gait.symbolic.kinematics import UP, axis_rotation, rotation_matrix
+from nlp_gait.symbolic.kinematics import UP, axis_rotation, build_rotation
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
 from nlp_gait.symbolic.trajectories import Motion, map_motion, stack
 
@@ -238,7 +238,7 @@ def _build_chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
     rotation = SX.eye(3)
     for i in reversed(range(n)):
         axes[i] = rotation @ DM(leg.axes[i])
-        rotation = rotation @ rotation_matrix(leg.axes[i], cosines[i], -sines[i])
+        rotation = rotation @ build_rotation(tuple(leg.axes[i]))(cosines[i], -sines[i])
         rotations[i] = rotation
         before = points[i - 1] if i else leg.hip_m
         step = before - points[i]

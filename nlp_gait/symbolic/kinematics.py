@@ -25,7 +25,7 @@ UP = (0.0, 0.0, 1.0)
 
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
     """Return the rotation (3, 3) about a fixed unit axis by an angle [rad]."""
-    return rotation_matrix(axis, ca.cos(angle), ca.sin(angle))
+    return build_rotation(tuple(axis))(ca.cos(angle), ca.sin(angle))
 
 
 def turn_quaternion(attitude: Iterable[Any], cos: Any, sin: Any) -> list[Any]:
@@ -34,13 +34,9 @@ def turn_quaternion(attitude: Iterable[Any], cos: Any, sin: Any) -> list[Any]:
     return [cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]
 
 
-def rotation_matrix(axis: Sequence[float], cos: SX, sin: SX) -> SX:
-    """Return the rotation (3, 3) about a fixed unit axis (Rodrigues); coordinate axes need no superfluous terms."""
-    return _build_rotation(tuple(axis))(cos, sin)
-
-
 @lru_cache
-def _build_rotation(axis: tuple[float, ...]) -> ca.Function:
+def build_rotation(axis: tuple[float, ...]) -> ca.Function:
+    """Return the rotation (3, 3) about a fixed unit axis as a function of cosine and sine (Rodrigues), sparse if it can be."""
     k, cos, sin = DM(axis), SX.sym("cos"), SX.sym("sin")
     along = k @ k.T
     return ca.Function("rotation", [cos, sin], [SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)])
