@@ -111,15 +111,9 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         inner = map_point(point)
         assembly = problem.assemble(inner, ops)
+        value, upper = (inner.x - DM(low)) / DM(scale), ca.MX(DM((problem.upper - low) / scale))
         within = Constraint(
-            name=RANGE,
-            labels=old,
-            unit="1",
-            scale=1.0,
-            value=(inner.x - DM(low)) / DM(scale),
-            lower=ca.MX(0),
-            upper=ca.MX(DM((problem.upper - low) / scale)),
-            over="once",
+            name=RANGE, labels=old, unit="1", scale=1.0, value=value, lower=ca.MX(0), upper=upper, over="once"
         )
         return replace(assembly, constraints=(*assembly.constraints, within))
 

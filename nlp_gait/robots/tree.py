@@ -152,17 +152,16 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
         centre_in_parent = (0.0, 0.0, 0.0) if joint is None or not forward else joint.origin_m
         reference = (0.0, 0.0, 0.0) if joint is None or forward else joint.origin_m
         link = robot.links[name]
-        bodies.append(
-            TreeBody(
-                link=link,
-                parent=parent,
-                joint=joint,
-                direction=1 if forward else -1,
-                offset_m=_vector(np.subtract(centre_in_parent, parent_reference)),
-                com_offset_m=_vector(np.subtract(link.com_m, reference)),
-                armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
-            )
+        body = TreeBody(
+            link=link,
+            parent=parent,
+            joint=joint,
+            direction=1 if forward else -1,
+            offset_m=_vector(np.subtract(centre_in_parent, parent_reference)),
+            com_offset_m=_vector(np.subtract(link.com_m, reference)),
+            armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
         )
+        bodies.append(body)
         index = len(bodies) - 1
         waiting += [(to, index, via, reference) for to, via in reversed(neighbours[name]) if via is not joint]
     return tuple(bodies)

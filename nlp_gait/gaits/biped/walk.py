@@ -257,6 +257,8 @@ def make_walk_problem(
 ) -> GaitProblem:
     """Return the problem of a walk; start points are shares of the bounds of the variables ``started``."""
     body = walk.body
+    start = partial(start_walk, [body.narrow(variable) for variable in started], math.tan(body.slope_rad))
+    durations = tuple(walk.parts[name].duration for name, count in walk.counts.items() for _ in range(count))
     problem = GaitProblem(
         name=f"{body.family}-walk",
         title=f"{body.title}, walk from standing to standing: least energy per metre",
@@ -266,14 +268,7 @@ def make_walk_problem(
         assemble=walk.assemble,
         grid=walk.phases["ssp"].grid,
         rows_over_time=walk.rows_over_time if body.closed_form else (),
-        display=Display(
-            motion=walk.signals,
-            durations=tuple(walk.parts[name].duration for name, count in walk.counts.items() for _ in range(count)),
-        ),
-        hints=SolverHints(
-            start=partial(start_walk, [body.narrow(variable) for variable in started], math.tan(body.slope_rad)),
-            starts=3,
-            searchable=False,
-        ),
+        display=Display(motion=walk.signals, durations=durations),
+        hints=SolverHints(start=start, starts=3, searchable=False),
     )
     return add_robot(problem, body, steps=walk.steps, ground=ground)

@@ -138,6 +138,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
     left, right = biped.legs["left"], biped.legs["right"]
     middle_x, _, middle_z = (left.hip_m + right.hip_m) / 2
     above = biped.model.feet["left"].ankle_height_m + float(left.ankle_m[2] - left.foot_m[2])
+    lowest, highest = (round(above + share * left.length_m, 3) for share in HEIGHT_SHARES)
     swing_speed = compare_swing(biped)
     rate = float(f"{LARGEST_LEAN_RATE * swing_speed / biped.time_scale:.4g}")
     heat = float(f"{biped.heat_W_per_Nm2:.4g}")
@@ -167,10 +168,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
         gravity=GRAVITY,
         feet_y=(float(left.foot_m[1]), float(right.foot_m[1])),
         leg_length_m=biped.leg_length_m,
-        hip_height_m=(
-            round(above + HEIGHT_SHARES[0] * left.length_m, 3),
-            round(above + HEIGHT_SHARES[1] * left.length_m, 3),
-        ),
+        hip_height_m=(lowest, highest),
         hip_m=(float(middle_x), 0.0, float(middle_z)),  # the legs are mirror images
         hip_name="middle of both hips",
         step_length_m=round(STEP_M * biped.length_scale, 3),

@@ -28,7 +28,7 @@ GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 
 # Section 4: the torso's origin is 0.25 to 0.31 m high. With NAO's ankles, hips and legs of 0.2029 m the distance of hip and ankle
 # is then 0.5905 to 0.8862 leg lengths, which is taken for other robots, to the millimetre.
-LEAST_HEIGHT_SHARE, GREATEST_HEIGHT_SHARE = 0.5905, 0.8862
+HEIGHT_SHARES = (0.5905, 0.8862)
 # Angles of the arms at both ends of each phase [rad]: Table 3, rows 6 to 9, and Table 5, rows 4 to 7.
 SWINGING = ("LShoulderPitch", "LElbowRoll", "RShoulderPitch", "RElbowRoll")
 ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {
@@ -238,6 +238,8 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
     left, right = (nao_joints.measure_leg(simulated, side) for side in "LR")
     leg_length = left.thigh_m + left.tibia_m
     ground = left.ankle_height_m - left.hip_m[2]
+    lowest, highest = (round(ground + share * leg_length, 3) for share in HEIGHT_SHARES)
+    separate = tuple(side + joint for side in "LR" for joint in nao_joints.ARM_JOINTS)
     return NaoBody(
         family="nao",
         title="NAO",
@@ -254,13 +256,8 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
         feet_y=(left.hip_m[1], right.hip_m[1]),
         leg_length_m=leg_length,
         arms=arms,
-        separate_joints=tuple(side + joint for side in "LR" for joint in nao_joints.ARM_JOINTS)
-        if arms == "separate"
-        else (),
-        hip_height_m=(
-            round(ground + LEAST_HEIGHT_SHARE * leg_length, 3),
-            round(ground + GREATEST_HEIGHT_SHARE * leg_length, 3),
-        ),
+        separate_joints=separate if arms == "separate" else (),
+        hip_height_m=(lowest, highest),
     )
 
 

@@ -122,12 +122,8 @@ class ClosedLoop:
         if self.rates == "differences":
             differences = (desired[:N, 1:] - desired[:N, :-1]) / QUANTUM
             desired = ca.vertcat(desired[:N, :], ca.horzcat(differences[:, 0], differences))
-        constants = ca.vertcat(
-            size,
-            *(point[name] for name in ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")),
-            point["gravity_compensation"],
-            point["disturbance_Nm"],
-        )
+        contact = ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")
+        constants = ca.vertcat(size, *(point[name] for name in (*contact, "gravity_compensation", "disturbance_Nm")))
         acted = slice(1, None) if self.scheme == "implicit" else slice(None, -1)
         if self.base == "stance-foot":
             ahead = biped.toe_foot_biped().foot_m * (self.base_point == "T'")

@@ -134,19 +134,12 @@ def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     rise = tread * parameters["rise_run_ratio"]
     first, second = -SETBACK, tread - SETBACK
     edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
-    zmp = signals.arrays.get("zmp")
-    return Skeleton(
-        t=signals.arrays["t"],
-        limbs=tuple(
-            Limb(side=side, points=np.stack([_sagittal(at[name]) for name in names], axis=1))
-            for side, names in LINES.items()
-        ),
-        soles=(),
-        ground=np.array([(x, level * rise) for x, level in edges]),
-        com=None,
-        zmp=None if zmp is None else _sagittal(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)])),
-        planar=True,
-    )
+    ground, zmp = np.array([(x, level * rise) for x, level in edges]), signals.arrays.get("zmp")
+    if zmp is not None:
+        zmp = _sagittal(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)]))
+    lines = {side: np.stack([_sagittal(at[name]) for name in names], axis=1) for side, names in LINES.items()}
+    limbs = tuple(Limb(side=side, points=points) for side, points in lines.items())
+    return Skeleton(t=signals.arrays["t"], limbs=limbs, soles=(), ground=ground, com=None, zmp=zmp, planar=True)
 
 
 def _sagittal(points: Array) -> Array:

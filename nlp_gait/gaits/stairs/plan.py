@@ -130,6 +130,7 @@ def stairs_plan(
         toe = compute_ground_force(q, qd, qdd) - stance
         return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
 
+    model = simulation_model(step_motion) if step == "next" and balance == "feet" else None
     return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
@@ -138,11 +139,7 @@ def stairs_plan(
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        display=Display(
-            motion=motion,
-            skeleton=skeleton,
-            simulation_model=simulation_model(step_motion) if step == "next" and balance == "feet" else None,
-        ),
+        display=Display(motion=motion, skeleton=skeleton, simulation_model=model),
         hints=SolverHints(start=partial(_start, step, variables)),
         rows_over_time=tuple(
             RowsOverTime(

@@ -72,16 +72,12 @@ def make_rigid_bodies(robot: PointMassBiped) -> Robot:
     joints, feet = {}, {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         # Links from the hip down: axis and place of the joint, length of what it moves, masses.
+        on_shank = (1 - 2 * SOLE_SHARE) * foot, (0, 0, shank_end + up)
         leg: dict[str, tuple[Vector, Vector, float, list[tuple[float, Vector]]]] = {
             "yaw": ((0, 0, 1), (0, sign * across, 0), robot.leg_m, [(hip / 3, here)]),
             "roll": ((1, 0, 0), here, robot.leg_m, [(hip / 3, here)]),
             "thigh": ((0, -1, 0), here, robot.leg_m, [(knee / 2, (0, 0, thigh_end))]),
-            "shank": (
-                (0, 1, 0),
-                (0, 0, thigh_end),
-                robot.shank_m,
-                [(knee / 2, here), ((1 - 2 * SOLE_SHARE) * foot, (0, 0, shank_end + up))],
-            ),
+            "shank": ((0, 1, 0), (0, 0, thigh_end), robot.shank_m, [(knee / 2, here), on_shank]),
             "ankle": ((0, -1, 0), (0, 0, shank_end), robot.foot_front_m, [(SOLE_SHARE * foot, (0, 0, up))]),
             "foot": ((1, 0, 0), here, robot.foot_front_m, [(SOLE_SHARE * foot, (0, 0, up))]),
         }

@@ -92,6 +92,7 @@ def walk12(
         reach = _limit_reach(point, robot, phases, [""] * phases.shape[1])
         return Assembly(objective=MX(0), constraints=(reach,), indexes={"Q_m2s": Q} if horizon == "step" else {})
 
+    means = ("Q_m2s",) if horizon == "step" else ()
     return GaitProblem(
         name="walk12",
         title="12-joint walk: stability margin against step length",
@@ -106,11 +107,7 @@ def walk12(
             simulation_model=make_simulation_model(robot, zmp),
         ),
         rows_over_time=(
-            RowsOverTime(
-                assemble=at_phases,
-                times=lambda values: (0.0, values["step_time_s"]),
-                means=("Q_m2s",) if horizon == "step" else (),
-            ),
+            RowsOverTime(assemble=at_phases, times=lambda values: (0.0, values["step_time_s"]), means=means),
         ),
         # All of 640 random starts converge; with the exact Hessian, 5 fail.
         hints=SolverHints(hessian="limited-memory"),
@@ -138,16 +135,11 @@ def _limit_reach(point: Point, robot: walk12_model.PointMassBiped, phases: MX | 
     x, phase = SX.sym("x", len(VARIABLES)), SX.sym("phase")
     cosines = ca.Function("reach", [x, phase], ca.cse([walk12_model.compute_knee_cosines(x, phase, robot)]))
     n = len(names)
+    labels = tuple(f"{leg} leg, {name}" for name in names for leg in ("stance", "swing"))
     limit = ca.cos(point["reach_margin_rad"])
+    value = ca.vec(cosines.map(n)(ca.repmat(point.x, 1, n), phases))
     return Constraint(
-        name="reach",
-        labels=tuple(f"{leg} leg, {name}" for name in names for leg in ("stance", "swing")),
-        unit="1",
-        scale=1.0,
-        value=ca.vec(cosines.map(n)(ca.repmat(point.x, 1, n), phases)),
-        lower=-limit,
-        upper=limit,
-        over="instant",
+        name="reach", labels=labels, unit="1", scale=1.0, value=value, lower=-limit, upper=limit, over="instant"
     )
 
 
