@@ -27,7 +27,8 @@ def prepare_start(
     lower, upper = read_bounds(objective)
     values, groups = getattr(objective, "inequalities", None), getattr(objective, "groups", ())
     # The children that a first `spawn` would give, without counting them in the parent.
-    keys, size = [(*seed.spawn_key, index) for index in (0, 1)], seed.pool_size
+    keys = [(*seed.spawn_key, index) for index in (0, 1)]
+    size = seed.pool_size
     first, second = (np.random.SeedSequence(seed.entropy, spawn_key=key, pool_size=size) for key in keys)
     return Start(
         lower=lower,

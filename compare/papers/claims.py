@@ -103,7 +103,8 @@ def decide(verdict: bool | ClaimVerdict | Sequence[bool], /, **values: Any) -> C
     """
     counts, detail = Counter(np.atleast_1d(verdict).tolist()), ""
     if len(counts) == 2:
-        verdict, detail = ClaimVerdict.UNTESTABLE, f"(holds under {counts[True]} of {counts.total()} readings)"
+        verdict = ClaimVerdict.UNTESTABLE
+        detail = f"(holds under {counts[True]} of {counts.total()} readings)"
     elif not isinstance(verdict, ClaimVerdict):
         verdict = ClaimVerdict.HOLDS if counts[True] else ClaimVerdict.FAILS
     return Check(lambda _: (verdict, detail), values)

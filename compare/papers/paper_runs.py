@@ -101,7 +101,8 @@ def make_start_tasks(
 
 def make_search_tasks(problem: ProblemSpec, algorithms: Mapping[str, Algorithm], runs: int, budget: int) -> list[Task]:
     """Return tasks of searches by label; run k has seed k."""
-    stop, searches = Stop(evaluations=budget), product(algorithms.items(), range(runs))
+    stop = Stop(evaluations=budget)
+    searches = product(algorithms.items(), range(runs))
     return [Task(problem=problem, solver=solver, label=label, stop=stop, run=k) for (label, solver), k in searches]
 
 
@@ -109,7 +110,8 @@ def choose_best(records: Iterable[RunRecord]) -> RunRecord:
     """Return the best run: claimed ones come first, then feasible ones, both by objective, then the others by violation."""
 
     def rank(record: RunRecord) -> tuple[bool, bool, float]:
-        verdict, sign = record.verdict, 1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0
+        verdict = record.verdict
+        sign = 1.0 if record.definition["objective"]["sense"] == "minimise" else -1.0
         by = sign * verdict.objective if verdict.feasible else verdict.violation
         return not record.claimed, not verdict.feasible, by
 

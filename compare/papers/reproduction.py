@@ -133,7 +133,8 @@ class Reproduction(Generic[E, F]):
         template = (resources.files("compare.papers") / self.name / f"{self.name}_report.md").read_text(
             encoding="utf-8"
         )
-        values, records = {"effort": effort, **self.values(findings)}, runner.records
+        values = {"effort": effort, **self.values(findings)}
+        records = runner.records
         claims = self.check_claims(findings, values)
         differences = fill_differences(self.printed.differences, values)
         with style():

@@ -61,7 +61,10 @@ class ExactModel:
         violations, found = _compute_violations(values), []
         for k in range(len(self.row_names)) if chosen is None else chosen:
             low, high = (float(end[k]) if math.isfinite(end[k]) else None for end in (values.lower, values.upper))
-            name, unit, value, miss = self.row_names[k], self.row_units[k], float(values.g[k]), float(violations[k])
+            name = self.row_names[k]
+            unit = self.row_units[k]
+            value = float(values.g[k])
+            miss = float(violations[k])
             found.append(ConstraintValue(name=name, value=value, lower=low, upper=high, violation=miss, unit=unit))
         return tuple(found)
 
@@ -93,7 +96,8 @@ def _build(problem: GaitProblem) -> ExactModel:
     # fmax returns the other argument for NaN, which must not pass for feasible: it is neither above nor below a bound.
     comparable = (g <= upper) + (g > upper)
     violations = ca.fmax(ca.fmax(lower - g, g - upper), 0) / comparable
-    cost, violation = problem.objective.sign * assembly.objective, ca.sum1(violations / scale)
+    cost = problem.objective.sign * assembly.objective
+    violation = ca.sum1(violations / scale)
     outputs = {"cost": cost, "violation": violation, "g": g, "lower": lower, "upper": upper}
     outputs["indexes"] = ca.vertcat(*assembly.indexes.values())
     function = ca.Function("exact", [point.x, point.p], list(outputs.values()), ["x", "p"], list(outputs))
@@ -101,7 +105,8 @@ def _build(problem: GaitProblem) -> ExactModel:
     units = [c.unit for c in constraints for _ in c.row_names]
     names += [f"bounds[{name}]" for name in problem.names]
     units += [variable.unit for variable in problem.variables]
-    scales, indexes = np.array(ca.evalf(scale)).ravel(), tuple(assembly.indexes)
+    scales = np.array(ca.evalf(scale)).ravel()
+    indexes = tuple(assembly.indexes)
     return ExactModel(
         function=function, row_names=tuple(names), row_units=tuple(units), row_scales=scales, index_names=indexes
     )

@@ -19,7 +19,8 @@ def hash_json(data: Any, code: str = "") -> str:
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
     """Identify a problem's mathematics and parameter values; every number of a robot is part of one of them."""
-    formulas, options = problem.build_once(_hash_mathematics), dict(problem.options)
+    formulas = problem.build_once(_hash_mathematics)
+    options = dict(problem.options)
     return {"problem": problem.address, "options": options, "parameters": problem.p.tolist(), FORMULAS: formulas}
 
 

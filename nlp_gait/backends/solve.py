@@ -196,8 +196,11 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> Iterat
             continue
         # A higher upper bound lowers the cost, a higher lower bound raises it.
         side = "upper" if slopes[i] < 0 else "lower"
-        name, row_unit, bound = exact.row_names[i], exact.row_units[i], float(getattr(values, side)[i])
-        price, price_unit = float(problem.objective.sign * slopes[i]), f"{per}per {row_unit}"
+        name = exact.row_names[i]
+        row_unit = exact.row_units[i]
+        bound = float(getattr(values, side)[i])
+        price = float(problem.objective.sign * slopes[i])
+        price_unit = f"{per}per {row_unit}"
         yield ActiveConstraint(name=name, side=side, bound=bound, unit=row_unit, price=price, price_unit=price_unit)
 
 
@@ -226,7 +229,8 @@ class Continuation:
         ``earlier`` are runs of the same problem on another path; random starts without success are not repeated. ``stop`` is
         called after each iteration, and returns whether to end at once.
         """
-        solver, near = self._solver.prepare(problem, self._solves), self._neighbour
+        solver = self._solver.prepare(problem, self._solves)
+        near = self._neighbour
         outcomes: list[Outcome] = []
         if near is not None:
             warm = solver.run_from(problem, near, stop)

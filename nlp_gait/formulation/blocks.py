@@ -25,7 +25,8 @@ class Block:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Variables, column by column."""
-        suffix, text = self.unit.replace("/", "_").replace("^", ""), self.description
+        suffix = self.unit.replace("/", "_").replace("^", "")
+        text = self.description
         table = (
             (f"{self.quantity}_{row}_{suffix}[{k}]", self.unit, *ends, f"{text} {row} at instant {k}")
             for k in range(self.columns)

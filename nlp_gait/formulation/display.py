@@ -150,7 +150,9 @@ def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[
     arrays = signals.arrays
     x = np.concatenate([sole.corners[..., 0].ravel() for sole in soles])
     ground = np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
-    t, com, zmp = arrays["t"], arrays["com"], np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))])
+    t = arrays["t"]
+    com = arrays["com"]
+    zmp = np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))])
     return Skeleton(t=t, limbs=tuple(limbs), soles=tuple(soles), ground=ground, com=com, zmp=zmp)
 
 

@@ -83,7 +83,8 @@ def make_strictly_feasible(instance: Any, x: Array) -> Array | None:
     """
     from scipy.optimize import linprog
 
-    width, first = instance.upper - instance.lower, np.clip(x, instance.lower, instance.upper)
+    width = instance.upper - instance.lower
+    first = np.clip(x, instance.lower, instance.upper)
     n, found = len(width), list[tuple[float, Array]]()
     for radius in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4):
         x = first

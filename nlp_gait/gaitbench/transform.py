@@ -101,17 +101,21 @@ def change_variables(problem: GaitProblem, affine: AffineMap, names: Sequence[st
         Variable(name=name, unit="1", lower=float(a), upper=float(b), description=describe(problem, row))
         for name, a, b, row in rows
     ]
-    start, base, matrix = problem.hints.start, problem.with_values(), ca.sparsify(DM(affine.matrix))
+    start = problem.hints.start
+    base = problem.with_values()
+    matrix = ca.sparsify(DM(affine.matrix))
 
     def map_point(point: PointOf[Expression]) -> PointOf[Expression]:
         parameters = {name: place for name, place in point.positions.items() if place[0] == "p"}
-        x, positions = matrix @ point.x + DM(affine.offset), parameters | {v: ("x", i) for i, v in enumerate(old)}
+        x = matrix @ point.x + DM(affine.offset)
+        positions = parameters | {v: ("x", i) for i, v in enumerate(old)}
         return PointOf(x=x, p=point.p, positions=positions)
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
         inner = map_point(point)
         assembly = problem.assemble(inner, ops)
-        value, upper = (inner.x - DM(low)) / DM(scale), ca.MX(DM((problem.upper - low) / scale))
+        value = (inner.x - DM(low)) / DM(scale)
+        upper = ca.MX(DM((problem.upper - low) / scale))
         within = Constraint(
             name=RANGE, labels=old, unit="1", scale=1.0, value=value, lower=ca.MX(0), upper=upper, over="once"
         )

@@ -127,10 +127,14 @@ def check_certificate(
     goals = bounds.to_z(np.clip(goals, problem.lower, problem.upper))
     goals[: (paths + 1) // 2] = np.nan  # random paths
     open_, _, cut, origin = bounds.prune(np.repeat(bounds.root, paths, axis=0), target)
-    path, weight, sizes, dropped = origin, np.ones(len(origin)), np.ones(paths), paths - len(origin)
+    path = origin
+    weight = np.ones(len(origin))
+    sizes = np.ones(paths)
+    dropped = paths - len(origin)
     for depth in range(DEEPEST_PATH):
         if not len(path):
-            size, same = float(sizes[: (paths + 1) // 2].mean()), file.code_sha256 == hash_code(bounds)
+            size = float(sizes[: (paths + 1) // 2].mean())
+            same = file.code_sha256 == hash_code(bounds)
             return CertificateCheck(
                 best=best, source=source, paths=paths, pieces=dropped, deepest=depth, boxes=size, same_code=same
             )

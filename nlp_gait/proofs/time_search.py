@@ -141,7 +141,8 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     others, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
-    given, numbers = [point.x, point.p, now], frozenset(range(first, first + len(squares)))
+    given = [point.x, point.p, now]
+    numbers = frozenset(range(first, first + len(squares)))
     at_once = TimeRows(instants, others, given, kinks) if instants or others else None
     between = TimeRows(changes, [], [*given, later], kinks) if changes else None
     sampled = tuple(c.name for kind in (None, "samples") for c in by_kind[kind])

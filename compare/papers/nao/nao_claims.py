@@ -329,7 +329,8 @@ def _check_speeds(findings: NaoFindings, by: Literal["fastest", "ratio", "differ
         ends.append([float(hip[-1, 0] - hip[0, 0]) / time for time in (min(times), max(times))])
     fast, slow = np.array(ends).T
     speeds = {"fastest": fast, "ratio": fast / slow, "difference": fast - slow}[by]
-    change, ssp = 100 * (speeds[1] / max(speeds[0], 1e-9) - 1), findings.ssp
+    change = 100 * (speeds[1] / max(speeds[0], 1e-9) - 1)
+    ssp = findings.ssp
     shortest = min(point.at for point in ssp.sweeps[ssp.paper.duration] if point.feasible)
     is_at_bound = shortest <= 1.001 * ssp.problem.lower[ssp.paper.duration]
     check = require_change(change, speeds=speeds, ranges=fast / slow, change=change)

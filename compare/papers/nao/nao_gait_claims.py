@@ -39,7 +39,8 @@ def compute_joint_shares(problem: GaitProblem, x: Sequence[float], *, heat: bool
 def _compute_joint_powers(problem: GaitProblem, x: Sequence[float], *, heat: bool = True) -> dict[str, float]:
     """Return the energy that each joint draws, or its mechanical part [J]."""
     signals = problem.signals(problem.check_x(x))
-    tau, loss = signals.arrays["tau"], heat * problem.value("heat_loss_W_per_Nm2")
+    tau = signals.arrays["tau"]
+    loss = heat * problem.value("heat_loss_W_per_Nm2")
     drawn = np.abs(tau * signals.arrays["qd"]) + loss * tau**2
     energies = np.asarray(np.trapezoid(drawn, signals.arrays["t"], axis=0))
     return dict(zip(signals.joints, map(float, energies), strict=True))
@@ -117,7 +118,8 @@ def _check_pace(phase: PhaseFindings, slow: bool, share: bool = True) -> Check:
         found = phase.evaluate_printed(**{time: at}, **{v: x[v] * x[time] / at for v in rates})
         margins[at] = 1000 * min(found["dbm_x_min_m"], found["dbm_y_min_m"])
     best, end = max(margins, key=margins.__getitem__), max(margins) if slow else min(margins)
-    lost, shown = margins[best] - margins[end], {"at_best": margins[best], "at_end": margins[end]}
+    lost = margins[best] - margins[end]
+    shown = {"at_best": margins[best], "at_end": margins[end]}
     fall = 100 * lost / margins[best]
     return require_change(fall if share else lost, **shown, best=best, end=end, lost=lost, fall=fall)
 
@@ -257,5 +259,6 @@ def _check_simulations(findings: NaoFindings, key: str) -> Check:
     tilts = ", ".join(f"{name} {np.degrees(s['tilt_rad']):.1f}" for name, s in found.items())
     room = min(-np.degrees(s["simulated_beyond_rad"]) for s in found.values())
     falls = ", ".join(name for name, s in found.items() if s["fell_at_s"] is not None)
-    holds, period_ms = not falls if key == "fell_at_s" else room >= 0.0, 1000 * WEBOTS_DRIVE.period_s
+    holds = not falls if key == "fell_at_s" else room >= 0.0
+    period_ms = 1000 * WEBOTS_DRIVE.period_s
     return decide(holds, tilts=tilts, room=room, falls=falls or "no gait", period=period_ms)

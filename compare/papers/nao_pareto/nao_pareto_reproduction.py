@@ -46,7 +46,8 @@ def _run_phase(runner: Runner, phase: str, effort: ParetoEffort) -> PhaseFronts:
     code = (runs, constrained_moead, dynamic_nsga3, pymoo)
     results = runner.compute([search for of_case in searches.values() for search in of_case], code)
     done = {case: [runs.make_run(results[search.name]) for search in of_case] for case, of_case in searches.items()}
-    scale, ends = Scale(front), [run[-1] for of_case in done.values() for run in of_case]
+    scale = Scale(front)
+    ends = [run[-1] for of_case in done.values() for run in of_case]
     points = select_best((*scale.undo(end.F), end.X) for end in ends)
     solve = partial(challenge_front, problem, criterion, front, points, work.solver(), work.progress)
     given = {"front": [asdict(point) for point in front], "points": [asdict(point) for point in points]}

@@ -74,7 +74,9 @@ def _check_straight(findings: NaoWalkFindings) -> Check:
     heights = findings.torsos
     own, tallest = next(point for point in heights if point["torso_m"] == nao_walk_runs.TORSO_M), heights[-1]
     best = {heat: min(heights, key=lambda point: float(point[f"{heat}_J_per_m"])) for heat in HEATS}
-    torso_mm, tallest_mm, found = 1000 * nao_walk_runs.TORSO_M, 1000 * tallest["torso_m"], []
+    torso_mm = 1000 * nao_walk_runs.TORSO_M
+    tallest_mm = 1000 * tallest["torso_m"]
+    found = []
     for heat, name in HEATS.items():
         key = f"{heat}_J_per_m"
         at_best, at_tallest = (100 * (point[key] / own[key] - 1) for point in (best[heat], tallest))
@@ -95,7 +97,8 @@ def _check_heat(findings: NaoWalkFindings) -> Check:
     *heats, _ = findings.straighter
     free, bounded = ({heat: at[bound] for heat, at in findings.straighter.items()} for bound in ("free", "paper"))
     least, sheet = free[heats[0]], free["sheet"]
-    straighter, rise = least["knee_deg"] - sheet["knee_deg"], 1000.0 * (sheet["hip_m"] - least["hip_m"])
+    straighter = least["knee_deg"] - sheet["knee_deg"]
+    rise = 1000.0 * (sheet["hip_m"] - least["hip_m"])
     values = {"speed": SPEED_M_S, "free": sheet, "rise": rise, "least": heats[0], "straighter": straighter}
     values |= {"heats": ", ".join(heats), "angles": ", ".join(f"{free[heat]['knee_deg']:.1f}" for heat in heats)}
     values["bounded"] = [bounded[heat]["knee_deg"] for heat in (heats[0], "sheet")]

@@ -105,7 +105,8 @@ def make_walk_computations(effort: NaoWalkEffort, optima: Mapping[str, Mapping[s
 
 def solve_over_speed(spec: ProblemSpec, speeds: Sequence[float], starts: int) -> list[dict[str, Any]]:
     """Return the cheapest gait at each speed."""
-    axis, names = Axis(name="speed_m_s", values=tuple(speeds)), ("cost_of_transport", "energy_J_per_m")
+    axis = Axis(name="speed_m_s", values=tuple(speeds))
+    names = ("cost_of_transport", "energy_J_per_m")
     return [
         {"speed_m_s": gait.at, "feasible": gait.point.feasible, "x": dict(gait.point.x)}
         | {name: gait.indexes[name] for name in names}

@@ -96,7 +96,8 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
         x = 2 * tread + radius * (angle - math.sin(angle) - math.pi)
         return np.array([x, lift[1] + radius * (1 - math.cos(angle))])
 
-    caught, second = first + 2 * catch, lift + [0.0, radius * (1 - math.cos(first))]
+    caught = first + 2 * catch
+    second = lift + [0.0, radius * (1 - math.cos(first))]
     points = np.stack([lift, second, cycloid(first + catch), cycloid(caught)])
     slope = radius * np.array([1 - math.cos(caught), math.sin(caught)])  # of the cycloid
     s = np.linspace(0.0, 1.0, 1001)[:, None]

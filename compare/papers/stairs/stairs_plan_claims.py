@@ -166,7 +166,8 @@ def measure_depth(findings: StairsFindings, what: str, case: int, setback: float
 
 def measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
     """Return the largest distance of the ZMP of (49) from the planned one of (22) [mm]."""
-    arrays, x = move(findings, what, case)[0].arrays, findings.best(what, case).x
+    arrays = move(findings, what, case)[0].arrays
+    x = findings.best(what, case).x
     share, (tread, _) = arrays["t"] / arrays["t"][-1], TABLE_4[case].step_m
     planned = x["zmp_start_m"] + (tread + x["zmp_end_m"] - x["zmp_start_m"]) * share**2 * (3 - 2 * share)
     return 1e3 * float(np.abs(arrays["zmp"][:, 0] + tread - planned).max())
@@ -182,7 +183,8 @@ def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
 
 def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:
     """Return by how much a link turns at most in a quantum of the best step under a choice [rad]."""
-    problem, x = make_choice_spec(findings, case, name).load(), get_best(findings, case, name).x
+    problem = make_choice_spec(findings, case, name).load()
+    x = get_best(findings, case, name).x
     rates = problem.signals(np.array(list(x.values()))).arrays["link_qd"]
     return QUANTUM * float(np.abs(rates).max())
 
@@ -335,7 +337,8 @@ def _check_network(findings: StairsFindings) -> Check:
 def _check_other_methods(findings: StairsFindings) -> Check:
     network = findings.others["network"]
     medians = {rule: 1e3 * float(np.median(found["time_s"][1:])) for rule, found in network.items()}
-    closed, error = medians.pop(CLOSED_FORM), network[CLOSED_FORM]["largest_angle_error_rad"]
+    closed = medians.pop(CLOSED_FORM)
+    error = network[CLOSED_FORM]["largest_angle_error_rad"]
     texts = "; ".join(f"{rule} {value:.3g}" for rule, value in medians.items())
     counts = {"bent": network["adam"]["bent_otherwise"], "poses": network["adam"]["poses"]}
     return decide([v < closed for v in medians.values()], closed=closed, medians=texts, error=error, **counts)
@@ -344,7 +347,8 @@ def _check_other_methods(findings: StairsFindings) -> Check:
 def _check_poses(findings: StairsFindings, share_of_first: float = math.inf, limit_ms: float = math.inf) -> Check:
     network, texts, verdicts = findings.others["network"], [], []
     for rule in RULES:
-        found, times_ms = network[rule], 1e3 * np.array(network[rule]["time_s"])
+        found = network[rule]
+        times_ms = 1e3 * np.array(network[rule]["time_s"])
         first, later = times_ms[0], np.median(times_ms[1:])
         steps = f"{found['iterations'][0]}, {np.median(found['iterations'][1:]):g} iterations"
         verdicts.append(bool(later <= min(share_of_first * first, limit_ms)))

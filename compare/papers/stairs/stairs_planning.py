@@ -67,7 +67,8 @@ def _make_choice_spec(findings: StairsFindings, what: str, name: str) -> Problem
 def make_first_step_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield first steps, which end where the steps with a reverse double support start, and those that end anywhere."""
     for case in findings.cases:
-        spec, settings = _make_first_spec(findings, case), findings.effort.plan_settings
+        spec = _make_first_spec(findings, case)
+        settings = findings.effort.plan_settings
         random = make_start_tasks(spec, findings.effort.first_starts - 1, settings=settings)
         near = {**findings.best("landing", case).x, "zmp_start_m": ZMP_OF_STANDING, "zmp_end_m": ZMP_OF_STANDING}
         yield from (*random, Task(problem=spec, solver=IPOPT, settings=settings, start=near, run=len(random)))

@@ -68,7 +68,8 @@ def make_tracking_computations(findings: StairsFindings) -> Iterator[Computation
             yield make_computation(f"powerless-{name}-{case}", spec, function, evaluations=effort.track_evaluations)
         for name, decides in effort.instant_searches:
             spec, plan = make_choice_spec(findings, case, name), findings.plan(case, CHOICES[name].plan)
-            title, function = f"instants-{name}-{decides}-{case}", partial(_run_algorithm_4, spec)
+            title = f"instants-{name}-{decides}-{case}"
+            function = partial(_run_algorithm_4, spec)
             settings = {"torso_rad": plan["torso_pitch_rad"], "evaluations": effort.instant_evaluations}
             yield make_computation(title, spec, function, decides=decides, **settings)
 

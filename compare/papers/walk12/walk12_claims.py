@@ -89,7 +89,8 @@ def _check_optimal_by_print(_: Walk12Findings) -> Check:
     for at, row in product(TABLE_3, repeat=2):
         of_f = at.weight / row.weight
         of_s = ((1 - at.weight) - (1 - row.weight) * of_f) / F2MAX
-        f, lengths = of_f * row.f + of_s * row.x[0], (row.x[0] - DIGIT_M, min(row.x[0] + DIGIT_M, F2MAX))
+        f = of_f * row.f + of_s * row.x[0]
+        lengths = (row.x[0] - DIGIT_M, min(row.x[0] + DIGIT_M, F2MAX))
         if of_f * (row.f - DIGIT_F) + min(of_s * s for s in lengths) > at.f + DIGIT_F:
             better.append(f"at λ = {at.weight:g} that of {row.weight:g} has {f:.3f} (printed {at.f:.3f})")
     return decide(not better, found="; ".join(better) or "none is")
@@ -135,7 +136,8 @@ def _describe_inside(findings: Walk12Findings) -> str:
     inside = [p for p in path if min(ends) + DIGIT_M < p.step_length_m < max(ends) - DIGIT_M]
     if not inside:
         return "for no λ solved is the optimal step between both ends"
-    weights, steps = ([inside[0].at, inside[-1].at], [1e3 * p.step_length_m for p in (inside[0], inside[-1])])
+    weights = [inside[0].at, inside[-1].at]
+    steps = [1e3 * p.step_length_m for p in (inside[0], inside[-1])]
     where = f"from λ = {weights[0]:.4g} to {weights[1]:.4g} the optimal step is between both ends"
     return f"{where}, {steps[0]:.0f} to {steps[1]:.0f} mm"
 
@@ -170,7 +172,8 @@ def _check_margin(findings: Walk12Findings) -> Check:
 
 
 def _check_margin_of_table_3(findings: Walk12Findings, rows: int) -> Check:
-    f1, shares = findings.f1_by()[:rows], [stable.share for stable in findings.stable]
+    f1 = findings.f1_by()[:rows]
+    shares = [stable.share for stable in findings.stable]
     changes = [100 * (after / before - 1) for before, after in pairwise(f1)]
     return require_change(changes, found=", ".join(f"{v:.1f}" for v in f1), low=min(changes), shares=shares)
 
@@ -219,7 +222,8 @@ def _check_speed(_: Walk12Findings, weight: float, printed_m_s: float, share: fl
 
 
 def _check_faster(findings: Walk12Findings) -> Check:
-    table, optima = 1e3 * (find_row(0.1).x[0] - find_row(0.15).x[0]), list_x(findings)[:, 0]
+    table = 1e3 * (find_row(0.1).x[0] - find_row(0.15).x[0])
+    optima = list_x(findings)[:, 0]
     return compare_changes(128.0 - 125.0, table, optima=optima[0] - optima[1], table=table)
 
 
@@ -288,7 +292,8 @@ def _check_inverse_kinematics(findings: Walk12Findings) -> Check:
 
     (2) takes theta_B from an arccosine that is never negative; below sqrt(d1^2 - d2^2) between hip and ankle it would be.
     """
-    robot, gaits = load_point_mass_biped(), [*(row.x for row in TABLE_3), *list_x(findings) / 1e3]
+    robot = load_point_mass_biped()
+    gaits = [*(row.x for row in TABLE_3), *list_x(findings) / 1e3]
     bent = max(float(walk12_findings.compute_knees(x, 400).max()) for x in gaits)  # up to a straight angle
     thigh, shank = robot.thigh_m, robot.shank_m
     shortest = math.sqrt(thigh**2 + shank**2 + 2 * thigh * shank * math.cos(bent))
@@ -301,7 +306,8 @@ def _check_ranges(_: Walk12Findings) -> Check:
 
 
 def _check_circle(findings: Walk12Findings, degrees: float) -> Check:
-    turn, x = math.radians(degrees), get_point(findings.optimum(PAPER, 0.9))
+    turn = math.radians(degrees)
+    x = get_point(findings.optimum(PAPER, 0.9))
     arrays = follow(x, steps=90, intervals=2, turn_rad=turn)
     prints = np.unique(np.round(arrays["left_ankle"][arrays["left_stance"] == 1.0][:, :2], 7), axis=0)
     radii = np.linalg.norm(prints - prints.mean(axis=0), axis=1)
@@ -327,7 +333,9 @@ def _check_f1max_over_time(findings: Walk12Findings, horizon: Horizon, solver: s
 
 
 def _check_trend(findings: Walk12Findings, horizon: Horizon) -> Check:
-    slow, fast, f1max = TABLE_4[0], TABLE_4[-1], list_f1max(findings, horizon)
+    slow = TABLE_4[0]
+    fast = TABLE_4[-1]
+    f1max = list_f1max(findings, horizon)
     ours = 100 * (f1max[0] / f1max[-1] - 1)
     times = {"slow": slow.step_time_s, "fast": fast.step_time_s}
     return compare_changes(100 * (slow.f1max / fast.f1max - 1), ours, **times, found=ours)
@@ -350,7 +358,8 @@ def _check_f1_over_time(_: Walk12Findings, horizon: Horizon) -> Check:
 
 
 def _check_variables_over_time(findings: Walk12Findings, horizon: Horizon, solver: str) -> Check:
-    printed, found = np.ptp([row.x for row in TABLE_4], axis=0) * 1e3, np.ptp(list_x(findings, solver, horizon), axis=0)
+    printed = np.ptp([row.x for row in TABLE_4], axis=0) * 1e3
+    found = np.ptp(list_x(findings, solver, horizon), axis=0)
     texts = [", ".join(f"{value:.0f}" for value in values) for values in (printed, found)]
     return compare_levels(printed, found, ranges=texts[0], found=texts[1])
 
@@ -361,7 +370,8 @@ def _check_f_of_table_4(_: Walk12Findings, horizon: Horizon) -> Check:
 
 
 def _check_optimal_over_time(findings: Walk12Findings, horizon: Horizon) -> Check:
-    best, f1max = list_objectives(_list_best(findings, horizon)), list_f1max(findings, horizon)
+    best = list_objectives(_list_best(findings, horizon))
+    f1max = list_f1max(findings, horizon)
     ours = [compute_f(row, most, horizon=horizon) for row, most in zip(TABLE_4, f1max, strict=True)]
     gaps = compute_range(100 * (1 - f / b) for f, b in zip(ours, best, strict=True))
     return compare_levels(best, ours, gaps=gaps)

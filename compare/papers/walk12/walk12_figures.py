@@ -52,7 +52,8 @@ def _colour(label: str) -> str:
 def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
     figure, axes = new_axes(4.2, 2.8)
     runs = np.array([run.history.objective for run in ga], dtype=float)
-    epochs, paint = np.arange(runs.shape[1]), dict[str, Any](where="post", color=COLOURS["ga"])
+    epochs = np.arange(runs.shape[1])
+    paint = dict[str, Any](where="post", color=COLOURS["ga"])
     axes.step(epochs, runs.T, **paint, alpha=0.3, linewidth=0.8)
     axes.step(epochs, np.median(runs, axis=0), **paint, label=f"GA, median of {len(runs)} runs")
     axes.axhline(optimum.verdict.objective, color=COLOURS["ipopt"], linestyle="--", label="IPOPT")

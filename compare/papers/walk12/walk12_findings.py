@@ -92,7 +92,8 @@ class StableShare:
 
 def compute_stable_share(x: tuple[float, ...]) -> StableShare:
     """Return when a gait is statically stable."""
-    robot, arrays = load_point_mass_biped(), follow(x, steps=1, intervals=1000)
+    robot = load_point_mass_biped()
+    arrays = follow(x, steps=1, intervals=1000)
     zmp_x, zmp_y = arrays["zmp_foot"].T
     inside = (-robot.foot_back_m <= zmp_x) & (zmp_x <= robot.foot_front_m) & (np.abs(zmp_y) <= robot.foot_width_m / 2)
     times = arrays["t"][inside]

@@ -193,7 +193,8 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
     simpson = [findings.best(f"simpson-{row.weight:g}") for row in TABLE_3]
     shifts = [abs(f - findings.optimum(PAPER, float(w)).verdict.objective) for w, f in findings.printed_step.items()]
     ga = {name: findings.records(PAPER, runs.VARIANTS_WEIGHT, name) for name in ("ga", *runs.GA_VARIANTS)}
-    epoch, histories = runs.GA_EVALUATIONS - runs.GA.population, [run.history for run in ga["ga"]]
+    epoch = runs.GA_EVALUATIONS - runs.GA.population
+    histories = [run.history for run in ga["ga"]]
     earlier = [f for h in histories for e, f in zip(h.evaluations, h.objective, strict=True) if e == epoch]
     bounds = {"bound": _find_bound(findings.optimum(PAPER, 1.0)), "simpson_bound": _find_bound(simpson[-1])}
     return {
@@ -276,7 +277,8 @@ def _make_tables(findings: Walk12Findings) -> dict[str, Rows]:
 def _list_quadratures(findings: Walk12Findings) -> Rows:
     rows = []
     for row in TABLE_3:
-        best, simpson = findings.optimum(PAPER, row.weight), findings.best(f"simpson-{row.weight:g}")
+        best = findings.optimum(PAPER, row.weight)
+        simpson = findings.best(f"simpson-{row.weight:g}")
         ours = [best.verdict.objective, _find_bound(best), findings.printed_step.get(f"{row.weight:g}")]
         rows.append([row.weight, *ours, simpson.verdict.objective, _get_dense(simpson)["f"], _find_bound(simpson)])
     return rows

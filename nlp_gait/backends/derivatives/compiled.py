@@ -97,7 +97,9 @@ def _write_calls(found: NlpPlan) -> str:
         if call.directions is not None:
             lines.append(write_array("int", f"directions_{i}", call.directions.tolist()))
         directions = "nullptr" if call.directions is None else f"directions_{i}"
-        first, split, end = f"blocks_{i}", len(call.inputs), len(call.inputs + call.outputs)
+        first = f"blocks_{i}"
+        split = len(call.inputs)
+        end = len(call.inputs + call.outputs)
         rows.append(f"{{function_{call.function},{call.samples},{directions},{first},{first}+{split},{first}+{end}}}")
     lines.append(f"static const Call calls[] = {{{','.join(rows) or '{}'}}};")
     return "\n".join(lines)

@@ -211,7 +211,8 @@ class CompiledFunction:
         inputs = [get_address(values if shared else values[cut]) for values, shared in pieces]
         outputs = [get_address(result[cut]) for result in results]
         given, made = ((ctypes.c_void_p * len(each))(*each) for each in (inputs, outputs))
-        is_shared, rows = bytes(shared for _, shared in pieces), ctypes.c_longlong(cut.stop - cut.start)
+        is_shared = bytes(shared for _, shared in pieces)
+        rows = ctypes.c_longlong(cut.stop - cut.start)
         if self._native(given, is_shared, made, rows, self._local.address):
             raise RuntimeError(f"{self.function.name()} reported a failure")
 

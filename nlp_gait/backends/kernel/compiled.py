@@ -81,7 +81,8 @@ class InterpretedKernel:
         self._weights = kernel.weights
         self._blocks = {}
         for size in BLOCKS:
-            x, p = ca.MX.sym("x", kernel.function.size1_in(0), size), ca.MX.sym("p", kernel.function.size1_in(1))
+            x = ca.MX.sym("x", kernel.function.size1_in(0), size)
+            p = ca.MX.sym("p", kernel.function.size1_in(1))
             cost, g = kernel.function.map(size)(x, ca.repmat(p, 1, size))
             self._blocks[size] = ca.Function("block", [x, p], [cost, g])
         self.description = "interpreted by CasADi's virtual machine"

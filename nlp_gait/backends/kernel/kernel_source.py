@@ -39,7 +39,8 @@ def _build(problem: GaitProblem) -> Kernel:
     model = build_exact_model(problem)
     x, p = model.function.mx_in()
     cost, _, g, lower, upper, _ = model.function.call([x, p], True, False)
-    function, bounds = ca.Function("kernel", [x, p], [cost, g]), ca.Function("bounds", [p], [lower, upper])
+    function = ca.Function("kernel", [x, p], [cost, g])
+    bounds = ca.Function("bounds", [p], [lower, upper])
     return Kernel(function=function, bounds=bounds, weights=1.0 / model.row_scales, model=model)
 
 

@@ -150,7 +150,8 @@ class Replanner:
             found = self._solve_by_ipopt(problem, found)
         if judge:
             values = self._exact.at(found.x, problem.p)
-            objective, violated = problem.objective.sign * values.cost, self._exact.find_violated(values)
+            objective = problem.objective.sign * values.cost
+            violated = self._exact.find_violated(values)
             found = replace(found, objective=objective, feasible=values.feasible, violated=violated)
         return replace(found, time_s=time.perf_counter() - started)
 
@@ -170,7 +171,8 @@ class Replanner:
         if outcome is None or not outcome.converged:
             cold = self._ipopt.run(problem, np.clip(found.x, problem.lower, problem.upper))
             outcome = cold if outcome is None else min(outcome, cold, key=lambda each: each.rank)
-        note, iterations = f"{found.note}; IPOPT {outcome.status}", found.iterations + outcome.iterations
+        note = f"{found.note}; IPOPT {outcome.status}"
+        iterations = found.iterations + outcome.iterations
         found = replace(found, note=note, iterations=iterations)
         if outcome.converged and outcome.guess is not None:
             self._guess, self._near = outcome.guess, outcome

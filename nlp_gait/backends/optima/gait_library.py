@@ -57,7 +57,8 @@ class GaitLibrary:
         x = np.clip(x, problem.lower, problem.upper)
         model = build_exact_model(problem)
         found, result = model.at(x, problem.p), Result(problem=problem, x=x)
-        objective, violated = problem.objective.sign * found.cost, model.find_violated(found)
+        objective = problem.objective.sign * found.cost
+        violated = model.find_violated(found)
         return LibraryGait(result=result, objective=objective, feasible=found.feasible, violated=violated)
 
     def covers(self, **at: float) -> bool:

@@ -151,7 +151,8 @@ def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Ar
     """
     values, lower, upper = optimum.rows
     inactive, active = optimum.side == 0, optimum.active
-    priced, side = np.abs(optimum.multipliers[active]) > WEAK, optimum.side[active]
+    priced = np.abs(optimum.multipliers[active]) > WEAK
+    side = optimum.side[active]
     rate = change.values + moved
     prices = (optimum.multipliers[active] * side)[priced]
     room = [(upper - values)[inactive], (values - lower)[inactive], prices]

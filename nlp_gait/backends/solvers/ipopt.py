@@ -266,7 +266,8 @@ def find_linear_solver(wanted: str | None = None) -> str:
     """Return the linear solver that IPOPT uses here, by its log: its default, or the wanted one; InputError if that fails."""
     x = ca.MX.sym("x")
     with make_temporary_folder("nlp-gait-ipopt-") as folder:
-        log, chosen = folder / "ipopt.log", {} if wanted is None else {"ipopt.linear_solver": wanted}
+        log = folder / "ipopt.log"
+        chosen = {} if wanted is None else {"ipopt.linear_solver": wanted}
         options = {**QUIET, "ipopt.output_file": str(log), "ipopt.file_print_level": 5, **chosen}
         probe = ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)
         probe(x0=1.0)

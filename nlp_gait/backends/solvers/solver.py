@@ -63,7 +63,9 @@ def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others
     """Return the outcome at x (n,), clipped to the bounds, with the values of the exact functions."""
     x = np.clip(x, problem.lower, problem.upper)
     exact = build_exact_model(problem).at(x, problem.p)
-    objective, cost, violation = problem.objective.sign * exact.cost, exact.cost, exact.violation
+    objective = problem.objective.sign * exact.cost
+    cost = exact.cost
+    violation = exact.violation
     return Outcome(solver=solver, x0=x0, x=x, objective=objective, cost=cost, violation=violation, **others)
 
 

@@ -84,7 +84,8 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
 
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
     """Return the plans of both phases."""
-    images, mirror = DM([c.image for c in body.coordinates]), SX([1, -1, 1])
+    images = DM([c.image for c in body.coordinates])
+    mirror = SX([1, -1, 1])
 
     def read(at: InstantPoint) -> tuple[SwitchState, SwitchState, SX]:
         """States at lift-off and touch-down, and the step length [m]."""

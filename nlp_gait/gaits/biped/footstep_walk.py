@@ -202,7 +202,8 @@ def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, 
     """Return the problem of a walk along footholds, the right foot's first, with least energy per metre."""
     if steps != len(footholds):
         raise InputError(f"steps must be the number of footholds, {len(footholds)}, got {steps}")
-    turning, loads = any(foothold.yaw for foothold in footholds), make_divided_loads(body, "lever")
+    turning = any(foothold.yaw for foothold in footholds)
+    loads = make_divided_loads(body, "lever")
     body = replace(body, upright=frozenset()) if turning else body  # a swinging foot turns
     feet, (*others, last) = list_feet(footholds, body.feet_y), make_phase_variables(body)
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)

@@ -93,7 +93,8 @@ class Phase:
             found = [planned, reach, torque, qd * moving, zmp, MX(0, n), *wrenches, q, qd, qdd, *seen]
             reads_motion = True
         columns = [[part] if len(ats) == 1 else ca.horzsplit(part, part.shape[1] // len(ats)) for part in found]
-        counts, several = (len(BOTH_FEET) * reads_wrenches, 3 * reads_motion, len(traces)), list[Samples]()
+        counts = (len(BOTH_FEET) * reads_wrenches, 3 * reads_motion, len(traces))
+        several = list[Samples]()
         for k, at in enumerate(ats):
             planned, reach, torque, power, zmp, miss, *rest = (part[k] for part in columns)
             pushes, moved, seen = ([rest.pop(0) for _ in range(count)] for count in counts)

@@ -107,7 +107,8 @@ def make_start_within_reach(
     Besides the margin on the reach, the motion reads the parameters ``known``; ``reach`` gives the cosines of the knees at a
     point. Start points to choose from are those of ``start``, or any, within both the bounds and those of ``variables``.
     """
-    read, names = (limits.REACH_MARGIN, *known), [variable.name for variable in variables]
+    read = (limits.REACH_MARGIN, *known)
+    names = [variable.name for variable in variables]
 
     @cache
     def farthest() -> ca.Function:

@@ -160,7 +160,8 @@ def make_double_support_phase(
     """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
     soles = place_soles(body, step_m)
     ankles = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
-    balance, ends = limit_to_box(make_support_box(body.robot, soles)), hip_ends(body, soles)
+    balance = limit_to_box(make_support_box(body.robot, soles))
+    ends = hip_ends(body, soles)
     return _make_support_phase(
         body, "dsp", splines, ends, lambda at, more, s: ankles, balance, (), sharing, grid, goal, derivatives
     )
@@ -193,7 +194,8 @@ def _make_support_phase(
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
 
     own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
-    variables, curve_limits = (*hip, *body.angle_variables, *own), body.make_curve_limits(name, splines.count, state)
+    variables = (*hip, *body.angle_variables, *own)
+    curve_limits = body.make_curve_limits(name, splines.count, state)
     names = [variable.name for variable in variables]
     return Phase(
         body=body,

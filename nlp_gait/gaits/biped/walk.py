@@ -247,7 +247,8 @@ def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = 
     if flight is None:
         return make_walk_problem(WholeWalk(body=body, steps=steps, variables=variables, phases=phases), variables)
     flight.check_run(next(variable.upper for variable in variables if variable.name == STEP))
-    variables, treads = tuple(_raise_lift(v, body, flight) for v in variables), flight.list_treads(steps - 1)
+    variables = tuple(_raise_lift(v, body, flight) for v in variables)
+    treads = flight.list_treads(steps - 1)
     walk = WholeWalk(body=body, steps=steps, variables=variables, phases=phases, flight=flight)
     return make_walk_problem(walk, variables, lambda at, count: treads).fix(**{STEP: flight.run_m})
 

@@ -132,7 +132,8 @@ def humanoid_walk(
         return plan_footstep_walk(body, places, steps, grid)
     flight = None
     if stair_rise_m or stair_run_m:
-        foot, clearance_m = body.robot.feet["left"], body.scale_length(CLEARANCE_M)
+        foot = body.robot.feet["left"]
+        clearance_m = body.scale_length(CLEARANCE_M)
         flight = Flight(rise_m=stair_rise_m, run_m=stair_run_m, foot=foot, clearance_m=clearance_m)
         if slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")

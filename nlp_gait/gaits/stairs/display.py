@@ -134,7 +134,8 @@ def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     rise = tread * parameters["rise_run_ratio"]
     first, second = -SETBACK, tread - SETBACK
     edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
-    ground, zmp = np.array([(x, level * rise) for x, level in edges]), signals.arrays.get("zmp")
+    ground = np.array([(x, level * rise) for x, level in edges])
+    zmp = signals.arrays.get("zmp")
     if zmp is not None:
         zmp = _sagittal(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)]))
     lines = {side: np.stack([_sagittal(at[name]) for name in names], axis=1) for side, names in LINES.items()}

@@ -84,7 +84,8 @@ def rows(
     columns: Sequence[int] = (),
 ) -> Constraint:
     """Return rows for quantities ``of`` (r,) at instants ``columns`` (m,), by default from zero; the value is (r, m) [unit]."""
-    labels, column = make_labels(of, columns or range(value.shape[1])), ca.vec(value)
+    labels = make_labels(of, columns or range(value.shape[1]))
+    column = ca.vec(value)
     least, most = (None if bound is None else MX(bound) for bound in (lower, upper))
     return Constraint(
         name=name, labels=labels, unit=unit, scale=scale, value=column, lower=least, upper=most, over="instant"

@@ -135,7 +135,8 @@ def stairs_track(
         found = rollout(at, Exact())
         parts = (*found[:4], loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
-        joints, names = loop.joints.full().T, tuple(closed_loop.ANGLES[coordinates])
+        joints = loop.joints.full().T
+        names = tuple(closed_loop.ANGLES[coordinates])
         (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))
         links = {"q": q, "qd": qd, "q_desired": q_desired, "qd_desired": qd_desired}
         t = np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta)
@@ -190,7 +191,8 @@ def _assemble(
     if rule == "limits":  # (Algorithm 3)
         constraints.append(stair.rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
     if tracking_limit:
-        most, names = point["tracking_tolerance_rad"], tuple(closed_loop.ANGLES[loop.coordinates])
+        most = point["tracking_tolerance_rad"]
+        names = tuple(closed_loop.ANGLES[loop.coordinates])
         limited = errors[: closed_loop.N, :]
         row = stair.rows("tracking", limited, names, "rad", 0.1, lower=-most, upper=most, columns=instants)
         constraints.append(row)

@@ -41,7 +41,8 @@ def make_simulation_model(robot: PointMassBiped, zmp: Zmp) -> SimulationModel:
     def motion(at: NumericPoint, steps: int) -> Signals:
         walked = compute_steps_at(at, robot, intervals=FINE_INTERVALS, zmp=zmp, steps=steps).arrays
         left, heading = _follow_steps(walked, float(at["turn_rad"]))
-        still, given = np.zeros_like(heading), [walked[name].T for name in ("q", "qd", "qdd")]
+        still = np.zeros_like(heading)
+        given = [walked[name].T for name in ("q", "qd", "qdd")]
         dynamics = (_make_inverse_dynamics(bodies, side).map(len(left)) for side in ("left", "right"))
         torques = [np.array(function(*given)).T for function in dynamics]
         arrays = {

@@ -115,7 +115,8 @@ def compute_legs(
     stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))
     swing_hip = hip._replace(position=hip.position + _across(robot))
     stance = _solve_leg(stance_ankle, hip, margin, robot, ops)
-    swing, heading = _solve_leg(swing_ankle, swing_hip, margin, robot, ops), axis_rotation((0.0, 0.0, 1.0), turn)
+    swing = _solve_leg(swing_ankle, swing_hip, margin, robot, ops)
+    heading = axis_rotation((0.0, 0.0, 1.0), turn)
     ankle = Motion(*(hip + heading @ (ankle - hip) for hip, ankle in zip(swing.hip, swing.ankle, strict=True)))
     return stance, swing._replace(ankle=ankle, heading=heading)
 

@@ -67,7 +67,9 @@ def walk12(
     robot = walk12_model.load_point_mass_biped()
 
     def assemble(point: Point, ops: Nonsmooth) -> Assembly:
-        T, s, zmp_at = point["step_time_s"], point["step_length_m"], _make_zmp_function(robot, ops, zmp)
+        T = point["step_time_s"]
+        s = point["step_length_m"]
+        zmp_at = _make_zmp_function(robot, ops, zmp)
         phases, weights = make_rule(quadrature, intervals)
         places = _sample_zmp(zmp_at, point, phases)
         Q = T * ca.sum1(places**2) @ weights  # (eq. 9)

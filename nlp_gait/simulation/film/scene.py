@@ -84,7 +84,8 @@ class Scene:
         self._surface.make_current()
         for view in self._views:
             above = view.name == "above"
-            option, camera = self._soles if above else self._whole, self._camera(view, k)
+            option = self._soles if above else self._whole
+            camera = self._camera(view, k)
             kinds = engine.mjtCatBit.mjCAT_ALL
             engine.mjv_updateScene(self._recording.model, self._data, option, None, camera, kinds, self._scene)
             self._scene.flags[engine.mjtRndFlag.mjRND_SHADOW] = not above

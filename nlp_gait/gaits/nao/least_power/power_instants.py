@@ -101,7 +101,8 @@ class PowerInstant:
             moment = world_frame.move_wrench(carried, at - joint.place)[3:, :]
             gravity, inertia = (ca.dot(joint.axis, part) for part in ca.horzsplit(moment))
             self.torques[joint.name] = direction * (gravity + self.rate_squared * inertia)
-            carried, at = world_frame.move_wrench(carried, at - point) + wrench, point
+            carried = world_frame.move_wrench(carried, at - point) + wrench
+            at = point
         return carried
 
     def _split_leg(self, side: str, hip: Motion, ankle: Motion) -> tuple[list[tuple[SX, SX]], list[LegJoint]]:
@@ -178,7 +179,8 @@ def single_support_instants(robot: Robot, stance: Stance, arm_swing: Mapping[str
     support = SX(DM([*stance.support_xy, foot.ankle_height_m]))
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip, arms = _hip(z, stance.hip_x, stance.hip_y, phase), arm_joints(arm_swing, ONE, SX(phase))
+        hip = _hip(z, stance.hip_x, stance.hip_y, phase)
+        arms = arm_joints(arm_swing, ONE, SX(phase))
         found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         begin, end = (SX(x) for x in stance.swing_x)
         path = swing_foot(begin, end, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
