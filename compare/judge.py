@@ -3,8 +3,6 @@
 For rows that are functions of time, it is also proven which are satisfied at every instant.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

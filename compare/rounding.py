@@ -4,8 +4,6 @@ Every component lies within half a unit of its last printed digit. Objective and
 forms where their operations allow it; best and worst points are found by a search in both cases.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

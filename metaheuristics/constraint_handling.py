@@ -1,7 +1,5 @@
 """Constraint handling: how two points with objective f and violation v compare, see `Rule`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

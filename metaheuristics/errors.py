@@ -1,7 +1,5 @@
 """Errors of this package."""
 
-from __future__ import annotations
-
 
 class SearchError(Exception):
     """A setting, a problem or a result of the objective that no search can use.

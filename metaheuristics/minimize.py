@@ -1,7 +1,5 @@
 """The only loop: ask, evaluate, record, tell; and the record of a run."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress

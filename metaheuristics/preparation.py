@@ -1,7 +1,5 @@
 """Preparation of a run: checks of arguments, seeds, starting points."""
 
-from __future__ import annotations
-
 import math
 from numbers import Integral
 from typing import Any

@@ -1,7 +1,5 @@
 """Gaps from the best known objective, as numbers and in words."""
 
-from __future__ import annotations
-
 import math
 
 from compare.analysis.units import percent, with_unit

@@ -3,8 +3,6 @@
 The unit of a pure number is "1" and is not shown.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Runs repeated from their records: the same seed gives the same bits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from compare.study.definition import describe_differences, hash_definition

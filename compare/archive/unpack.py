@@ -1,7 +1,5 @@
 """Reading an archive from anywhere: nothing in it is trusted, and nothing outside the target folder is written."""
 
-from __future__ import annotations
-
 import hashlib
 import stat
 import zipfile

@@ -5,8 +5,6 @@ command with a parameter of that type has every field as an option, and receives
 are in ``options.toml``, except those that a program computes: these are annotated.
 """
 
-from __future__ import annotations
-
 import codecs
 import errno
 import functools

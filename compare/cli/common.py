@@ -1,7 +1,5 @@
 """Output of commands: tables, results, progress, errors, interruptions."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """``nlp-gait list``."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict

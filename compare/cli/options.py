@@ -1,7 +1,5 @@
 """Options that several commands take; ``command`` explains groups of options."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 A register in the cache folder holds the hash of each written file under the hash of its path.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """A figure that notebooks display, whether or not pyplot is in use."""
 
-from __future__ import annotations
-
 import io
 
 import matplotlib

@@ -1,7 +1,5 @@
 """Figures of a robot as read and of its simulation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

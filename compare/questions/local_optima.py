@@ -1,7 +1,5 @@
 """Distinct local optima among the ends of many starts, and estimates of those that no start reached."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One gait as a page of its own: in 3-D, with power and balance margin; also shown in notebooks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape

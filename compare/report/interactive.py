@@ -1,7 +1,5 @@
 """Data that a page draws itself: runs for charts with hover, zoom and a choice of solvers; gaits in 3-D."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

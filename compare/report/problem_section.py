@@ -1,7 +1,5 @@
 """The section of a report on one problem: tables, figures, gaits, the engine, tests, constraints, failures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

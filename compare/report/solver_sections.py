@@ -1,7 +1,5 @@
 """Sections on solvers over many problems: at all budgets, next to the ranks by their medians; how their settings were tuned."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Documents written as a self-contained HTML page and as Markdown, with figures and tables, session and citations at the end."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace

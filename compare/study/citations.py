@@ -1,7 +1,5 @@
 """What to cite: the software, the suite, and the papers that problems come from; ``citations.toml`` has the entries."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import tomllib

@@ -3,8 +3,6 @@
 Paths are part of a definition, for its readers, but not of its hash: a robot or user code is identified by its content.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Shipped best known values and proven bounds, by the hash of a problem: the references from which gaps are measured."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

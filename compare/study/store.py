@@ -1,7 +1,5 @@
 """Finished results on disk: each is computed once for equal inputs, so that an interrupted command can be rerun to continue."""
 
-from __future__ import annotations
-
 import inspect
 import io
 import json

@@ -1,7 +1,5 @@
 """Several objectives: protocols of objectives and algorithms, and the loop, which takes snapshots on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import process_time

@@ -1,7 +1,5 @@
 """How new points are made, directions spread and fronts found, by pymoo's operators."""
 
-from __future__ import annotations
-
 from itertools import count
 from math import comb
 

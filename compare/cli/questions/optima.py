@@ -1,7 +1,5 @@
 """Commands about optima: how certain they are (``certainty``), and how they change (``motions``, ``prices``, ``walk``, ...)."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, replace
 from pathlib import Path
 

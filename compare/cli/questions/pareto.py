@@ -1,7 +1,5 @@
 """``nlp-gait pareto``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from compare.cli.command import command

@@ -1,7 +1,5 @@
 """Objectives that compete with power: a balance margin or the walking speed, as a limit, a number and an expression."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

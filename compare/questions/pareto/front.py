@@ -1,7 +1,5 @@
 """The true front of power against one criterion: least power for each demanded value of the criterion, and its knees."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
