@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
+from compare.analysis.tuning import read_tunings
 from compare.archive.rerun import compare_runs, make_task
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
@@ -163,7 +164,8 @@ def _check_report(folder: Path, records: Sequence[RunRecord]) -> Finding:
     try:
         comparisons = compare_problems(label_editions(records))
         simulated = load_simulations(folder, select_best_gaits(comparisons))
-        again = markdown_page(make_study_document(comparisons, read_manifest(folder), simulated)).split("\n")
+        document = make_study_document(comparisons, read_manifest(folder), simulated, tunings=read_tunings(folder))
+        again = markdown_page(document).split("\n")
         known = (folder / REPORT).read_text(encoding="utf-8").split("\n")
     except (GaitError, OSError, UnicodeError) as error:
         return Finding(REPORT, False, str(error))
