@@ -4,6 +4,8 @@
 exact functions to search algorithms, and ``compile_function`` compiles any CasADi function for batches.
 """
 
+from __future__ import annotations
+
 from nlp_gait.providers import FILE_HASHES, FUNCTIONS, PROBLEMS, import_object
 
 # In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
@@ -74,7 +76,7 @@ FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
 FUNCTIONS["animate_gait"] = "compare.report.gait_page:animate_gait"
 
 
-def __getattr__(name: str) -> "Any":
+def __getattr__(name: str) -> Any:
     """Import or read a public name when it is first used."""
     if name == "__version__":
         from importlib.metadata import version

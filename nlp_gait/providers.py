@@ -4,6 +4,8 @@
 imports this module before everything else, so it imports nothing that takes time.
 """
 
+from __future__ import annotations
+
 TYPE_CHECKING = False  # in place of typing's, as in ``nlp_gait/__init__.py``
 if TYPE_CHECKING:
     from typing import Any
@@ -14,7 +16,7 @@ FILE_HASHES: dict[str, str] = {}
 FUNCTIONS: dict[str, str] = {}  # by their task, such as ``plot_gait``
 
 
-def import_object(place: str) -> "Any":
+def import_object(place: str) -> Any:
     """Return the object at ``"module:object"``."""
     from importlib import import_module
 

@@ -145,7 +145,7 @@ def compare(
         print_simulations(gaits)
 
     print_result(as_json, data, written, tables)
-    end_if_excluded([each.sentence for each in imported.excluded])
+    end_if_excluded(imported.sentences)
     end_if_none_left(records)
 
 

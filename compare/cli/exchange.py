@@ -52,7 +52,7 @@ def import_results(
     written = [*kept, *report]
     shown = [record for record in everything if record.problem == spec.title]
     print_result(as_json, {"problems": summarise_problems(shown)}, written, lambda: print_summaries(shown))
-    end_if_excluded([each.sentence for each in evidence.excluded])
+    end_if_excluded(evidence.sentences)
 
 
 @command
@@ -81,7 +81,7 @@ def logs(folder: Path, to: Path, form: Literal["ioh", "coco"] = "ioh", as_json: 
         () if not as_json else written,
         lambda: stdout.print(f"wrote {len(written)} files to {to}", soft_wrap=True),
     )
-    end_if_excluded([each.sentence for each in evidence.excluded])
+    end_if_excluded(evidence.sentences)
 
 
 @command
@@ -101,7 +101,7 @@ def archive(*, folder: Path, out: Path = Path("study.zip"), code: list[str] | No
     name_all(code)
     target = output_file(out)
     evidence = read_evidence(folder, "all")
-    end_if_excluded([each.sentence for each in evidence.excluded])
+    end_if_excluded(evidence.sentences)
     write_report(folder, label_editions(evidence.records), read_manifest(folder))
     print_written(pack_study(folder, evidence.records, target))
 

@@ -93,9 +93,9 @@ def report(
     simulated = simulate_best(folder, records, drive_options.make()) if engine else []
     further = FurtherFiles(csv=as_csv, parquet=parquet, latex=latex, pdf=pdf, style=style)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
-    data = {**plain_simulations(simulated), "excluded": [exclusion.sentence for exclusion in evidence.excluded]}
+    data = {**plain_simulations(simulated), "excluded": evidence.sentences}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
-    end_if_excluded([each.sentence for each in evidence.excluded])
+    end_if_excluded(evidence.sentences)
 
 
 @command

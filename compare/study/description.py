@@ -72,7 +72,8 @@ def _read_fields(kind: type) -> Iterator[tuple[str, str]]:
     with suppress(OSError):  # a frozen program has no source
         for line in inspect.getsource(kind).splitlines():
             code, _, comment = line.partition("#: ")
-            words += [comment] * bool(comment)
+            if comment:
+                words.append(comment)
             if words and (field := FIELD.match(code)):
                 yield field[1], " ".join(words).replace("``", "`")
             if code.strip():

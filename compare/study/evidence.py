@@ -55,6 +55,11 @@ class CheckedRecords(NamedTuple):
     records: list[RunRecord]
     excluded: list[Exclusion]
 
+    @property
+    def sentences(self) -> list[str]:
+        """Names and reasons of the excluded ones."""
+        return [exclusion.sentence for exclusion in self.excluded]
+
 
 def check_records(
     records: Sequence[RunRecord],
@@ -110,7 +115,7 @@ def read_evidence(
     damaged = [(path, error) for path, error in found if isinstance(error, InputError)]
     evidence.excluded[:0] = [Exclusion(path.relative_to(folder).as_posix(), (str(error),)) for path, error in damaged]
     if not evidence.records:
-        sentences = "; ".join(exclusion.sentence for exclusion in evidence.excluded)
+        sentences = "; ".join(evidence.sentences)
         raise InputError(f"none of the {len(found)} records in {str(folder)!r} can be used: {sentences}")
     return evidence
 

@@ -135,8 +135,14 @@ class _CmaLagrangianSearch(CmaEsSearch):
     def _begin(self, centre: Array) -> Any:
         from cma import ConstrainedFitnessAL
 
-        functions, off = (lambda x: self._current[0], lambda x: self._current[1]), {"logging": 0, "archives": False}
-        self._fitness = ConstrainedFitnessAL(*functions, dimension=len(centre), which="best", **off)
+        self._fitness = ConstrainedFitnessAL(
+            lambda x: self._current[0],
+            lambda x: self._current[1],
+            dimension=len(centre),
+            which="best",
+            logging=0,
+            archives=False,
+        )
         return super()._begin(centre)
 
     def _criteria(self) -> dict[str, float]:

@@ -61,11 +61,16 @@ class ExactModel:
         violations, found = _compute_violations(values), []
         for k in range(len(self.row_names)) if chosen is None else chosen:
             low, high = (float(end[k]) if math.isfinite(end[k]) else None for end in (values.lower, values.upper))
-            name = self.row_names[k]
-            unit = self.row_units[k]
-            value = float(values.g[k])
-            miss = float(violations[k])
-            found.append(ConstraintValue(name=name, value=value, lower=low, upper=high, violation=miss, unit=unit))
+            found.append(
+                ConstraintValue(
+                    name=self.row_names[k],
+                    value=float(values.g[k]),
+                    lower=low,
+                    upper=high,
+                    violation=float(violations[k]),
+                    unit=self.row_units[k],
+                )
+            )
         return tuple(found)
 
 

@@ -196,12 +196,14 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> Iterat
             continue
         # A higher upper bound lowers the cost, a higher lower bound raises it.
         side = "upper" if slopes[i] < 0 else "lower"
-        name = exact.row_names[i]
-        row_unit = exact.row_units[i]
-        bound = float(getattr(values, side)[i])
-        price = float(problem.objective.sign * slopes[i])
-        price_unit = f"{per}per {row_unit}"
-        yield ActiveConstraint(name=name, side=side, bound=bound, unit=row_unit, price=price, price_unit=price_unit)
+        yield ActiveConstraint(
+            name=exact.row_names[i],
+            side=side,
+            bound=float(getattr(values, side)[i]),
+            unit=exact.row_units[i],
+            price=float(problem.objective.sign * slopes[i]),
+            price_unit=f"{per}per {exact.row_units[i]}",
+        )
 
 
 class Continuation:

@@ -1,5 +1,6 @@
 """What shows the gaits of a problem: time histories, stick figures, and what a physics engine needs to simulate them."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -97,22 +98,26 @@ class Skeleton:
         NaN where it is unknown or no sole carries load. The first and the last instant use the loaded soles of their neighbour: a
         foot that only touches the ground there carries no load.
         """
-        margins, last = np.full(len(self.t), np.nan), len(self.t) - 1
-        for k, zmp in enumerate(() if self.zmp is None else self.zmp):
-            bearing = min(max(k, 1), max(last - 1, 0))
-            loaded = [sole.corners[k] for sole in self.soles if sole.supports[bearing]]
-            corners = find_hull(np.concatenate(loaded)[:, :2]) if loaded else None
-            if corners is not None:
-                edges = np.roll(corners, -1, axis=0) - corners  # counter-clockwise
-                away = zmp[:2] - corners
-                inside = (edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0]) / np.linalg.norm(edges, axis=1)
-                along = np.clip((away * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
-                distance = np.linalg.norm(away - along[:, None] * edges, axis=1).min()
-                margins[k] = inside.min() if (inside >= 0.0).all() else -distance
-            elif loaded:  # a planar model: only its length counts
-                x = np.concatenate(loaded)[:, 0]
-                margins[k] = min(zmp[0] - x.min(), x.max() - zmp[0])
-        return margins
+        if self.zmp is None:
+            return np.full(len(self.t), np.nan)
+        last = len(self.t) - 1
+        return np.array([self._margin_at(k, zmp, min(max(k, 1), max(last - 1, 0))) for k, zmp in enumerate(self.zmp)])
+
+    def _margin_at(self, k: int, zmp: Array, bearing: int) -> float:
+        loaded = [sole.corners[k] for sole in self.soles if sole.supports[bearing]]
+        if not loaded:
+            return math.nan
+        corners = find_hull(np.concatenate(loaded)[:, :2])
+        if corners is None:  # a planar model: only its length counts
+            x = np.concatenate(loaded)[:, 0]
+            return float(min(zmp[0] - x.min(), x.max() - zmp[0]))
+        edges = np.roll(corners, -1, axis=0) - corners  # counter-clockwise
+        away = zmp[:2] - corners
+        inside = (edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0]) / np.linalg.norm(edges, axis=1)
+        if (inside >= 0.0).all():
+            return float(inside.min())
+        along = np.clip((away * edges).sum(axis=1) / (edges**2).sum(axis=1), 0.0, 1.0)
+        return -float(np.linalg.norm(away - along[:, None] * edges, axis=1).min())
 
     def box(self) -> tuple[Array, Array]:
         """Return the smallest and largest coordinates of everything that moves, (3,) each [m]."""
@@ -150,10 +155,14 @@ def make_flat_skeleton(signals: Signals, limbs: Sequence[Limb], soles: Sequence[
     arrays = signals.arrays
     x = np.concatenate([sole.corners[..., 0].ravel() for sole in soles])
     ground = np.array([[x.min() - 0.05, 0.0], [x.max() + 0.05, 0.0]])
-    t = arrays["t"]
-    com = arrays["com"]
-    zmp = np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))])
-    return Skeleton(t=t, limbs=tuple(limbs), soles=tuple(soles), ground=ground, com=com, zmp=zmp)
+    return Skeleton(
+        t=arrays["t"],
+        limbs=tuple(limbs),
+        soles=tuple(soles),
+        ground=ground,
+        com=arrays["com"],
+        zmp=np.column_stack([arrays["zmp"], np.zeros(len(arrays["t"]))]),
+    )
 
 
 def make_rectangle(back: float, front: float, right: float, left: float) -> Array:

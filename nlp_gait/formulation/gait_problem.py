@@ -5,6 +5,8 @@ A problem contains mathematics and knows no solver: ``backends/`` turns it into 
 every variable, which are the parameters ``<variable>.lower`` and ``<variable>.upper``.
 """
 
+from __future__ import annotations
+
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -75,18 +77,18 @@ class GaitProblem:
     #: Parameters that the problem has with another option, as ``{"speed_m_s": "objective=power"}``
     with_other_options: Mapping[str, str] = field(default_factory=dict)
     #: Makes the same problem with a number of times as many samples; None if there is no finer grid
-    refine: Callable[[int], "GaitProblem"] | None = None
+    refine: Callable[[int], GaitProblem] | None = None
     grid: parts.Grid | None = None  #: samples, or None if the problem has none
     #: The motion's rows as functions of time, one entry per phase; empty if they are defined on samples only
     rows_over_time: tuple[parts.RowsOverTime, ...] = ()
     #: Makes the problem's least-power form for proofs; None if it has none
-    power_form: Callable[["GaitProblem"], PowerForm] | None = None
+    power_form: Callable[[GaitProblem], PowerForm] | None = None
     display: Display = Display()  #: what shows its gaits
     hints: SolverHints = SolverHints()  #: for solvers
     loaded_as: str = ""  #: argument of ``load``, if that is not the name but user code
     # No arguments: only copies made by ``with_values`` and ``with_origin`` share them.
     _cache: Cache = field(default_factory=Cache, init=False, repr=False)
-    _origin: "Origin | None" = field(default=None, init=False, repr=False)
+    _origin: Origin | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         counts = Counter([*self.names, *(parameter.name for parameter in self.parameters)])
@@ -139,7 +141,7 @@ class GaitProblem:
         """Return the current value of a parameter."""
         return self.parameter_values[self._parameter(name).name]
 
-    def with_values(self, /, **values: float) -> "GaitProblem":
+    def with_values(self, /, **values: float) -> GaitProblem:
         """Return the same problem with other parameter values; nothing is rebuilt. Pass names with a dot as ``**{...}``.
 
         Raises UnknownNameError, and InputError for a value outside the parameter's limits, or inverted bounds.
@@ -165,7 +167,7 @@ class GaitProblem:
                 )
         return changed
 
-    def fix(self, /, **values: float) -> "GaitProblem":
+    def fix(self, /, **values: float) -> GaitProblem:
         """Return the same problem with some variables fixed at a value within their bounds."""
         bounds: dict[str, float] = {}
         for name, value in values.items():
@@ -179,7 +181,7 @@ class GaitProblem:
             bounds |= {f"{name}.lower": value, f"{name}.upper": value}
         return self.with_values(**bounds)
 
-    def place(self, at: Mapping[str, float]) -> "GaitProblem":
+    def place(self, at: Mapping[str, float]) -> GaitProblem:
         """Return the same problem at a point of a grid: parameters, variables and other bounded quantities have a value."""
         fixed = {name: value for name, value in at.items() if name in self.names}
         values: dict[str, float] = {}
@@ -188,7 +190,7 @@ class GaitProblem:
             values |= dict.fromkeys(bounds if bounds <= self.parameter_values.keys() else {name}, at[name])
         return self.with_values(**values).fix(**fixed)
 
-    def dense(self, factor: int) -> "GaitProblem | None":
+    def dense(self, factor: int) -> GaitProblem | None:
         """Return the same problem with ``factor`` times as many intervals; None if it cannot be refined."""
         if (refine := self.refine) is None:
             return None
@@ -203,7 +205,7 @@ class GaitProblem:
         variables: Sequence[Variable] = (),
         parameters: Sequence[Parameter] = (),
         change: Change | None = None,
-    ) -> "GaitProblem":
+    ) -> GaitProblem:
         """Return a problem with other mathematics; time histories, start points and denser grids are adapted.
 
         ``change`` makes the new assembly from this problem's, the point of all variables and parameters, and the interpretation
@@ -317,24 +319,24 @@ class GaitProblem:
         parameters = [q.name for q in self.parameters]
         return Point.of(MX.sym("x", len(self.names)), MX.sym("p", len(parameters)), self.names, parameters)
 
-    def with_origin(self, make: Callable[..., "GaitProblem"], options: Mapping[str, Any]) -> "GaitProblem":
+    def with_origin(self, make: Callable[..., GaitProblem], options: Mapping[str, Any]) -> GaitProblem:
         """Return the same problem, pickled as ``make`` with these options."""
         return self._copy((make, dict(options)))
 
-    def _copy(self, origin: "Origin | None", **changes: Any) -> "GaitProblem":
+    def _copy(self, origin: Origin | None, **changes: Any) -> GaitProblem:
         """Return a copy with the same mathematics, so that it shares what is built from it."""
         made = replace(self, **changes)
         object.__setattr__(made, "_cache", self._cache)
         object.__setattr__(made, "_origin", origin)
         return made
 
-    def __copy__(self) -> "GaitProblem":  # it cannot be changed
+    def __copy__(self) -> GaitProblem:  # it cannot be changed
         return self
 
-    def __deepcopy__(self, memo: object) -> "GaitProblem":
+    def __deepcopy__(self, memo: object) -> GaitProblem:
         return self
 
-    def __reduce__(self) -> tuple[Callable[..., "GaitProblem"], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[Callable[..., GaitProblem], tuple[Any, ...]]:
         make, options = self._origin or (None, {})
         if make is None or "<locals>" in getattr(make, "__qualname__", ""):
             raise InputError(
@@ -343,7 +345,7 @@ class GaitProblem:
             )
         return _unpickle, (make, options, dict(self.values), repr(self.display.robot))
 
-    def build_once(self, build: Callable[Concatenate["GaitProblem", P], T], *arguments: P.args, **named: P.kwargs) -> T:
+    def build_once(self, build: Callable[Concatenate[GaitProblem, P], T], *arguments: P.args, **named: P.kwargs) -> T:
         """Return ``build(self, ...)``, computed once for all copies that differ in parameter values only.
 
         ``build`` is a function of a module or class; it reads the mathematics, not the parameter values. Arguments are hashable.

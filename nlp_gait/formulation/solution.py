@@ -1,5 +1,7 @@
 """Results of solvers: numbers and names, no solver objects."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -50,7 +52,7 @@ class Evaluations:
     jacobian: int = 0
     hessian: int = 0
 
-    def __add__(self, other: "Evaluations") -> "Evaluations":
+    def __add__(self, other: Evaluations) -> Evaluations:
         """Sum by kind."""
         return Evaluations(**{kind: getattr(self, kind) + getattr(other, kind) for kind in asdict(self)})
 
@@ -177,7 +179,7 @@ class Solution:
         header = ("variable or constraint", "value", "price of raising its bound")
         return format_html_table(repr(self)[1:-1], header, [*x, *rows], note)
 
-    def signals(self, problem: "GaitProblem | None" = None) -> Signals:
+    def signals(self, problem: GaitProblem | None = None) -> Signals:
         """Return time histories at x.
 
         The problem that was solved is loaded by name if it is not given, which may be impossible for a user-defined one: it
@@ -185,15 +187,15 @@ class Solution:
         """
         return self._restore(problem).signals(self.x)
 
-    def plot(self, problem: "GaitProblem | None" = None) -> Any:
+    def plot(self, problem: GaitProblem | None = None) -> Any:
         """Plot the gait with Matplotlib: stick figures, power and balance margin; problem and errors as for ``signals``."""
         return import_object(FUNCTIONS["plot_gait"])(self._restore(problem), self.x, self.solver)
 
-    def animate(self, problem: "GaitProblem | None" = None) -> Any:
+    def animate(self, problem: GaitProblem | None = None) -> Any:
         """Return a page that plays the gait in 3-D, with power and margin, for notebooks; ``write`` saves it. See ``plot``."""
         return import_object(FUNCTIONS["animate_gait"])(self._restore(problem), self.x, self.solver)
 
-    def sensitivity(self, problem: "GaitProblem | None" = None) -> Any:
+    def sensitivity(self, problem: GaitProblem | None = None) -> Any:
         """Return a table of the derivatives of x and the objective with respect to all parameters.
 
         It has ``value(quantity, parameter)`` in the quantity's unit per unit of the parameter, ``write_csv(path)``, and
@@ -203,7 +205,7 @@ class Solution:
         """
         return import_object(FUNCTIONS["tabulate_sensitivities"])(self._restore(problem), self)
 
-    def _restore(self, problem: "GaitProblem | None") -> "GaitProblem":
+    def _restore(self, problem: GaitProblem | None) -> GaitProblem:
         from nlp_gait.formulation.registry import load
 
         return (problem or load(self.problem, **self.options)).with_values(**self.parameters)

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from itertools import pairwise
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_folder, replace_nan, write_json
-from nlp_gait.formulation import Array
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 
@@ -23,7 +23,22 @@ SLACK = 1e-10
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
-def find_facts(instance: Any) -> Facts:
+class Judged(Protocol):
+    """What is needed of an ``Instance`` here."""
+
+    id: str
+    gait_problem: GaitProblem
+    lower: Array
+    upper: Array
+
+    def make_one_sided(self, g: Array) -> Array:
+        """Return the rows G (P, m)."""
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives (m, n) of the rows."""
+
+
+def find_facts(instance: Judged) -> Facts:
     """Return the facts about an instance: shipped ones, or those of this call or of an earlier one on this machine.
 
     Raises InputError if no start of IPOPT converged, so that the instance has no best known point.
@@ -41,7 +56,7 @@ def find_facts(instance: Any) -> Facts:
     return facts
 
 
-def compute_facts(instance: Any, starts: int) -> Facts:
+def compute_facts(instance: Judged, starts: int) -> Facts:
     """Return the best point of IPOPT from random starts and its evidence; raises InputError if no start converges."""
     problem = instance.gait_problem
     for seed in range(MOST_ROUNDS):
@@ -68,14 +83,14 @@ def compute_facts(instance: Any, starts: int) -> Facts:
     )
 
 
-def evaluate_interpreted(instance: Any, x: Array) -> tuple[float, Array]:
+def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     kernel = build_kernel(instance.gait_problem)
     cost, g = kernel.function(x, instance.gait_problem.p)
     return float(cost), instance.make_one_sided(np.array(g).reshape(1, -1))[0]
 
 
-def make_strictly_feasible(instance: Any, x: Array) -> Array | None:
+def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     """Return the nearest point with a slack in every row, by linear programs with the smallest possible step, or None.
 
     IPOPT may leave a row violated by about 1e-8; the best known point has a violation of exactly zero. The programs ignore the
@@ -110,7 +125,7 @@ def make_strictly_feasible(instance: Any, x: Array) -> Array | None:
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def make_probes(instance: Any, best: Array) -> tuple[Probe, ...]:
+def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
     """Return values at random points, between them and the best one, and at the best one."""
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))

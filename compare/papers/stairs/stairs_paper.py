@@ -110,6 +110,8 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
         [angle * (offset + 12 * u - 9 * u**2 + 2 * u**3) for u in (t1 / (t2 - t1), t2 / (t2 - t1))]
         for angle, offset in ((sole, -4), (toe, -5))
     )
+    slant = math.atan2(rise, tread)
+    arc = tread / math.sin(2 * slant)  # (eq. 25)
     return {
         "sole_jump_deg": math.degrees(sixth[0] - sole),  # (eq. 3) at t1
         "sole_end_deg": math.degrees(sixth[1]),  # at t2, where the sole should be level
@@ -124,8 +126,8 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
         "toe_jump_mm": 1e3 * lift[1],  # (eq. 16) with theta_6 = 0
         "raised_toe_mm": 1e3 * (lift[1] + robot.foot_m * math.sin(toe)),  # with theta_6 = theta_b
         "third_point_mm": 1e3 * math.dist(points[2], points[3] - catch * slope),
-        "arc_m": (arc := tread / math.sin(2 * math.atan2(rise, tread))),  # (eq. 25)
-        "sagitta_mm": 1e3 * arc * (1 - math.cos(math.atan2(rise, tread))),  # from the arc to its chord
+        "arc_m": arc,
+        "sagitta_mm": 1e3 * arc * (1 - math.cos(slant)),  # from the arc to its chord
     }
 
 

@@ -160,8 +160,9 @@ def make_nlp_plan(structure: Structure, *, second: bool = True) -> NlpPlan:
     for row, (entries, pattern) in enumerate(zip(glue.entries, patterns, strict=True)):
         for j, factor in entries:
             derivative = assembler.derivatives[j]
-            columns = np.searchsorted(pattern, derivative.columns) if row else derivative.columns
-            targets = (jacobian + starts[row - 1] if row else gradient) + columns
+            targets = gradient + derivative.columns
+            if row > 0:
+                targets = jacobian + starts[row - 1] + np.searchsorted(pattern, derivative.columns)
             plan.add_row(FIRST, derivative, targets, factor)
     m = rows.shape[0] - 1
     number = np.repeat(np.arange(m), np.diff(starts))

@@ -32,13 +32,24 @@ def write_nlp_source(found: NlpPlan) -> str:
     plan = found.plan
     m, n = found.jacobian.shape
     phases = dict(zip(("value", "first", "second"), plan.steps, strict=True))
-    sizes = {"VARIABLES": n, "PARAMETERS": found.parameters, "ROWS": m, "SIZE": plan.size}
-    sizes["MOST_IN"] = max((function.nnz_in() for function in plan.functions), default=1)
-    sizes["MOST_OUT"] = max((function.nnz_out() for function in plan.functions), default=1)
-    sizes |= {"W": found.w, "P": found.p, "VALUE": found.rows, "WEIGHT": found.weights, "GRADIENT": found.gradient}
-    sizes |= {"HESSIAN": found.hessian_place, "HESSIAN_NONZEROS": found.hessian.nnz()}
-    sizes |= {"JACOBIAN_NONZEROS": found.jacobian.nnz(), "INITIALS": len(plan.initial)}
-    sizes |= {f"{phase.upper()}_STEPS": len(steps) for phase, steps in phases.items()}
+    sizes = {
+        "VARIABLES": n,
+        "PARAMETERS": found.parameters,
+        "ROWS": m,
+        "SIZE": plan.size,
+        "MOST_IN": max((function.nnz_in() for function in plan.functions), default=1),
+        "MOST_OUT": max((function.nnz_out() for function in plan.functions), default=1),
+        "W": found.w,
+        "P": found.p,
+        "VALUE": found.rows,
+        "WEIGHT": found.weights,
+        "GRADIENT": found.gradient,
+        "HESSIAN": found.hessian_place,
+        "HESSIAN_NONZEROS": found.hessian.nnz(),
+        "JACOBIAN_NONZEROS": found.jacobian.nnz(),
+        "INITIALS": len(plan.initial),
+        **{f"{phase.upper()}_STEPS": len(steps) for phase, steps in phases.items()},
+    }
     cases = " ".join(
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
         for operation, expression in EXPRESSIONS.items()

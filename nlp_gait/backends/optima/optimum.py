@@ -71,9 +71,11 @@ def _build(problem: GaitProblem) -> KktFunctions:
     upper = ca.vertcat(row_upper, DM(model.tie_upper), high)
     lam = MX.sym("lam", values.shape[0])
     lagrangian = model.nlp["f"] + ca.dot(lam, values)
-    names, outputs = (["w", "p", "lam"], ["gradient"]), [model.nlp["f"], values, lower, upper]
-    gradient = ca.Function("gradient", [w, p, lam], [ca.gradient(lagrangian, w)], *names)
-    return KktFunctions(model=model, values=ca.Function("values", [w, p], outputs), gradient=gradient)
+    return KktFunctions(
+        model=model,
+        values=ca.Function("values", [w, p], [model.nlp["f"], values, lower, upper]),
+        gradient=ca.Function("gradient", [w, p, lam], [ca.gradient(lagrangian, w)], ["w", "p", "lam"], ["gradient"]),
+    )
 
 
 def column(value: DM) -> Array:

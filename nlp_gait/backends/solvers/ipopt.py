@@ -1,5 +1,7 @@
 """IPOPT on a problem's NLP."""
 
+from __future__ import annotations
+
 import logging
 import math
 import re
@@ -71,14 +73,14 @@ class IpoptSettings(Solver):
     iterations: int = 300  #: limit of iterations for each stage, in the first stage for each set of rows
     time_limit_s: float = 300.0  #: limit of wall time for all stages of a run [s]; checked after each iteration
     hessian: str | None = None  #: ``"exact"`` or ``"limited-memory"``; None for the one that suits the problem
-    #: whether the NLP's functions and derivatives are compiled; None if that pays for the number of solves and there is a
+    #: whether the NLP's functions and derivatives are compiled; None: where that pays for the number of solves and there is a
     #: compiler
     compiled: bool | None = None
     #: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never replaced by
     #: another one
     linear_solver: str | None = None
-    #: begin with the rows that matter, see ``working_set``; None if the functions are compiled, because selecting the rows
-    #: takes a run. False begins with all rows
+    #: whether a run begins with the rows that matter, see ``working_set``, instead of all; None: where the functions are
+    #: compiled, because selecting the rows takes a run
     few_rows: bool | None = None
     #: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those of the
     #: NLP. Narrower ones follow if the exact functions refuse the last stage's point
@@ -97,14 +99,14 @@ class IpoptSettings(Solver):
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
-    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> "IpoptSettings":
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
         # Whatever is cached: compiled and interpreted functions differ in the last bits, and the same call gives the same result.
         pays = solves * build_nlp(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
         compiled = pays if self.compiled is None else self.compiled
         few_rows = compiled if self.few_rows is None else self.few_rows
         return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled, few_rows=few_rows)
 
-    def prepare(self, problem: GaitProblem, solves: int = 1) -> "Ipopt":
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
         """Return IPOPT for a problem, built once for all its copies; CompilerError if compiled functions are required and fail.
 
         ``solves``, the planned number of solves, decides whether compilation pays if the settings do not.

@@ -142,7 +142,9 @@ class Sqpmethod(WatchedSolver):
 
     name: ClassVar[str] = "sqpmethod"
     quiet: ClassVar[Mapping[str, Any]] = {
-        **{f"print_{what}": False for what in ("header", "iteration", "status")},
+        "print_header": False,
+        "print_iteration": False,
+        "print_status": False,
         "qpsol_options": {"printLevel": "none", "error_on_fail": False},
     }
 

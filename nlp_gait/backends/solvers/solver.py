@@ -1,5 +1,7 @@
 """The interface of an NLP solver: one run of a problem from one start point; and a callback that ends runs."""
 
+from __future__ import annotations
+
 import math
 import threading
 import time
@@ -41,11 +43,11 @@ class Solver(Protocol):
         """Run warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
         return None
 
-    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> "Solver":
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> Solver:
         """Return this solver with all settings that ``prepare`` would choose by the problem and the number of runs."""
         return self
 
-    def prepare(self, problem: GaitProblem, solves: int = 1) -> "Solver":
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> Solver:
         """Return this solver, checked and prepared for a number of runs of a problem and its copies."""
         self.check(problem)
         return self
@@ -63,24 +65,36 @@ def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others
     """Return the outcome at x (n,), clipped to the bounds, with the values of the exact functions."""
     x = np.clip(x, problem.lower, problem.upper)
     exact = build_exact_model(problem).at(x, problem.p)
-    objective = problem.objective.sign * exact.cost
-    cost = exact.cost
-    violation = exact.violation
-    return Outcome(solver=solver, x0=x0, x=x, objective=objective, cost=cost, violation=violation, **others)
+    return Outcome(
+        solver=solver,
+        x0=x0,
+        x=x,
+        objective=problem.objective.sign * exact.cost,
+        cost=exact.cost,
+        violation=exact.violation,
+        **others,
+    )
 
 
 def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
     """Count calls by kind from CasADi's statistics; products with the Hessian count as gradients."""
-    names = {"f": "nlp_f nlp_fg", "g": "nlp_g nlp_fg", "jacobian": "nlp_jac_g nlp_jac_fg", "hessian": "nlp_hess_l"}
-    names["gradient"] = "nlp_grad_f nlp_jac_fg fwd1_nlp_grad_l"
-    counts = {kind: sum(int(stats.get(f"n_call_{name}", 0)) for name in each.split()) for kind, each in names.items()}
-    return Evaluations(**counts)
+
+    def calls(*names: str) -> int:
+        return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
+
+    return Evaluations(
+        f=calls("nlp_f", "nlp_fg"),
+        g=calls("nlp_g", "nlp_fg"),
+        gradient=calls("nlp_grad_f", "nlp_jac_fg", "fwd1_nlp_grad_l"),
+        jacobian=calls("nlp_jac_g", "nlp_jac_fg"),
+        hessian=calls("nlp_hess_l"),
+    )
 
 
 class IterationWatch(ca.Callback):
     """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
-    def __init__(self, nlp: Mapping[str, MX], shared: "IterationWatch | None" = None) -> None:
+    def __init__(self, nlp: Mapping[str, MX], shared: IterationWatch | None = None) -> None:
         """Make a watch for an NLP, to which ``begin`` of another watch applies if it is shared."""
         ca.Callback.__init__(self)
         n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))

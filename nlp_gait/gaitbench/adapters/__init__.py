@@ -17,7 +17,7 @@ ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
     "optuna": ("optuna:OptunaProblem", ("optuna", "optunahub")),
     "nevergrad": ("plain:to_nevergrad", ("nevergrad",)),
     "pymoo-front": ("pymoo:PymooProblem", ("pymoo",)),
-    "pygmo-front": ("plain:to_pygmo", ("pygmo",)),
+    "pygmo-front": ("plain:to_pygmo_front", ("pygmo",)),
 }
 
 

@@ -90,18 +90,22 @@ def to_nevergrad(instance: Instance) -> Any:
     return function
 
 
-def to_pygmo(instance: Instance | FrontInstance) -> Any:
+def to_pygmo(instance: Instance) -> Any:
     """Return a problem of pygmo."""
     import pygmo
 
-    return pygmo.problem((_PygmoFrontProblem if hasattr(instance, "front") else _PygmoProblem)(instance))
+    return pygmo.problem(_PygmoProblem(instance))
 
 
-class _PygmoFrontProblem:
-    """User-defined problem of pygmo with two objectives; infeasible points are worse than any feasible one.
+def to_pygmo_front(instance: FrontInstance) -> Any:
+    """Return a problem of pygmo; its algorithms for several objectives take no constraints, so a violation adds to both."""
+    import pygmo
 
-    pygmo's algorithms for several objectives take no constraints, so a violation adds to both.
-    """
+    return pygmo.problem(_PygmoFrontProblem(instance))
+
+
+class _InBox:
+    """What user-defined problems of pygmo share."""
 
     def __init__(self, instance: Any) -> None:
         self.instance = instance
@@ -111,8 +115,7 @@ class _PygmoFrontProblem:
 
     def batch_fitness(self, xs: Array) -> Array:
         """Return the fitness of concatenated points, point by point."""
-        F, violation = self.instance(np.reshape(xs, (-1, len(self.instance.names))))
-        return np.where(violation[:, None] > 0.0, INFEASIBLE + violation[:, None], F).ravel()
+        raise NotImplementedError
 
     def has_batch_fitness(self) -> bool:
         return True
@@ -120,15 +123,12 @@ class _PygmoFrontProblem:
     def get_bounds(self) -> tuple[Array, Array]:
         return self.instance.lower, self.instance.upper
 
-    def get_nobj(self) -> int:
-        return getattr(self.instance, "count", 1)
-
     def get_name(self) -> str:
         return f"GaitBench {self.instance.id}"
 
 
-class _PygmoProblem(_PygmoFrontProblem):
-    """User-defined problem of pygmo: the objective, then every row as an inequality, with dense gradients."""
+class _PygmoProblem(_InBox):
+    """The objective, then every row as an inequality, with dense gradients."""
 
     def batch_fitness(self, xs: Array) -> Array:
         X = np.reshape(xs, (-1, len(self.instance.names)))
@@ -144,3 +144,15 @@ class _PygmoProblem(_PygmoFrontProblem):
     def get_extra_info(self) -> str:
         instance = self.instance
         return f"\t{instance.definition.what}\n\tbest known: {instance.best_known!r}, {instance.evidence}"
+
+
+class _PygmoFrontProblem(_InBox):
+    """Two objectives; infeasible points are worse than any feasible one."""
+
+    def batch_fitness(self, xs: Array) -> Array:
+        F, violation = self.instance(np.reshape(xs, (-1, len(self.instance.names))))
+        return np.where(violation[:, None] > 0.0, INFEASIBLE + violation[:, None], F).ravel()
+
+    def get_nobj(self) -> int:
+        count: int = self.instance.count
+        return count

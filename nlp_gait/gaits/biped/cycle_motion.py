@@ -119,7 +119,7 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
             foot = flight.swing(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
         else:
             foot = swing_foot(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
-        hip, angles = between(leg.start, leg.end, leg.duration, phase)
+        hip, angles = interpolate_states(leg.start, leg.end, leg.duration, phase)
         return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, at[REACH_MARGIN], ops)
 
     return plan
@@ -135,7 +135,9 @@ def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -
     )
 
 
-def between(start: SwitchState, end: SwitchState, duration: SX, phase: SX) -> tuple[Motion, tuple[Motion, ...]]:
+def interpolate_states(
+    start: SwitchState, end: SwitchState, duration: SX, phase: SX
+) -> tuple[Motion, tuple[Motion, ...]]:
     """Motion of the hip (3,) [m] and of every coordinate [rad] from state to state."""
 
     def curves(*ends: SX) -> tuple[Motion, ...]:

@@ -16,7 +16,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point, Signals
 from nlp_gait.formulation.assembly import Variable, parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
-from nlp_gait.gaits.biped.cycle_motion import between, make_cycle_variables, make_state_variables, read_state
+from nlp_gait.gaits.biped.cycle_motion import interpolate_states, make_cycle_variables, make_state_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
 from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
@@ -167,7 +167,7 @@ def make_footstep_planner(body: Body, turning: bool, swings: bool) -> Planner:
 
     def plan(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
         begin, end = (read_state(at, name, body.coordinates) for name in ("begin", "end"))
-        hip, angles = between(begin, end, at[DURATION], phase)
+        hip, angles = interpolate_states(begin, end, at[DURATION], phase)
         share, rise = constant_motion(1.0), constant_motion(0.0)
         if swings:
             share = cubic(SX(0), SX(1), SX(0), SX(0), at[DURATION], phase)

@@ -20,7 +20,8 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
-SINGLE, DOUBLE = "single support: least mean power", "double support: least mean power"
+# Titles of the phases' problems.
+SINGLE_SUPPORT, DOUBLE_SUPPORT = "single support: least mean power", "double support: least mean power"
 DRAWS = 50  # of a start point, at most
 
 

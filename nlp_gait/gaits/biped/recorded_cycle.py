@@ -1,9 +1,9 @@
 """Problems of recorded motions: judged by the limits of the planned phases; their times and their step are the variables."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
@@ -28,12 +28,16 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 MOVES = 1e-9  # [rad]; a joint that turns by less is held
 
 
+def _refuse_plan(*_: object) -> NoReturn:
+    raise NotImplementedError("a recorded phase has no plan")
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedPhase(Phase):
     """A phase whose angles over time are given, so that it has no plan."""
 
     recorded: RecordedMotion  # the motion, of the same joints
-    plan: Planner = field(init=False, default=None)  # type: ignore[assignment]
+    plan: Planner = _refuse_plan
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

@@ -137,14 +137,14 @@ def make_single_support_phase(
         body,
         "ssp",
         splines,
-        (stance.hip_x, stance.hip_y),
-        lambda at, more, s: {"L": left, "R": swing(at, more, right_height, s)},
-        limit_to_sole(body, stance.support_xy),
-        (FootClearance(sole, step_m, LIFT),) if splines.count else (),
-        LoadSharing(make_single_support_loads(body)),
-        grid,
-        goal,
-        derivatives,
+        hip_places=(stance.hip_x, stance.hip_y),
+        ankles=lambda at, more, s: {"L": left, "R": swing(at, more, right_height, s)},
+        balance=limit_to_sole(body, stance.support_xy),
+        clearance=(FootClearance(sole, step_m, LIFT),) if splines.count else (),
+        sharing=LoadSharing(make_single_support_loads(body)),
+        grid=grid,
+        goal=goal,
+        derivatives=derivatives,
     )
 
 
@@ -160,10 +160,18 @@ def make_double_support_phase(
     """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
     soles = place_soles(body, step_m)
     ankles = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
-    balance = limit_to_box(make_support_box(body.robot, soles))
-    ends = hip_ends(body, soles)
     return _make_support_phase(
-        body, "dsp", splines, ends, lambda at, more, s: ankles, balance, (), sharing, grid, goal, derivatives
+        body,
+        "dsp",
+        splines,
+        hip_places=hip_ends(body, soles),
+        ankles=lambda at, more, s: ankles,
+        balance=limit_to_box(make_support_box(body.robot, soles)),
+        clearance=(),
+        sharing=sharing,
+        grid=grid,
+        goal=goal,
+        derivatives=derivatives,
     )
 
 
@@ -171,6 +179,7 @@ def _make_support_phase(
     body: Body,
     name: PhaseName,
     splines: Splines,
+    *,
     hip_places: tuple[Point2, Point2],
     ankles: Callable[[InstantPoint, Mapping[str, trajectories.Motion], SX], Mapping[str, trajectories.Motion]],
     balance: BalanceMargins,

@@ -10,7 +10,7 @@ from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
-from nlp_gait.gaits.biped.phase_problem import DOUBLE, SINGLE, Criterion, make_goal, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.support_phases import make_double_support_phase, make_single_support_phase
 from nlp_gait.gaits.biped.walk import plan_whole_walk
@@ -41,7 +41,7 @@ def humanoid_ssp(
     step_m = body.check_step_length(step_length_m)
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
     phase = make_single_support_phase(body, step_m, body.make_splines("ssp", trajectory), grid, goal)
-    return make_phase_problem("ssp", SINGLE, phase)
+    return make_phase_problem("ssp", SINGLE_SUPPORT, phase)
 
 
 @maker
@@ -68,7 +68,7 @@ def humanoid_dsp(
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
     phase = make_double_support_phase(body, step_m, body.make_splines("dsp", trajectory), sharing, grid, goal)
-    return make_phase_problem("dsp", DOUBLE, phase)
+    return make_phase_problem("dsp", DOUBLE_SUPPORT, phase)
 
 
 @maker

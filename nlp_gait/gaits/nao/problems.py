@@ -18,7 +18,7 @@ from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
-from nlp_gait.gaits.biped.phase_problem import DOUBLE, SINGLE, Criterion, make_goal, make_phase_problem
+from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.recorded_cycle import (
     RecordedCycles,
     RecordedGait,
@@ -70,7 +70,7 @@ def nao_ssp(
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
     splines = body.make_splines("ssp", trajectory)
     phase = make_single_support_phase(body, step_length_m, splines, grid, goal, derivatives)
-    return replace(make_phase_problem("ssp", SINGLE, phase), power_form=power_form)
+    return replace(make_phase_problem("ssp", SINGLE_SUPPORT, phase), power_form=power_form)
 
 
 @maker
@@ -113,7 +113,7 @@ def nao_dsp(
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
     splines = body.make_splines("dsp", trajectory)
     phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, goal, derivatives)
-    return replace(make_phase_problem("dsp", DOUBLE, phase), power_form=power_form)
+    return replace(make_phase_problem("dsp", DOUBLE_SUPPORT, phase), power_form=power_form)
 
 
 @maker
