@@ -76,10 +76,10 @@ class IpoptSettings(Solver):
     #: whether the NLP's functions and derivatives are compiled; None: where that pays for the number of solves and there is a
     #: compiler
     compiled: bool | None = None
-    #: one of ``LINEAR_SOLVERS``; None for IPOPT's default. One that does not run here is an error; it is never replaced by
-    #: another one
+    #: ma27, ma57, ma77, ma86, ma97, pardiso, mumps or spral; None for IPOPT's default. One that does not run here is an error;
+    #: it is never replaced by another one
     linear_solver: str | None = None
-    #: whether a run begins with the rows that matter, see ``working_set``, instead of all; None: where the functions are
+    #: whether a run begins with the rows that matter instead of all, see docs/solving.md; None: where the functions are
     #: compiled, because selecting the rows takes a run
     few_rows: bool | None = None
     #: of the sigmoids that replace a jump, one stage for each, in units of the switch [m for a margin]; empty for those of the
