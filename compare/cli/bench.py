@@ -8,25 +8,14 @@ from typing import Literal
 
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import command
-from compare.cli.common import (
-    describe_command,
-    end_interrupted,
-    fail,
-    print_result,
-    print_table,
-    print_written,
-    progress_bar,
-    say,
-    stdout,
-    until_interrupted,
-)
 from compare.cli.compare import tune_first
+from compare.cli.endings import end_interrupted, fail, interruptible, until_interrupted
 from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import output_file
+from compare.cli.printing import describe_command, print_result, print_table, print_written, progress_bar, say, stdout
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
-from nlp_gait.interrupts import Interrupted
 from nlp_gait.user_code import is_reference
 
 # Solvers that run beside yours on instances or with a budget for which no baseline is shipped.
@@ -178,11 +167,11 @@ def _bench_fronts(
     solvers += [algorithm] if algorithm and algorithm not in solvers else []
     make_writable_folder(out)
     options = {"runs": runs, "evaluations": evaluations, "folder": out, "jobs": jobs or available_cores()}
-    with progress_bar("runs", len(chosen) * len(solvers) * runs) as advance:
-        try:
-            results = run_fronts(chosen, solvers, **options, progress=advance)  # type: ignore[arg-type]
-        except Interrupted:
-            end_interrupted(f"interrupted; finished runs are stored in {out}; rerun the command to continue")
+    with (
+        interruptible(f"interrupted; finished runs are stored in {out}; rerun the command to continue"),
+        progress_bar("runs", len(chosen) * len(solvers) * runs) as advance,
+    ):
+        results = run_fronts(chosen, solvers, **options, progress=advance)  # type: ignore[arg-type]
     page = add_session(make_fronts_page(results, runs, evaluations), describe_command(), [], str(options["jobs"]))
     written, ranks = write_document(out, page, "fronts"), rank_searches(results)
     data = {"instances": chosen, "mean_ranks": ranks}

@@ -24,7 +24,7 @@ from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import typer
 
-from compare.cli.common import end_interrupted, fail, say_error
+from compare.cli.endings import end_interrupted, fail, say_error
 from compare.cli.outputs import register_written
 from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError

@@ -10,20 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import (
-    describe_command,
-    end_if_excluded,
-    end_interrupted,
-    fail,
-    print_result,
-    print_table,
-    progress_bar,
-    say,
-    say_error,
-    stderr,
-    stdout,
-)
+from compare.cli.endings import end_if_excluded, end_interrupted, fail, say_error
 from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
+from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stderr, stdout
 from compare.cli.report import plain_simulations, print_simulations, simulate_best
 from compare.study.settings import SolverSpec, read_settings, resolve_user_code
 from compare.study.task import GRADIENT_SOLVERS, IPOPT

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from compare.analysis.units import heading, with_unit
 from compare.cli.command import command
-from compare.cli.common import fail, print_json, print_result, print_rows, print_table, print_written, stdout
+from compare.cli.endings import fail
 from compare.cli.options import AnyProblem, parse_values, parse_x
 from compare.cli.outputs import output_file
+from compare.cli.printing import print_json, print_result, print_rows, print_table, print_written, stdout
 from compare.judge import Evaluation
 from nlp_gait.errors import InputError
 from nlp_gait.files import format_csv, write_text

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from compare.cli.command import command
-from compare.cli.common import end_if_excluded, fail, print_json, print_result, print_written, progress_bar, say, stdout
 from compare.cli.compare import print_summaries, summarise_problems
+from compare.cli.endings import end_if_excluded, fail
 from compare.cli.options import RESULTS, NamedProblem, name_all
 from compare.cli.outputs import output_file
+from compare.cli.printing import print_json, print_result, print_written, progress_bar, say, stdout
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:

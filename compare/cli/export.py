@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from compare.cli.command import command
-from compare.cli.common import interruptible, print_result, print_written
+from compare.cli.endings import interruptible
 from compare.cli.options import NamedProblem, StoredGait
 from compare.cli.outputs import output_file
+from compare.cli.printing import print_result, print_written
 from nlp_gait.export.set_points import PERIOD_MS
 
 SHEET = ".png"  # suffix of a contact sheet

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from compare.cli.command import command
-from compare.cli.common import print_json, print_table, print_written, stdout
 from compare.cli.outputs import output_file
+from compare.cli.printing import print_json, print_table, print_written, stdout
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load, problem_names
 

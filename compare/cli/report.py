@@ -11,19 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.common import (
-    describe_command,
-    end_if_excluded,
-    end_interrupted,
-    interruptible,
-    print_result,
-    print_table,
-    print_written,
-    progress_bar,
-    say,
-    stdout,
-)
+from compare.cli.endings import end_if_excluded, interruptible
 from compare.cli.options import name_all
+from compare.cli.printing import describe_command, print_result, print_table, print_written, progress_bar, say, stdout
 from compare.cli.simulate import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
 from nlp_gait.decoding import read_dataclass
@@ -119,7 +109,7 @@ def reproduce(
     chosen = reproduction.quick if quick else reproduction.full
     if effort:
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
-    with interruptible(out), progress_bar(paper, chosen.steps) as advance:
+    with interruptible(folder=out), progress_bar(paper, chosen.steps) as advance:
         reproduction.reproduce(out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler)
     print_written(out / "report.md")
 
@@ -131,13 +121,12 @@ def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> l
     from compare.study.simulations import simulate_records
 
     gaits = select_best_gaits(compare_problems(records))
-    try:
-        with progress_bar("gaits", len(gaits)) as advance:
-            simulated = simulate_records(folder, gaits, drive, advance)
-    except KeyboardInterrupt:
-        end_interrupted(
-            f"interrupted while simulating; finished simulations are stored; continue with `nlp-gait report --engine {folder}`"
-        )
+    remedy = f"continue with `nlp-gait report --engine {folder}`"
+    with (
+        interruptible(f"interrupted while simulating; finished simulations are stored; {remedy}"),
+        progress_bar("gaits", len(gaits)) as advance,
+    ):
+        simulated = simulate_records(folder, gaits, drive, advance)
     if gaits and not simulated:
         names = ", ".join(dict.fromkeys(record.problem for record in gaits))
         raise InputError(f"no gait of {names} can be simulated in the engine; omit --engine")

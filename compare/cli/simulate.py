@@ -13,9 +13,10 @@ import numpy as np
 
 from compare.analysis.units import millimetres, with_unit
 from compare.cli.command import command
-from compare.cli.common import end_interrupted, fail, print_json, print_table, print_written, progress_bar, stdout
+from compare.cli.endings import fail, interruptible
 from compare.cli.options import StoredGait, parse_number
 from compare.cli.outputs import output_file
+from compare.cli.printing import print_json, print_table, print_written, progress_bar, stdout
 from nlp_gait.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -194,12 +195,10 @@ def simulate(
         write_npz(folder / "simulation.npz", traces[0].signals(plan.joints))
         written += plot_simulation(plan, traces[0], drive, folder / "simulation")
     if robustness:
-        try:
+        lost = "nothing was written; name a folder with --out"
+        where = lost if folder is None else f"the simulation is stored in {folder}"
+        with interruptible(f"interrupted in the tests of robustness; {where}"):
             survival = sweep(plan, drive)
-        except KeyboardInterrupt:
-            lost = "nothing was written; name a folder with --out"
-            where = lost if folder is None else f"the simulation is stored in {folder}"
-            end_interrupted(f"interrupted in the tests of robustness; {where}")
         data["robustness"] = asdict(survival)
         if folder is not None:
             write_json(folder / "report.json", replace_nan(data))

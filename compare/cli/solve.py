@@ -9,21 +9,11 @@ from typing import TYPE_CHECKING, Any
 from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
 from compare.cli.command import command
-from compare.cli.common import (
-    end_interrupted,
-    fail,
-    print_json,
-    print_rows,
-    print_table,
-    print_written,
-    progress_bar,
-    say,
-    stdout,
-    until_interrupted,
-)
 from compare.cli.compare import print_summaries
+from compare.cli.endings import end_interrupted, fail, until_interrupted
 from compare.cli.options import NamedProblem, SearchOptions, parse_names, parse_number, parse_values, parse_x
 from compare.cli.outputs import output_file
+from compare.cli.printing import print_json, print_rows, print_table, print_written, progress_bar, say, stdout
 from compare.study.settings import SolverSpec
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.formulation.solution import Solution

@@ -13,8 +13,8 @@ import pytest
 from rich.console import Console
 
 from compare.analysis.comparison import compare_problems
-from compare.cli import common
-from compare.cli.common import PlainConsole, escape_controls
+from compare.cli import endings, printing
+from compare.cli.printing import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, new_figure, render_svg, style
 from compare.report.document import Figure, iterate_leaves
 from compare.report.study_report import make_study_document
@@ -135,11 +135,11 @@ def test_the_terminal_shows_control_characters_and_markup(text: str, shown: str)
 def test_tables_and_errors_show_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
     out = io.StringIO()
     console: Console = PlainConsole(file=out, markup=False, highlight=False, width=200)
-    monkeypatch.setattr(common, "stdout", console)
-    monkeypatch.setattr(common, "stderr", console)
-    common.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
-    with pytest.raises(common.typer.Exit):
-        common.fail("no file 'a\x1b[31m\nb'")
+    monkeypatch.setattr(printing, "stdout", console)
+    monkeypatch.setattr(endings, "stderr", console)
+    printing.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
+    with pytest.raises(endings.typer.Exit):
+        endings.fail("no file 'a\x1b[31m\nb'")
     text = out.getvalue()
     assert "\x1b" not in text and "\x07" not in text
     for part in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"):
@@ -150,8 +150,8 @@ def test_tables_and_errors_show_them_too(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_progress_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     """A row's name, ``torque_change[LKneePitch, 3]``, would be taken for markup and vanish; ``[/]`` would be an error."""
     out = io.StringIO()
-    monkeypatch.setattr(common, "stderr", PlainConsole(file=out, force_terminal=True, width=200))
-    with common.progress_bar("[/] runs\x1b[2J", 2) as advance:
+    monkeypatch.setattr(printing, "stderr", PlainConsole(file=out, force_terminal=True, width=200))
+    with printing.progress_bar("[/] runs\x1b[2J", 2) as advance:
         advance("torque_change[LKneePitch, 3] [/]\x1b[2J")
     assert "[/] runs" in out.getvalue() and "\x1b[2J" not in out.getvalue()
     assert "torque_change[LKneePitch, 3]" in out.getvalue()

@@ -4,8 +4,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from compare.cli.command import command
-from compare.cli.common import print_json, progress_bar, stdout
 from compare.cli.options import AnyCycle, AnyProblem, NamedProblem, NaoPhase, name_all, parse_names
+from compare.cli.printing import print_json, progress_bar, stdout
 from compare.cli.questions.output import Output
 from compare.cli.simulate import DriveOptions
 from nlp_gait.errors import InputError

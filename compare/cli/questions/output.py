@@ -7,18 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from compare.cli.common import (
-    describe_command,
-    describe_stored,
-    end_interrupted,
-    fail,
-    print_result,
-    print_table,
-    progress_bar,
-    say,
-    stdout,
-)
+from compare.cli.endings import describe_stored, end_interrupted, fail
 from compare.cli.options import RESULTS
+from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stdout
 from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted, defer_interrupts
 

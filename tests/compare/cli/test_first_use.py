@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 import nlp_gait
-from compare.cli import PANELS, app, common
-from compare.cli.common import PlainConsole, print_table
+from compare.cli import PANELS, app, printing
 from compare.cli.compare import HOW_TO_READ, READ_FIRST
+from compare.cli.printing import PlainConsole, print_table
 from tests.compare.cli.calls import as_json, one_sentence
 
 ROOT = Path(__file__).parents[3]
@@ -32,7 +32,7 @@ ROWS = [
 
 
 def printed(monkeypatch, capsys, width):
-    monkeypatch.setattr(common, "stdout", PlainConsole(highlight=False, markup=False, width=width))
+    monkeypatch.setattr(printing, "stdout", PlainConsole(highlight=False, markup=False, width=width))
     print_table("Solvers", HEADER, ROWS)
     return capsys.readouterr().out
 
@@ -42,12 +42,12 @@ def test_no_table_is_wider_than_the_terminal_and_none_loses_a_cell(monkeypatch, 
     text = printed(monkeypatch, capsys, width)
     assert max(map(len, text.splitlines())) <= width
     for row in ROWS:
-        assert all(" ".join(cell.split()) in text for cell in row if len(cell) <= common.LONGEST_CELL)
+        assert all(" ".join(cell.split()) in text for cell in row if len(cell) <= printing.LONGEST_CELL)
     assert text.count("continued") == (0 if width >= 80 else 1)
 
 
 def test_the_first_columns_of_a_study_fit_eighty_columns_with_names_of_sixteen_letters(monkeypatch, capsys):
-    monkeypatch.setattr(common, "stdout", PlainConsole(highlight=False, markup=False, width=80))
+    monkeypatch.setattr(printing, "stdout", PlainConsole(highlight=False, markup=False, width=80))
     row = ("genetic-algorit1", "31/31", "125.4978 %", "123.907415 W/s", "10 000", "12.345 s")
     print_table("Solvers", READ_FIRST, [row])
     text = capsys.readouterr().out
@@ -91,9 +91,9 @@ def test_a_problem_by_name_a_solution_in_one_line_and_its_x_wherever_one_is_take
 
 
 def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):
-    monkeypatch.setattr(common, "LOG_PERIOD_S", 0.0)
-    monkeypatch.setattr(common, "stderr", PlainConsole(stderr=True, highlight=False, markup=False))
-    with common.progress_bar("starts", 2) as advance:
+    monkeypatch.setattr(printing, "LOG_PERIOD_S", 0.0)
+    monkeypatch.setattr(printing, "stderr", PlainConsole(stderr=True, highlight=False, markup=False))
+    with printing.progress_bar("starts", 2) as advance:
         advance("0.53 W")
         advance("0.54 W")
     assert re.fullmatch(

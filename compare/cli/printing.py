@@ -1,4 +1,4 @@
-"""Output of commands: tables, results, progress, errors, interruptions."""
+"""Output of commands: tables, results, written files, progress."""
 
 import json
 import shlex
@@ -8,9 +8,8 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar, cast
+from typing import Any, Literal, TypeVar
 
-import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -18,15 +17,11 @@ from rich.table import Table
 from rich.text import Text
 
 from nlp_gait.files import replace_nan
-from nlp_gait.interrupts import Interrupted
 
 T = TypeVar("T")
 
-# Characters of an error message, in which a value can be a whole file.
-LONGEST_SENTENCE = 2000
 STACKED_WIDTH = 60  # of terminals on which tables are stacked: a block of lines per row
 LONGEST_CELL = 24  # characters of a cell on one line
-MOST_EXCLUDED = 20  # records named on a terminal
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
 GAP = 2  # characters between two columns of a table
 
@@ -53,34 +48,6 @@ def escape_controls(text: str) -> str:
 
 stderr = PlainConsole(stderr=True, highlight=False, markup=False)
 stdout = PlainConsole(highlight=False, markup=False)  # 80 columns without a terminal
-
-
-def end_interrupted(sentence: str) -> NoReturn:
-    """End with status 130 and one sentence about the stored results."""
-    fail(sentence, status=130)
-
-
-def fail(message: str, status: int = 1) -> NoReturn:
-    """End with a status and one sentence."""
-    say_error(message)
-    raise typer.Exit(status)
-
-
-def end_if_excluded(excluded: Sequence[str]) -> None:
-    """Report sentences about records that are no evidence on stderr, and end with status 1 if there are any."""
-    for sentence in excluded[:MOST_EXCLUDED]:
-        say_error(f"excluded {sentence}")
-    if excluded:
-        more = f" ({len(excluded) - MOST_EXCLUDED} more are in the report)" if len(excluded) > MOST_EXCLUDED else ""
-        count = f"{len(excluded)} record{'s were' if len(excluded) > 1 else ' was'} excluded{more}"
-        fail(f"{count}; delete what is named, and rerun the study to compute it again")
-
-
-def say_error(message: str) -> None:
-    """Print the sentence of an error on stderr."""
-    text = " ".join(message.split())
-    text = text if len(text) <= LONGEST_SENTENCE else f"{text[:LONGEST_SENTENCE]} ..."
-    stderr.print(f"nlp-gait: {text}", soft_wrap=True)
 
 
 def say(sentence: str) -> None:
@@ -205,33 +172,3 @@ class _ProgressLog:
             stderr.print(
                 f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {note}", soft_wrap=True
             )
-
-
-def until_interrupted(work: Callable[[], T], nothing: str = "nothing was written") -> tuple[T, str]:
-    """Return what some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
-
-    ``Interrupted`` carries the part that was found; if it is empty, the command ends with the sentence and ``nothing``.
-    """
-    try:
-        return work(), ""
-    except Interrupted as interrupt:
-        if not interrupt.partial:
-            end_interrupted("; ".join(filter(None, (interrupt.sentence, nothing))))
-        return cast(T, interrupt.partial), interrupt.sentence
-    except KeyboardInterrupt:
-        end_interrupted(f"interrupted before there was a result; {nothing or 'nothing was written'}")
-
-
-def describe_stored(folder: Path) -> str:
-    """Return how many results are stored in a folder, and how to continue."""
-    finished = sum(1 for files in ("store/**/*.json", "records/*/*.json") for _ in folder.glob(files))
-    return f"{finished} finished results are stored in {folder}; rerun the command to continue"
-
-
-@contextmanager
-def interruptible(folder: Path | None = None) -> Iterator[None]:
-    """For a command that has no result before its end, or that continues from the results that are stored in a folder."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        end_interrupted(f"interrupted; {'nothing was written' if folder is None else describe_stored(folder)}")
