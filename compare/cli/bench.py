@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import command
-from compare.cli.compare import tune_first
-from compare.cli.endings import end_interrupted, fail, interruptible, until_interrupted
+from compare.cli.compare import run_in_folder
+from compare.cli.endings import fail, interruptible
 from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import output_file
@@ -63,8 +63,7 @@ def bench(
     from compare.bench.submission import SUFFIX, pack_submission, verify_submission
     from compare.report.writing import add_session, write_document
     from compare.study.record import RunRecord
-    from compare.study.run_study import Study, check_study, run_study
-    from compare.study.settings import Session, SolverSpec, write_manifest
+    from compare.study.settings import SolverSpec
     from nlp_gait.backends.kernel.compiled import available_cores
 
     if submit is not None or verify is not None:
@@ -99,21 +98,10 @@ def bench(
     if solvers:
         specs = [SolverSpec(name=solver, label=own) for solver, own in solvers.items()]
         settings = make_bench_study(chosen, *specs, runs=runs, evaluations=evaluations)
-        study = Study(tasks=settings.tasks(), folder=out, jobs=jobs or available_cores(), scheduler=scheduler)
-        name = study.tasks[-1].title if algorithm is not None else None
+        name = settings.tasks()[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
-        check_study(study)
-        if tune:
-            settings = tune_first(study, settings, tune)
-            study = replace(study, tasks=settings.tasks())
-        write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
-        with progress_bar(f"{name or 'all'} runs", len(study.tasks)) as advance:
-            records, stopped = until_interrupted(
-                lambda: run_study(study, progress=lambda task, _: advance(task.problem.title)), nothing=""
-            )
-        if stopped:
-            end_interrupted(f"{stopped}; finished runs are stored in {out}; rerun the command to continue")
+        records = run_in_folder(settings, out, jobs, scheduler, tune, "rerun the command to continue")
     board = rank_solvers(chosen, records, shipped=shipped)
     suite_name = "chosen instances" if instances or families else f"suite {suite}"
     page = add_session(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from compare.cli.command import command
-from compare.cli.endings import end_if_excluded, end_interrupted, fail, say_error
+from compare.cli.endings import end_if_excluded, end_interrupted, fail, interruptible, say_error
 from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stderr, stdout
 from compare.cli.report import plain_simulations, print_simulations, simulate_best
@@ -25,7 +25,6 @@ from nlp_gait.interrupts import Interrupted
 
 if TYPE_CHECKING:
     from compare.study.record import RunRecord
-    from compare.study.run_study import Study
     from compare.study.settings import StudySettings
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
@@ -75,9 +74,7 @@ def compare(
     """
     from compare.report import FurtherFiles, write_report
     from compare.study.import_runs import read_imported_records
-    from compare.study.run_study import Study, check_study, run_study
-    from compare.study.settings import Session, read_manifest, write_manifest
-    from nlp_gait.backends.kernel.compiled import available_cores
+    from compare.study.settings import read_manifest
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import load_mujoco
 
@@ -97,30 +94,12 @@ def compare(
         specs = [options.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = choose_solvers(algorithms, starts, searches)
         settings = searches.make_study(specs, solvers, max(starts, 1))
-    study = Study(
-        tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
-    )
-    check_study(study)  # before the manifest names it
-    if tune:
-        settings = tune_first(study, settings, tune)
-        study = replace(study, tasks=settings.tasks())
-    if engine and not any(task.problem.load().display.simulation_model for task in study.tasks):
+    if engine and not any(problem.load().display.simulation_model for problem in settings.problems):
         raise InputError(f"no gait of {', '.join(p.title for p in settings.problems)} can be simulated; omit --engine")
-    write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
     if stderr.is_terminal:
         say(f"watch it: nlp-gait report {out} --watch")
-    with progress_bar("runs", len(study.tasks)) as advance:
-        try:
-            records = run_study(
-                study,
-                progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
-                on_stored=lambda count: _advance_by(advance, count),
-                on_outdated=say,
-            )
-        except Interrupted as interrupt:
-            end_interrupted(
-                f"{interrupt.sentence}; finished runs are kept in {out}; continue with `nlp-gait compare --resume --out {out}`"
-            )
+    remedy = f"continue with `nlp-gait compare --resume --out {out}`"
+    records = run_in_folder(settings, out, jobs, scheduler, tune, remedy)
     imported = read_imported_records(out, records)
     records += imported.records
     gaits = simulate_best(out, records, Drive()) if engine else []
@@ -138,17 +117,38 @@ def compare(
     end_if_none_left(records)
 
 
-def tune_first(study: Study, settings: StudySettings, trials: int) -> StudySettings:
-    """Return the settings of a study with tuned solvers beside those that can be tuned, and store how they were tuned."""
-    from compare.analysis.tuning import tune_solvers, write_tunings
+def run_in_folder(
+    settings: StudySettings, out: Path, jobs: int | None, scheduler: str | None, tune: int, remedy: str
+) -> list[RunRecord]:
+    """Run a study in a folder, each search also tuned by so many trials, and return all records, also of earlier commands.
 
-    try:
-        settings, tunings = tune_solvers(study, settings, trials, say)
-    except Interrupted:
-        end_interrupted("interrupted while tuning; finished runs are stored; rerun the command to continue")
-    if study.folder is not None:
-        write_tunings(study.folder, tunings)
-    return settings
+    The remedy says how to continue, in the sentence with which Ctrl-C ends the command.
+    """
+    from compare.analysis.tuning import tune_solvers, write_tunings
+    from compare.study.run_study import Study, check_study, run_study
+    from compare.study.settings import Session, write_manifest
+    from nlp_gait.backends.kernel.compiled import available_cores
+
+    study = Study(
+        tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
+    )
+    check_study(study)  # before the manifest names it
+    if tune:
+        with interruptible("interrupted while tuning; finished runs are stored; rerun the command to continue"):
+            settings, tunings = tune_solvers(study, settings, tune, say)
+        write_tunings(out, tunings)
+        study = replace(study, tasks=settings.tasks())
+    write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
+    with progress_bar("runs", len(study.tasks)) as advance:
+        try:
+            return run_study(
+                study,
+                progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
+                on_stored=lambda count: _advance_by(advance, count),
+                on_outdated=say,
+            )
+        except Interrupted as interrupt:
+            end_interrupted(f"{interrupt.sentence}; finished runs are stored in {out}; {remedy}")
 
 
 def end_if_none_left(records: Sequence[RunRecord]) -> None:
