@@ -15,7 +15,7 @@ from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS
 from compare.bench.leaderboard import Leaderboard, filter_instances
 from compare.drawing.comparison_figures import plot_suite_ecdf
-from compare.report.document import Document, Figure, Section, Table, text_table
+from compare.report.document import Document, Figure, Section, Table, list_section, text_table
 from compare.report.provenance import TERMS
 from compare.report.solver_sections import make_anytime_section, make_tuning_section
 from compare.study.task import GRADIENT_SOLVERS
@@ -35,6 +35,8 @@ def make_leaderboard_page(
 ) -> Document:
     """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
     count_of = len(board.comparisons)
+    runs = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
+    targets = ", ".join(f"{100 * target:g} %" for target in TARGETS)
     title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
     return Document(
         title=title if solver is None else f"{solver} on {title}",
@@ -50,28 +52,21 @@ def make_leaderboard_page(
             ),
             *make_leads(board),
             *((make_anytime_section(board.comparisons),) if count_of > 1 else ()),
-            *(() if solver is None else (_make_scores(board, solver),)),
+            *(() if solver is None else _make_scores(board, solver)),
             *make_tuning_section(tunings),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
                 title="How it was measured",
                 parts=(
-                    f"Every solver makes {_describe_runs(board)} runs on each instance, with {evaluations} evaluations each, run "
-                    "k with the seed k; "
-                    "IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within the same budget and both within "
-                    "60 s. What counts is the exact functions' verdict. The mean rank is "
-                    "that of the expected running time over all instances and the targets "
-                    + ", ".join(f"{100 * target:g} %" for target in TARGETS)
-                    + " above the best known; equals share a rank, and pairs that no solver reached are left out.",
+                    f"Every solver makes {' or '.join(map(str, runs))} runs on each instance, with {evaluations} evaluations "
+                    "each, run k with the seed k; IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within "
+                    "the same budget and both within 60 s. What counts is the exact functions' verdict. The mean rank is that of "
+                    f"the expected running time over all instances and the targets {targets} above the best known; equals share "
+                    "a rank, and pairs that no solver reached are left out.",
                 ),
             ),
         ),
     )
-
-
-def _describe_runs(board: Leaderboard) -> str:
-    counts = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
-    return " or ".join(map(str, counts))
 
 
 def make_leads(board: Leaderboard) -> tuple[Section, ...]:
@@ -156,19 +151,18 @@ def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]
     return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), count(costs[solver]), place)
 
 
-def _make_scores(board: Leaderboard, solver: str) -> Section:
+def _make_scores(board: Leaderboard, solver: str) -> tuple[Section, ...]:
     rows = [
         (s.other, str(s.wins), str(s.losses), str(s.ties), f"{s.mean_a12:.3f}", f"{s.signed_rank:.2g}")
         for s in sorted(count_wins(board.comparisons, solver), key=lambda score: board.place(score.other))
     ]
     header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
-    return Section(
-        title=f"{solver} against each of the others",
-        parts=(
-            "Instances on which the rank-sum test of the final objectives finds a difference at 5 %, Holm-corrected over all "
-            "pairs of solvers on the instance; differences within the judge's tolerance are ties. A12 is the probability that a "
-            "run of this solver ends better. The "
-            "signed-rank test compares the median gaps of all instances, Holm-corrected over the solvers.",
-            text_table(header, rows),
-        ),
+    return list_section(
+        f"{solver} against each of the others",
+        header,
+        rows,
+        "Instances on which the rank-sum test of the final objectives finds a difference at 5 %, Holm-corrected over all pairs "
+        "of solvers on the instance; differences within the judge's tolerance are ties. A12 is the probability that a run of "
+        "this solver ends better. The signed-rank test compares the median gaps of all instances, Holm-corrected over the "
+        "solvers.",
     )

@@ -102,6 +102,13 @@ def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: st
     return Table(columns=dict.fromkeys(header, ""), rows=rows, caption=caption, prose=prose)
 
 
+def list_section(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *words: str, prose: bool = False
+) -> tuple[Section, ...]:
+    """Return a section of sentences and a table of texts; none without rows."""
+    return (Section(title=title, parts=(*words, text_table(header, rows, prose=prose))),) if rows else ()
+
+
 def iterate_leaves(parts: Sequence[Part]) -> Iterator[str | Prose | Table | Figure]:
     """Yield all parts except sections, in the order of the page."""
     for part in parts:

@@ -12,7 +12,7 @@ from compare.analysis.units import BY_UNIT, heading, seconds
 from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
-from compare.report.document import Figure, Part, Prose, Section, text_table
+from compare.report.document import Figure, Part, Prose, Section, list_section, text_table
 from compare.report.interactive import describe_gaits, describe_runs
 from compare.study.record import RunRecord, load_gait
 from compare.study.simulations import SimulatedGait
@@ -28,9 +28,8 @@ HOW = Prose(
 CAPTION = (
     "Best gait of each solver, left blue, right orange. In the drawing the best of all, six poses at equidistant times, later "
     "ones darker, and the others beside it. The deviation is the largest distance of a joint from its place in the best gait "
-    "after the same share of "
-    "the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin is the distance of the "
-    "zero-moment point from the nearest edge of the support polygon, negative outside of it."
+    "after the same share of the time. Mechanical power is the sum of |torque x rate| over the joints. The balance margin is the "
+    "distance of the zero-moment point from the nearest edge of the support polygon, negative outside of it."
 )
 
 
@@ -61,14 +60,7 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
         ),
     )
     gaits = make_gaits_part(comparison)
-    where_needed = (
-        engine_section(simulated),
-        _tests(comparison),
-        _binding(comparison),
-        _published_section(comparison),
-        _failures(comparison),
-        _between(comparison),
-    )
+    published = make_published_rows(comparison)
     return Section(
         title=f"{comparison.problem}: {heading(objective.name, objective.unit)}, to {objective.sense}",
         parts=(
@@ -79,7 +71,12 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
             *(() if gaits is None else (gaits,)),
             *figures,
             _costs(comparison, summaries),
-            *(section for section in where_needed if section is not None),
+            *engine_section(simulated),
+            *_tests(comparison),
+            *_binding(comparison),
+            *(() if published is None else list_section("The paper's values and ours", *published)),
+            *_failures(comparison),
+            *_between(comparison),
         ),
     )
 
@@ -137,10 +134,7 @@ def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
     return [f"{value:.1f}" if value % 1 else f"{value:.0f}" for value in (*means, failed)]
 
 
-def _tests(comparison: Comparison) -> Section | None:
-    pairs = compare_pairs(comparison)
-    if not pairs:
-        return None
+def _tests(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
         (
             f"{pair.first} < {pair.second}",
@@ -149,20 +143,19 @@ def _tests(comparison: Comparison) -> Section | None:
             str(pair.paired_runs),
             f"{pair.a12:.3f}",
         )
-        for pair in pairs
+        for pair in compare_pairs(comparison)
     ]
-    return Section(
-        title="Significance of differences",
-        parts=(
-            "Two-sided p-values on the final objectives, Holm-corrected over all pairs: rank-sum over all runs, signed-rank over "
-            "runs with equal starting points. A12 is the probability that a run of the first solver ends better (0.5: no "
-            "difference; above 0.71: large).",
-            text_table(("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12"), rows),
-        ),
+    return list_section(
+        "Significance of differences",
+        ("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12"),
+        rows,
+        "Two-sided p-values on the final objectives, Holm-corrected over all pairs: rank-sum over all runs, signed-rank over "
+        "runs with equal starting points. A12 is the probability that a run of the first solver ends better (0.5: no "
+        "difference; above 0.71: large).",
     )
 
 
-def _binding(comparison: Comparison) -> Section | None:
+def _binding(comparison: Comparison) -> tuple[Section, ...]:
     priced = [
         (cost, record)
         for solver in comparison.solvers
@@ -170,7 +163,7 @@ def _binding(comparison: Comparison) -> Section | None:
         if record.active_constraints and record.verdict.feasible
     ]
     if not priced:
-        return None
+        return ()
     record = min(priced, key=lambda item: item[0])[1]
     rows = [
         (
@@ -184,13 +177,12 @@ def _binding(comparison: Comparison) -> Section | None:
     ]
     left_out = len(record.active_constraints) - len(rows)
     note = f" {left_out} lower ones are omitted." if left_out else ""
-    return Section(
-        title="Active constraints at the optimum",
-        parts=(
-            f"At the best optimum of {record.solver} (run {record.run}). The price is the change of the optimal "
-            f"{comparison.objective.name} per unit by which the bound is raised, highest first.{note}",
-            text_table(("constraint", "side", "at", "price", "for a step"), rows),
-        ),
+    return list_section(
+        "Active constraints at the optimum",
+        ("constraint", "side", "at", "price", "for a step"),
+        rows,
+        f"At the best optimum of {record.solver} (run {record.run}). The price is the change of the optimal "
+        f"{comparison.objective.name} per unit by which the bound is raised, highest first.{note}",
     )
 
 
@@ -202,35 +194,24 @@ def _for_one_step(active: ActiveConstraint, unit: str) -> str:
     return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
 
 
-def _published_section(comparison: Comparison) -> Section | None:
-    found = make_published_rows(comparison)
-    if found is None:
-        return None
-    header, rows, note = found
-    return Section(title="The paper's values and ours", parts=(note, text_table(header, rows)))
+def _failures(comparison: Comparison) -> tuple[Section, ...]:
+    rows = [
+        (r.solver, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-")
+        for r in comparison.records
+        if not r.verdict.feasible
+    ]
+    header = ("solver", "run", "seed", "status", "violated, worst first")
+    return list_section("Runs that ended infeasible or failed", header, rows, prose=True)
 
 
-def _failures(comparison: Comparison) -> Section | None:
-    failed = [r for r in comparison.records if not r.verdict.feasible]
-    if not failed:
-        return None
-    rows = [(r.solver, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-") for r in failed]
-    table = text_table(("solver", "run", "seed", "status", "violated, worst first"), rows, prose=True)
-    return Section(title="Runs that ended infeasible or failed", parts=(table,))
-
-
-def _between(comparison: Comparison) -> Section | None:
+def _between(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
         (r.solver, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _proven(r))
         for r in comparison.records
         if r.verdict.feasible and (r.verdict.dense_feasible is False or _proven(r) != "-")
     ]
-    if not rows:
-        return None
-    table = text_table(
-        ("solver", "run", "violated on a dense grid, worst first", "proven at all times"), rows, prose=True
-    )
-    return Section(title="Feasible at the samples, not at all times", parts=(table,))
+    header = ("solver", "run", "violated on a dense grid, worst first", "proven at all times")
+    return list_section("Feasible at the samples, not at all times", header, rows, prose=True)
 
 
 def _proven(record: RunRecord) -> str:
@@ -247,10 +228,10 @@ def _seconds(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "-"
 
 
-def engine_section(simulated: Sequence[SimulatedGait]) -> Section | None:
-    """Return the section on every solver's best gait in the engine, for each drive; None without simulations."""
+def engine_section(simulated: Sequence[SimulatedGait]) -> tuple[Section, ...]:
+    """Return the section on every solver's best gait in the engine, for each drive; none without simulations."""
     if not simulated:
-        return None
+        return ()
     parts: list[Part] = []
     for drive in dict.fromkeys(gait.drive for gait in simulated):
         alike = [gait for gait in simulated if gait.drive == drive]
@@ -262,15 +243,12 @@ def engine_section(simulated: Sequence[SimulatedGait]) -> Section | None:
         if steps is None
         else f"energy for each planned metre over {steps} steps, every second one mirrored"
     )
-    return Section(
-        title="In the physics engine",
-        parts=(
-            f"Every solver's best gait, simulated open loop in MuJoCo. Model and engine: {figure}, mechanical and heat. The "
-            "model's value and rank refer to the planned motion on a dense grid. Ranks use the printed digits; a gait "
-            "that falls has none. For a cycle that does not fall, the walked share of the planned distance is given.",
-            *parts,
-        ),
+    introduction = (
+        f"Every solver's best gait, simulated open loop in MuJoCo. Model and engine: {figure}, mechanical and heat. The "
+        "model's value and rank refer to the planned motion on a dense grid. Ranks use the printed digits; a gait "
+        "that falls has none. For a cycle that does not fall, the walked share of the planned distance is given."
     )
+    return (Section(title="In the physics engine", parts=(introduction, *parts)),)
 
 
 def make_gaits_part(comparison: Comparison) -> Figure | str | None:

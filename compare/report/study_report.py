@@ -22,7 +22,7 @@ from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import Tuning, read_tunings
 from compare.analysis.verdict import find_leaders, write_verdict
 from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
-from compare.report.document import Document, Figure, Part, Section, Table, text_table
+from compare.report.document import Document, Figure, Part, Section, Table, list_section, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.solver_sections import make_anytime_section, make_tuning_section
@@ -140,6 +140,7 @@ def make_study_document(
 ) -> Document:
     """Return the document of a study, of its best gaits simulated in the engine, of excluded records, and of tuned searches."""
     sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
+    sessions = [make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)]
     ranking = rank_over_problems(comparisons) if len(comparisons) > 1 else None
     return Document(
         title="Comparison of solvers on " + ", ".join(c.problem for c in comparisons),
@@ -151,55 +152,35 @@ def make_study_document(
             *make_tuning_section(tunings),
             *sections,
             *(() if simulated else (HOW,)),
-            _make_method_section(comparisons, manifest),
+            Section(title="Methods", parts=(*_describe_counting(comparisons), _list_settings(comparisons), *sessions)),
             make_citation_section(c.records[0].definition["problem"] for c in comparisons),
         ),
     )
 
 
 def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
-    if not excluded:
-        return ()
     rows = [(exclusion.name, "; ".join(exclusion.reasons)) for exclusion in excluded]
-    return (
-        Section(
-            title="Excluded records",
-            parts=(
-                "All numbers of records are evaluated again. These records are no evidence, and nothing below contains them.",
-                text_table(("record", "reason"), rows, prose=True),
-            ),
-        ),
+    words = (
+        "All numbers of records are evaluated again. These records are no evidence, and nothing below contains them."
     )
+    return list_section("Excluded records", ("record", "reason"), rows, words, prose=True)
 
 
-def _make_method_section(comparisons: Sequence[Comparison], manifest: Manifest) -> Section:
-    """Return everything needed to reproduce or question the study."""
-    return Section(
-        title="Methods",
-        parts=(
-            _describe_counting(comparisons),
-            _list_settings(comparisons),
-            *(make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)),
-        ),
-    )
-
-
-def _describe_counting(comparisons: Sequence[Comparison]) -> Section:
+def _describe_counting(comparisons: Sequence[Comparison]) -> tuple[Section, ...]:
     sizes = [max((len(r.x) for r in c.records), default=0) for c in comparisons]
     rows = [
         (c.problem, *(f"{w:g}" for w in c.weighting.of_kind(n).values()))
         for c, n in zip(comparisons, sizes, strict=True)
     ]
-    return Section(
-        title="Counting",
-        parts=(
-            "Objective and constraints count separately where they are called separately, so gradient methods are never "
-            "favoured. A gradient run reaches its targets at its end. A polished run includes the cost of its search. Times are "
-            "wall times of the solve, without building or compiling.",
-            "Searches with equal seeds start from the same points; run k has the study's seed plus k. The table of settings says "
-            "what was changed; the defaults are those of the sources, and none was tuned on these problems.",
-            text_table(("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"), rows),
-        ),
+    return list_section(
+        "Counting",
+        ("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"),
+        rows,
+        "Objective and constraints count separately where they are called separately, so gradient methods are never favoured. A "
+        "gradient run reaches its targets at its end. A polished run includes the cost of its search. Times are wall times of "
+        "the solve, without building or compiling.",
+        "Searches with equal seeds start from the same points; run k has the study's seed plus k. The table of settings says "
+        "what was changed; the defaults are those of the sources, and none was tuned on these problems.",
     )
 
 
