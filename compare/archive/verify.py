@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import read_tunings
-from compare.archive.rerun import compare_runs, make_task
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import markdown_page
+from compare.study.definition import describe_differences, hash_definition
 from compare.study.evidence import name_record, read_evidence
 from compare.study.record import RunRecord, hash_installed_code, load_problem
+from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.simulations import load_simulations
+from compare.study.task import Handling, ProblemSpec, Stop, Task
 from nlp_gait.backends.identity import FILES, SOURCE
+from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
-from nlp_gait.files import make_temporary_folder
+from nlp_gait.files import make_temporary_folder, read_text
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.certificate import check_certificate, load_certificates, read_certificate
-from nlp_gait.user_code import hash_file, parse_reference
+from nlp_gait.user_code import hash_file, parse_reference, resolve_code
 
 REPORT = "report.md"
+# What a repeated run must have in common with its record: everything but the times.
+REPEATED = ("status", "x", "evaluations", "history", "failed_evaluations", "iterations", "claimed_objective", "verdict")
 
 
 class Finding(NamedTuple):
@@ -66,7 +73,7 @@ def verify_archive(
         if found.records:
             findings += _check_code_files(folder, found.records)
         if found.records and has_report:
-            findings.append(_check_report(folder, found.records))
+            findings.append(_judge(REPORT, lambda: _check_report(folder, found.records)))
         return Verification(findings, found.records)
 
 
@@ -99,21 +106,27 @@ def verify_folder(
         f"{len(excluded)} of {count} are no evidence: {wrong}" if excluded else f"all {count} follow from their points"
     )
     findings = [Finding("records", not excluded, detail + ", also between the samples" * (not excluded))]
-    try:
-        findings.append(_check_sessions(records, read_manifest(folder)))
-    except InputError as error:
-        findings.append(Finding(FILE, False, str(error)))
-    findings += [_check_certificate(path) for path in sorted((folder / "certificates").glob("*.json"))]
+    findings.append(_judge(FILE, lambda: _check_sessions(records, read_manifest(folder))))
+    for path in sorted((folder / "certificates").glob("*.json")):
+        findings.append(_judge(f"certificates/{path.name}", partial(_check_certificate, path)))
     if share > 0.0:
         findings += _repeat_runs(records, share, places, progress)
     return Verification(findings, records)
 
 
-def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> Finding:
+def _judge(what: str, check: Callable[[], str]) -> Finding:
+    """Return the finding of a check, which returns what holds, and raises what does not."""
+    try:
+        return Finding(what, True, check())
+    except GaitError as error:
+        return Finding(what, False, str(error))
+
+
+def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> str:
     """Compare the code and machines of records with the sessions of the manifest that computed them."""
     own = [(record, record.origin) for record in records if record.origin is not None]
     if own and not manifest.sessions:
-        return Finding(FILE, False, "no session is recorded")
+        raise InputError("no session is recorded")
     codes = {session.versions.get("code") for session in manifest.sessions}
     machines = {f"{s.machine.get('processor')}, {s.machine.get('system')}" for s in manifest.sessions}
     started = min((session.started for session in manifest.sessions), default="")
@@ -127,23 +140,20 @@ def _check_sessions(records: Sequence[RunRecord], manifest: Manifest) -> Finding
         )
         if not holds
     ]
+    if wrong:
+        raise InputError("; ".join(wrong))
     installed = hash_installed_code()
     other = any(origin.code_sha256 != installed for _, origin in own)
     note = f"; other code is installed here ({installed[:8]}), so runs cannot be repeated" if other else ""
-    detail = "; ".join(wrong) or f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
-    return Finding(FILE, not wrong, detail)
+    return f"runs computed in a recorded session: {len(own)} of {len(own)}{note}"
 
 
-def _check_certificate(path: Path) -> Finding:
+def _check_certificate(path: Path) -> str:
     """Compare an archived certificate with the shipped ones; another one is checked as by ``certainty --check``."""
-    what = f"certificates/{path.name}"
-    try:
-        file = read_certificate(path)
-        shipped = any(file == other for other in load_certificates().values())
-        how = "equal to the shipped one" if shipped else f"{check_certificate(file).paths} paths of its proof followed"
-        return Finding(what, True, f"bound {file.certificate.bound:.9g}, {how}")
-    except GaitError as error:
-        return Finding(what, False, str(error))
+    file = read_certificate(path)
+    shipped = any(file == other for other in load_certificates().values())
+    how = "equal to the shipped one" if shipped else f"{check_certificate(file).paths} paths of its proof followed"
+    return f"bound {file.certificate.bound:.9g}, {how}"
 
 
 def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Finding]:
@@ -159,20 +169,17 @@ def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Findin
     return findings
 
 
-def _check_report(folder: Path, records: Sequence[RunRecord]) -> Finding:
+def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
     """Write the report again, and compare its text."""
-    try:
-        comparisons = compare_problems(label_editions(records))
-        simulated = load_simulations(folder, select_best_gaits(comparisons))
-        document = make_study_document(comparisons, read_manifest(folder), simulated, tunings=read_tunings(folder))
-        again = markdown_page(document).split("\n")
-        known = (folder / REPORT).read_text(encoding="utf-8").split("\n")
-    except (GaitError, OSError, UnicodeError) as error:
-        return Finding(REPORT, False, str(error))
+    comparisons = compare_problems(label_editions(records))
+    simulated = load_simulations(folder, select_best_gaits(comparisons))
+    document = make_study_document(comparisons, read_manifest(folder), simulated, tunings=read_tunings(folder))
+    again = markdown_page(document).split("\n")
+    known = read_text(folder / REPORT, "report").split("\n")
     for number, (a, b) in enumerate(zip_longest(known, again), start=1):
         if a != b:
-            return Finding(REPORT, False, f"line {number} is {a!r:.100}, but the records give {b!r:.100}")
-    return Finding(REPORT, True, "it follows from the records")
+            raise InputError(f"line {number} is {a!r:.100}, but the records give {b!r:.100}")
+    return "it follows from the records"
 
 
 def _repeat_runs(
@@ -183,14 +190,65 @@ def _repeat_runs(
     findings = []
     for record in chosen:
         progress(name_record(record))
-        try:
-            task = make_task(_move_files(record, places), record)
-            difference = compare_runs(record, task, records)
-        except (GaitError, ValueError) as error:
-            difference = f"it cannot be repeated: {error}"
-        detail = difference or f"the same {record.evaluations['f']} evaluations, point and history, to the last bit"
-        findings.append(Finding(f"repeated: {name_record(record)}", not difference, detail))
+        repeat = partial(_repeat_run, record, _move_files(record, places), records)
+        findings.append(_judge(f"repeated: {name_record(record)}", repeat))
     return findings
+
+
+def _repeat_run(record: RunRecord, moved: RunRecord, records: Sequence[RunRecord]) -> str:
+    """Repeat a run, whose files may have moved, from the run that it polishes: the same seed gives the same bits."""
+    try:
+        task, start = _make_task(record, moved.definition), None
+        if task.polishes:
+            key = (record.problem, task.polishes, record.run)
+            start = next((r for r in records if (r.problem, r.solver, r.run) == key), None)
+            if start is None:
+                raise InputError(f"run {record.run} of {task.polishes}, which it polishes, is missing")
+        again = try_task(task, start)
+    except (GaitError, ValueError) as error:
+        raise InputError(f"it cannot be repeated: {error}") from error
+    for what in REPEATED:
+        before, now = (getattr(of, what) for of in (record, again))
+        if before != now and repr(before) != repr(now):  # NaN differs from itself
+            raise InputError(f"its {what.replace('_', ' ')} differs: recorded {before!r:.100}, found {now!r:.100}")
+    return f"the same {record.evaluations['f']} evaluations, point and history, to the last bit"
+
+
+def _make_task(record: RunRecord, definition: Mapping[str, Any]) -> Task:
+    """Return the task of a record by its definition, in which files of the problem may be elsewhere than in the record's.
+
+    Raises:
+        InputError: the run ended by the clock, or its solver was an object in Python.
+        UserCodeError: it needs user code that the command does not name.
+    """
+    solver, stored = definition["solver"], decode(StoredProblem, definition["problem"], "problem")
+    if not isinstance(solver, str):
+        if "name" not in solver:
+            raise InputError("its solver was an object of Python, which has no name")
+        solver = resolve_code(solver["name"], "algorithm", "the run")
+    polishes = definition.get("polishes") or {}
+    stop, handling = ({**polishes, **definition}.get(key) for key in ("stop", "handling"))
+    if (stop or {}).get("time_limit_s") is not None:
+        raise InputError("it ended by the clock or could have")
+    name = resolve_code(stored.name, "problem", "the run")
+    task = Task(
+        problem=ProblemSpec(name=name, options=stored.options, values=stored.parameters, label=record.problem),
+        solver=solver,
+        settings=definition["settings"],
+        handling=decode(Handling, handling) if handling else Handling(),
+        stop=decode(Stop, stop) if stop else Stop(),
+        seed=record.seed - record.run if record.seed >= record.run else record.seed,
+        run=record.run if record.seed >= record.run else 0,
+        label=record.solver,
+        polishes=polishes.get("solver", ""),
+        start=definition.get("start") or {},
+    )
+    own, wanted = task.definition(), dict(record.definition)
+    if polishes:  # its key is of the search, whose record is compared
+        wanted["polishes"] = {key: value for key, value in polishes.items() if key != "key"}
+    if hash_definition(own) != hash_definition(wanted):
+        raise InputError(f"it has another definition here: {describe_differences(wanted, own)}")
+    return task
 
 
 def _move_files(record: RunRecord, places: Mapping[str, str]) -> RunRecord:
