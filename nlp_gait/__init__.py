@@ -73,7 +73,7 @@ FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
 FUNCTIONS["load_generated"] = "nlp_gait.gaitbench.instance:load_generated"
 FUNCTIONS["tabulate_sensitivities"] = "nlp_gait.backends.optima.sensitivities:tabulate_sensitivities"
 FUNCTIONS["plot_gait"] = "compare.drawing.gait_figure:plot_gait"
-FUNCTIONS["animate_gait"] = "compare.report.gait_page:animate_gait"
+FUNCTIONS["animate_gait"] = "compare.report.interactive:animate_gait"
 
 
 def __getattr__(name: str) -> Any:

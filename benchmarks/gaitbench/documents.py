@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.bench.baseline import list_drawn, list_instances
-from compare.bench.leaderboard import rank_solvers
-from compare.bench.page import make_leads
+from compare.bench.leaderboard import make_leads, rank_solvers
 from compare.report.document import Document
 from compare.report.writing import markdown_page
 from nlp_gait import gaitbench

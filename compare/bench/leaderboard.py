@@ -1,21 +1,33 @@
-"""Ranking of the solvers on the suite: by expected running time and by solved targets."""
+"""The leaderboard: ranking of the solvers on the suite, by expected running time and by solved targets, and its page."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compare.analysis.anytime import SHARES, rank_at_budgets
 from compare.analysis.comparison import Comparison, compare_problems, index_solvers
+from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
-from compare.bench.baseline import load_baseline
+from compare.analysis.solver_table import count
+from compare.analysis.tuning import Tuning
+from compare.bench.baseline import EVALUATIONS, load_baseline
+from compare.drawing.comparison_figures import plot_suite_ecdf
+from compare.report.document import Document, Figure, Section, Table, list_section, text_table
+from compare.report.provenance import TERMS
+from compare.report.solver_sections import make_anytime_section, make_tuning_section
 from compare.study.record import RunRecord
+from compare.study.task import GRADIENT_SOLVERS
 from nlp_gait import gaitbench
+from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.generated import is_generated, parse_id
 
 FEW_VARIABLES = 10
+PER_INSTANCE_TARGET = 1e-3
+LEAST_GROUPS = 4  # of instances, for a table of who leads where
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,3 +111,145 @@ def filter_instances(instances: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
         for name in (f"family {family}", f"{size} {FEW_VARIABLES} variables"):
             parts[name] = (*parts.get(name, ()), id)
     return {name: part for name, part in parts.items() if name == "all instances" or len(part) < len(instances)}
+
+
+def make_leaderboard_page(
+    board: Leaderboard,
+    solver: str | None,
+    suite: str,
+    evaluations: int = EVALUATIONS,
+    tunings: Sequence[Tuning] = (),
+) -> Document:
+    """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
+    count_of = len(board.comparisons)
+    runs = sorted({len(solver.records) for comparison in board.comparisons for solver in comparison.solvers})
+    targets = ", ".join(f"{100 * target:g} %" for target in TARGETS)
+    title = f"GaitBench, {suite}: {count_of} instances, {len(board.standings)} solvers"
+    return Document(
+        title=title if solver is None else f"{solver} on {title}",
+        verdict=() if solver is None else make_verdict(board, solver),
+        parts=(
+            TERMS,
+            _make_standings_table(board),
+            Figure(
+                name="gaitbench-runtime",
+                caption="Share of all triples of instance, run and target solved within a number of evaluations per variable; "
+                "31 targets, from 100 % to 1e-4 % above the best known.",
+                drawing=plot_suite_ecdf(board.comparisons),
+            ),
+            *make_leads(board),
+            *((make_anytime_section(board.comparisons),) if count_of > 1 else ()),
+            *(() if solver is None else _make_scores(board, solver)),
+            *make_tuning_section(tunings),
+            Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
+            Section(
+                title="How it was measured",
+                parts=(
+                    f"Every solver makes {' or '.join(map(str, runs))} runs on each instance, with {evaluations} evaluations "
+                    "each, run k with the seed k; IPOPT and SLSQP begin at a random point and end by themselves, SLSQP within "
+                    "the same budget and both within 60 s. What counts is the exact functions' verdict. The mean rank is that of "
+                    f"the expected running time over all instances and the targets {targets} above the best known; equals share "
+                    "a rank, and pairs that no solver reached are left out.",
+                ),
+            ),
+        ),
+    )
+
+
+def make_leads(board: Leaderboard) -> tuple[Section, ...]:
+    """Return who has the best mean rank on each family and size of instances, early and late; none for few instances."""
+    groups = filter_instances([comparison.problem for comparison in board.comparisons])
+    if len(groups) < LEAST_GROUPS:
+        return ()
+    header = ("instances", "number", *(f"after {100 * share:g} %" for share in SHARES))
+    words = "best mean rank by median gap after a share of the budget"
+    tables = []
+    for caption, left_out in ((f"All solvers: {words}", ()), (f"Searches alone: {words}", GRADIENT_SOLVERS)):
+        rows = []
+        for name, ids in groups.items():
+            chosen = [c for c in board.comparisons if c.problem in ids]
+            kept = [replace(c, solvers=tuple(s for s in c.solvers if s.name not in left_out)) for c in chosen]
+            rows.append((name, str(len(ids)), *_find_leads(rank_at_budgets(kept))))
+        tables.append(text_table(header, rows, caption))
+    return (Section(title="Who leads where", parts=tables),)
+
+
+def _find_leads(ranks: Mapping[str, Array]) -> Iterator[str]:
+    """Yield the best solver and its rank at each share of the budget; "none" where all are equal."""
+    for k in range(len(SHARES)):
+        first = min(ranks, key=lambda solver: float(ranks[solver][k]))
+        equal = all(rank[k] == ranks[first][k] for rank in ranks.values())
+        yield "none" if equal else f"{first} ({ranks[first][k]:.1f})"
+
+
+def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
+    """Return the result of a solver in sentences."""
+    place = board.place(solver)
+    standing = board.standings[place - 1]
+    scores = count_wins(board.comparisons, solver)
+    won = sum(score.wins > score.losses for score in scores)
+    lost = sum(score.losses > score.wins for score in scores)
+    return (
+        f"{solver} takes place {place} of {len(board.standings)} by expected running time (mean rank "
+        f"{standing.mean_rank:.2f}) and place {standing.solved_rank} by solved targets ({100 * standing.solved:.1f} %).",
+        f"{100 * standing.feasible:.0f} % of its runs end feasible.",
+        f"It is better than {won} of the other {len(scores)} solvers on more instances than it is worse, and worse than {lost} "
+        "(rank-sum tests at 5 %, Holm-corrected).",
+    )
+
+
+def _make_standings_table(board: Leaderboard) -> Table:
+    rows = [
+        (
+            *(str(place), s.solver, f"{s.mean_rank:.2f}", str(s.solved_rank)),
+            *(f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %"),
+            *(f"{reached}/{len(board.comparisons)}" for reached in s.reached),
+        )
+        for place, s in enumerate(board.standings, start=1)
+    ]
+    targets = (f"to {100 * t:g} %" for t in TARGETS)
+    header = ("place", "solver", "mean rank", "by solved", "solved", "feasible", *targets)
+    return text_table(
+        header, rows, "Mean rank of the expected running time; instances of which each target was reached"
+    )
+
+
+def _make_instances_table(board: Leaderboard, solver: str | None) -> Table:
+    header = ["instance", "variables", "best known", "cheapest solver", "its cost"]
+    if solver is not None:
+        header += ["median gap", "cost", "rank"]
+    rows = [_instance_row(comparison, solver) for comparison in board.comparisons]
+    caption = f"Cost: expected evaluations to {100 * PER_INSTANCE_TARGET:g} % above the best known"
+    return text_table(header, rows, caption)
+
+
+def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]:
+    instance = gaitbench.load(comparison.problem)
+    costs = {s.name: s.expected_cost(PER_INSTANCE_TARGET) for s in comparison.solvers}
+    cheapest = min(costs, key=lambda name: costs[name])
+    known = math.isfinite(costs[cheapest])
+    size, best = str(len(instance.names)), f"{comparison.reference:.6g}"
+    row = (comparison.problem, size, best, cheapest if known else "-", count(costs[cheapest]))
+    if solver is None:
+        return row
+    runs = next(s for s in comparison.solvers if s.name == solver)
+    rank = 1 + sum(cost < costs[solver] for cost in costs.values())
+    place = str(rank) if math.isfinite(costs[solver]) else "-"
+    return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), count(costs[solver]), place)
+
+
+def _make_scores(board: Leaderboard, solver: str) -> tuple[Section, ...]:
+    rows = [
+        (s.other, str(s.wins), str(s.losses), str(s.ties), f"{s.mean_a12:.3f}", f"{s.signed_rank:.2g}")
+        for s in sorted(count_wins(board.comparisons, solver), key=lambda score: board.place(score.other))
+    ]
+    header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
+    return list_section(
+        f"{solver} against each of the others",
+        header,
+        rows,
+        "Instances on which the rank-sum test of the final objectives finds a difference at 5 %, Holm-corrected over all pairs "
+        "of solvers on the instance; differences within the judge's tolerance are ties. A12 is the probability that a run of "
+        "this solver ends better. The signed-rank test compares the median gaps of all instances, Holm-corrected over the "
+        "solvers.",
+    )

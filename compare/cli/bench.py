@@ -58,9 +58,8 @@ def bench(
     """
     from compare.analysis.tuning import read_tunings
     from compare.bench.baseline import list_drawn, list_instances
-    from compare.bench.leaderboard import rank_solvers
-    from compare.bench.page import make_leaderboard_page, make_verdict
-    from compare.bench.submission import SUFFIX, pack_submission, verify_submission
+    from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
+    from compare.bench.submission import SUFFIX, pack_submission, verify_submission, write_public_pages
     from compare.report.writing import add_session, write_document
     from compare.study.record import RunRecord
     from compare.study.settings import SolverSpec
@@ -74,7 +73,10 @@ def bench(
             print_findings(verify_submission(verify, share=rerun, progress=say).findings, as_json)
         return
     if leaderboard is not None:
-        _write_leaderboard(leaderboard, out, as_json)
+        written, rejected = write_public_pages(leaderboard, make_writable_folder(out), progress=say)
+        print_result(as_json, {"rejected": rejected}, written, lambda: None)
+        if rejected:
+            fail(f"rejected: {'; '.join(rejected)}")
         return
     if audit:
         _audit(algorithm, as_json)
@@ -194,13 +196,3 @@ def _audit(algorithm: str | None, as_json: bool) -> None:
 
     effects = [{**asdict(effect), "verdict": effect.verdict} for effect in found.effects]
     print_result(as_json, {**asdict(found), "effects": effects, "accusations": list(found.accusations)}, (), tables)
-
-
-def _write_leaderboard(folder: Path, out: Path, as_json: bool) -> None:
-    """Write the pages of all submissions of a folder; status 1 if one is rejected."""
-    from compare.bench.public_pages import write_public_pages
-
-    written, rejected = write_public_pages(folder, make_writable_folder(out), progress=say)
-    print_result(as_json, {"rejected": rejected}, written, lambda: None)
-    if rejected:
-        fail(f"rejected: {'; '.join(rejected)}")

@@ -89,7 +89,7 @@ def animate(
     """
     from compare.drawing.animation import draw_frames, write_contact_sheet
     from compare.drawing.gait_figure import make_skeleton
-    from compare.report.gait_page import animate_gait
+    from compare.report.interactive import animate_gait
     from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
     loaded = stored.load()

@@ -1,6 +1,9 @@
-"""Data that a page draws itself: runs for charts with hover, zoom and a choice of solvers; gaits in 3-D."""
+"""Data that a page draws itself: runs for charts with hover, zoom and a choice of solvers; gaits in 3-D, also alone."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,12 +11,17 @@ import numpy as np
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.record_statistics import ECDF_TARGETS, Curve
 from compare.drawing.comparison_figures import SMALLEST_GAP
-from compare.drawing.figures import Look, assign_looks
-from compare.drawing.gait_figure import GaitCurves
-from nlp_gait.formulation import Array
+from compare.drawing.figures import Look, assign_looks, render_svg
+from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
+from compare.report.document import Document, Figure
+from compare.report.writing import html
+from nlp_gait.errors import InputError
+from nlp_gait.files import write_text
+from nlp_gait.formulation import Array, GaitProblem, Result
 
 MOST_FRAMES = 61  # of a gait; the page interpolates between them
 SIGNIFICANT_DIGITS = 5
+CAPTION = "Left blue, right orange; the support polygon green, the zero-moment point pink, the centre of mass in ink."
 
 
 def describe_runs(comparison: Comparison) -> dict[str, Any]:
@@ -87,3 +95,29 @@ def _round(values: Array, digits: int = SIGNIFICANT_DIGITS) -> list[float | int 
     """Round to significant digits; None for infinite and unknown values."""
     rounded = [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in values]
     return [int(value) if value is not None and value.is_integer() else value for value in rounded]
+
+
+@dataclass(frozen=True)
+class GaitPage:
+    """A page that plays a gait; notebooks display it."""
+
+    html: str  #: the whole page, without any other file
+
+    def write(self, path: Path) -> None:
+        """Write the page; raises OutputError."""
+        write_text(path, self.html)
+
+    def _repr_html_(self) -> str:
+        frame = 'sandbox="allow-scripts" title="gait in 3-D" style="width: 100%; height: 52rem; border: 0"'
+        return f'<iframe srcdoc="{escape(self.html)}" {frame}></iframe>'
+
+
+def animate_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -> GaitPage:
+    """Return the page of a gait, a point x of a problem, under the name of its solver; InputError if it cannot be drawn."""
+    gaits = {name: prepare_gait(Result(problem=problem, x=problem.check_x(x)))}
+    data = describe_gaits(gaits)
+    if data is None:
+        raise InputError(f"problem {problem.name!r} has no skeleton to draw")
+    drawing = plot_gaits(gaits)
+    figure = Figure(name="gait", caption=CAPTION, drawing=drawing, data=data)
+    return GaitPage(html(Document(title=problem.title, parts=[figure]), [render_svg(drawing)]))

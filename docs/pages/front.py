@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from benchmarks.difficulty import difficulties
-from compare.report.gait_page import animate_gait
+from compare.report.interactive import animate_gait
 from docs.pages.playground import FOLDER
 from docs.pages.problems import GAITS, names
 from nlp_gait.formulation import load

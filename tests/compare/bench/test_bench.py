@@ -18,8 +18,7 @@ from compare.bench.baseline import (
     list_instances,
     load_baseline,
 )
-from compare.bench.leaderboard import rank_solvers
-from compare.bench.page import make_leaderboard_page, make_leads
+from compare.bench.leaderboard import make_leaderboard_page, make_leads, rank_solvers
 from compare.report.writing import write_document
 from nlp_gait import gaitbench
 

@@ -15,11 +15,9 @@ import pytest
 from compare.archive.pack import write_archive
 from compare.archive.unpack import MANIFEST
 from compare.archive.verify import Finding
-from compare.bench import public_pages
 from compare.bench.baseline import make_bench_study, parse_seeds
 from compare.bench.leaderboard import filter_instances
-from compare.bench.public_pages import write_public_pages
-from compare.bench.submission import check_rules, pack_submission, verify_submission
+from compare.bench.submission import check_rules, pack_submission, verify_submission, write_public_pages
 from compare.study.evidence import check_claims, check_history
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
@@ -135,7 +133,7 @@ def test_searches_with_similar_names_have_pages_of_their_own(
         user = [replace(record, solver="mine", definition={**record.definition, "solver": {}}) for record in records]
         return [], [*(replace(record, solver=names[path.name]) for record in records), *user]
 
-    monkeypatch.setattr(public_pages, "verify_submission", verify)
+    monkeypatch.setattr("compare.bench.submission.verify_submission", verify)
     (tmp_path / "in").mkdir()
     for name in names:
         (tmp_path / "in" / name).touch()

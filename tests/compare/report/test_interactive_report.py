@@ -12,7 +12,7 @@ import pytest
 
 import nlp_gait
 from compare.report import write_report
-from compare.report.gait_page import animate_gait
+from compare.report.interactive import animate_gait
 from compare.study.record import RunRecord
 from compare.study.settings import Manifest
 from tests.browser import (
