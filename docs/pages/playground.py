@@ -31,7 +31,7 @@ from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_goal
 from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.biped.skeleton import ON_GROUND, make_level_sole, place_links
-from nlp_gait.gaits.biped.support_phases import make_single_support_phase
+from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import connect_joints, make_nao
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
@@ -142,8 +142,8 @@ def make_phase(instance: Instance) -> Phase:
     """Return the phase of an instance of single support with cubics."""
     options = instance.definition.options
     body = make_nao(str(options["robot"]))
-    splines, grid = body.make_splines("ssp", "cubic"), make_grid("cubic", 10, 0)
-    return make_single_support_phase(body, float(options["step_length_m"]), splines, grid, make_goal(body, "power"))
+    step_m, grid = float(options["step_length_m"]), make_grid("cubic", 10, 0)
+    return make_support_phase(body, "ssp", step_m, "cubic", grid, make_goal(body, "power"))
 
 
 @dataclass(frozen=True, kw_only=True)

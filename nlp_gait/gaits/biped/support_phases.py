@@ -3,7 +3,7 @@
 Phases of sections 3 and 4 of Gupta, Pratihar, Deb (2023), with the margins of the ZMP on a sole and around both.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import casadi as ca
@@ -11,9 +11,9 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
-from nlp_gait.gaits.biped.curves import Splines, hip_on_spline
+from nlp_gait.gaits.biped.curves import PhaseTrajectory, hip_on_spline
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Limit, Margins
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
@@ -22,6 +22,7 @@ from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion
 
 # Least mean margins: 0.05 m and 0.02 m on NAO's sole of 0.15 m by 0.08 m (section 4.1); 0.08 m in the box of 0.21 m by 0.18 m
 # around both soles (section 4.2).
@@ -115,96 +116,54 @@ def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
     return (body.round_place(rear_x + sixth), body.round_place(front_x - sixth)), (left_y / 2, right_y / 2)
 
 
-def make_single_support_phase(
-    body: Body, step_m: float, splines: Splines, grid: Grid, goal: Goal, derivatives: Derivatives = "analytic"
-) -> Phase:
-    """Return the phase from rest behind the standing foot to rest in front of it, with feet ``step_m`` apart."""
-    stance = place_stance(body, step_m)
-    left, (_, right_height) = body.standing_ankle("L", step_m), body.ankle("R")
-
-    def swing(at: InstantPoint, more: Mapping[str, trajectories.Motion], height: float, s: SX) -> trajectories.Motion:
-        """The paper's motion of the right foot at a height, and what its curves add."""
-        time, (begin, end) = read_duration(at, "ssp"), stance.swing_x
-        paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
-        return trajectories.add_motions(
-            paper, trajectories.stack(more["foot_x"], trajectories.constant_motion(0.0), more["foot_z"])
-        )
-
-    def sole(at: InstantPoint, s: SX) -> SX:
-        return swing(at, splines.motions(at, read_duration(at, "ssp"), s), 0.0, s).position
-
-    return _make_support_phase(
-        body,
-        "ssp",
-        splines,
-        hip_places=(stance.hip_x, stance.hip_y),
-        ankles=lambda at, more, s: {"L": left, "R": swing(at, more, right_height, s)},
-        balance=limit_to_sole(body, stance.support_xy),
-        clearance=(FootClearance(sole, step_m, LIFT),) if splines.count else (),
-        sharing=LoadSharing(make_single_support_loads(body)),
-        grid=grid,
-        goal=goal,
-        derivatives=derivatives,
-    )
-
-
-def make_double_support_phase(
-    body: Body,
-    step_m: float,
-    splines: Splines,
-    sharing: LoadSharing,
-    grid: Grid,
-    goal: Goal,
-    derivatives: Derivatives = "analytic",
-) -> Phase:
-    """Return the phase from touch-down of the right foot, ``step_m`` ahead of the left one, to lift-off of the left one."""
-    soles = place_soles(body, step_m)
-    ankles = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
-    return _make_support_phase(
-        body,
-        "dsp",
-        splines,
-        hip_places=hip_ends(body, soles),
-        ankles=lambda at, more, s: ankles,
-        balance=limit_to_box(make_support_box(body.robot, soles)),
-        clearance=(),
-        sharing=sharing,
-        grid=grid,
-        goal=goal,
-        derivatives=derivatives,
-    )
-
-
-def _make_support_phase(
+def make_support_phase(
     body: Body,
     name: PhaseName,
-    splines: Splines,
-    *,
-    hip_places: tuple[Point2, Point2],
-    ankles: Callable[[InstantPoint, Mapping[str, trajectories.Motion], SX], Mapping[str, trajectories.Motion]],
-    balance: BalanceMargins,
-    clearance: tuple[Limit, ...],
-    sharing: LoadSharing,
+    step_m: float,
+    trajectory: PhaseTrajectory,
     grid: Grid,
     goal: Goal,
-    derivatives: Derivatives,
+    sharing: LoadSharing | None = None,
+    derivatives: Derivatives = "analytic",
 ) -> Phase:
-    """Return a phase from places of the hip, along and across, and the motion of the ankles with what the curves add."""
-    hip, measured = body.split_hip(splines, *hip_places)
-    lift = (body.lift_variable,) if name == "ssp" else ()
+    """Return a phase with feet ``step_m`` apart; in double support the load is shared.
+
+    Single support is from rest behind the standing foot to rest in front of it, double support from touch-down of the right foot,
+    a step ahead of the left one, to lift-off of the left one.
+    """
+    swings, soles, stance = name == "ssp", place_soles(body, step_m), place_stance(body, step_m)
+    hip_places = (stance.hip_x, stance.hip_y) if swings else hip_ends(body, soles)
+    standing = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
+    sharing = sharing or LoadSharing(make_single_support_loads(body))
+    splines = body.make_splines(name, trajectory)
+
+    def swing(at: InstantPoint, more: Mapping[str, Motion], height: float, s: SX) -> Motion:
+        """The paper's motion of the right foot at a height, and what its curves add."""
+        time, (begin, end) = read_duration(at, name), stance.swing_x
+        paper = swing_foot(SX(begin), SX(end), stance.swing_y, height, at[LIFT], time, s)
+        curves = (more["foot_x"], trajectories.constant_motion(0.0), more["foot_z"])
+        return trajectories.add_motions(paper, trajectories.stack(*curves))
+
+    def sole(at: InstantPoint, s: SX) -> SX:
+        return swing(at, splines.motions(at, read_duration(at, name), s), 0.0, s).position
 
     def state(at: InstantPoint, s: SX) -> State:
         time = read_duration(at, name)
         more = splines.motions(at, time, s)
         hip = hip_on_spline(at, more, *hip_places, time, s, splines.is_measured)
-        return hip, body.angles(name, at, more, time, s), ankles(at, more, s)
+        ankles = {**standing, "R": swing(at, more, body.ankle("R")[1], s)} if swings else standing
+        return hip, body.angles(name, at, more, time, s), ankles
 
     def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
 
+    balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
+    clearance = (FootClearance(sole, step_m, LIFT),) if swings and splines.count else ()
+    curve_limits = body.make_curve_limits(name, splines.count, state)
+    hip, measured = body.split_hip(splines, *hip_places)
+    lift = (body.lift_variable,) if swings else ()
     own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
     variables = (*hip, *body.angle_variables, *own)
-    curve_limits = body.make_curve_limits(name, splines.count, state)
     names = [variable.name for variable in variables]
     return Phase(
         body=body,
@@ -222,9 +181,7 @@ def _make_support_phase(
     )
 
 
-def swing_foot(
-    start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX
-) -> trajectories.Motion:
+def swing_foot(start_x: SX, end_x: SX, y: float, ankle_height: float, lift: SX, duration: SX, phase: SX) -> Motion:
     """Return the motion of a swinging foot's ankle (3,) from rest to rest over a parabola [m] (Table 3, rows 1 and 2)."""
     forward = trajectories.cubic(start_x, end_x, SX(0), SX(0), duration, phase)
     rise = trajectories.parabola_lift(forward, start_x, end_x, lift)

@@ -12,7 +12,7 @@ from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem
 from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
-from nlp_gait.gaits.biped.support_phases import make_double_support_phase, make_single_support_phase
+from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.humanoid.turning import check_turns
@@ -40,7 +40,7 @@ def humanoid_ssp(
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
     step_m = body.check_step_length(step_length_m)
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
-    phase = make_single_support_phase(body, step_m, body.make_splines("ssp", trajectory), grid, goal)
+    phase = make_support_phase(body, "ssp", step_m, trajectory, grid, goal)
     return make_phase_problem("ssp", SINGLE_SUPPORT, phase)
 
 
@@ -67,7 +67,7 @@ def humanoid_dsp(
     step_m = body.check_step_length(step_length_m)
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
-    phase = make_double_support_phase(body, step_m, body.make_splines("dsp", trajectory), sharing, grid, goal)
+    phase = make_support_phase(body, "dsp", step_m, trajectory, grid, goal, sharing)
     return make_phase_problem("dsp", DOUBLE_SUPPORT, phase)
 
 

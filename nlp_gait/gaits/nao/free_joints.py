@@ -22,7 +22,7 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FreeParts, locate_free_parts
 from nlp_gait.gaits.biped.samples import Instant, Samples
-from nlp_gait.gaits.biped.support_phases import make_single_support_phase
+from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
 from nlp_gait.robots import Robot
@@ -157,7 +157,7 @@ class FreeLimits(limits.Limit):
 def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
     """Return single support with free joints between the ends of the paper's; one sample of the grid is the middle."""
     body = replace(body, upright=frozenset())
-    paper = make_single_support_phase(body, step_m, body.make_splines("ssp", "cubic"), grid, Goal())
+    paper = make_support_phase(body, "ssp", step_m, "cubic", grid, Goal())
     splines = Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
     _, left_y, _ = support = (step_m, *body.ankle("L"))
     motion = FreeMotion(paper=paper, splines=splines, support=support)

@@ -26,13 +26,7 @@ from nlp_gait.gaits.biped.recorded_cycle import (
     make_refinable,
 )
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, RecordedMotion, make_places_function
-from nlp_gait.gaits.biped.support_phases import (
-    hip_ends,
-    make_double_support_phase,
-    make_single_support_phase,
-    place_soles,
-    place_stance,
-)
+from nlp_gait.gaits.biped.support_phases import hip_ends, make_support_phase, place_soles, place_stance
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
@@ -68,8 +62,7 @@ def nao_ssp(
         places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
         power_form = power_form_maker(body.robot, partial(single_support_instants, *places))
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
-    splines = body.make_splines("ssp", trajectory)
-    phase = make_single_support_phase(body, step_length_m, splines, grid, goal, derivatives)
+    phase = make_support_phase(body, "ssp", step_length_m, trajectory, grid, goal, derivatives=derivatives)
     return replace(make_phase_problem("ssp", SINGLE_SUPPORT, phase), power_form=power_form)
 
 
@@ -111,8 +104,7 @@ def nao_dsp(
         power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
-    splines = body.make_splines("dsp", trajectory)
-    phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, goal, derivatives)
+    phase = make_support_phase(body, "dsp", step_length_m, trajectory, grid, goal, sharing, derivatives)
     return replace(make_phase_problem("dsp", DOUBLE_SUPPORT, phase), power_form=power_form)
 
 
@@ -236,9 +228,9 @@ def nao_dsp_free(
     """
     check_step_length(step_length_m)
     body = make_leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia))
-    splines, sharing = body.make_splines("dsp", trajectory), share_load(body, torso_share, load_degree)
+    sharing = share_load(body, torso_share, load_degree)
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
-    phase = make_double_support_phase(body, step_length_m, splines, sharing, grid, Goal())
+    phase = make_support_phase(body, "dsp", step_length_m, trajectory, grid, Goal(), sharing)
     return make_phase_problem(
         "dsp-free", "double support with a leaning torso: least mean power", phase, searchable=False
     )
