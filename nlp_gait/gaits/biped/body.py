@@ -19,7 +19,7 @@ from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Limit, Margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
-from nlp_gait.gaits.biped.skeleton import make_skeleton
+from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign, tree_from
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler, tilt_gravity
@@ -273,7 +273,6 @@ class Body(ABC):
         """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""
         return ()
 
-    @property
-    def skeleton(self) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-        """Function that draws the robot."""
-        return make_skeleton(self.full)
+    def draw(self, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+        """Return the robot as a stick figure."""
+        return draw_robot(self.full, signals)

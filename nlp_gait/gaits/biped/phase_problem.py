@@ -96,7 +96,7 @@ def add_robot(
         ground=ground,
         body=body,
     )
-    display = replace(problem.display, robot=body.full, skeleton=body.skeleton, simulation_model=model)
+    display = replace(problem.display, robot=body.full, skeleton=body.draw, simulation_model=model)
     return replace(problem, display=display)
 
 

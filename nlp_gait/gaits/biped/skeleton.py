@@ -1,6 +1,6 @@
 """Stick figure of any biped: legs, soles, and every other limb that is long enough to be seen."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
@@ -16,12 +16,8 @@ ON_GROUND = 1e-6  # [m]; a higher sole does not bear load
 SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs are fingers and cameras
 
 
-def make_skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-    """Return the function that draws a robot; joints that a gait does not move are at zero."""
-    return lambda signals, parameters: _draw(robot, signals)
-
-
-def _draw(robot: Robot, signals: Signals) -> Skeleton:
+def draw_robot(robot: Robot, signals: Signals) -> Skeleton:
+    """Return a robot's limbs and soles over time; joints that a gait does not move are at zero."""
     arrays, at = signals.arrays, locate_links(robot, signals)
     limbs, soles = [], []
     for side in (LEFT, RIGHT):

@@ -222,9 +222,15 @@ class NaoBody(Body):
 
         return (AngleLimits("arm_angle", self.robot, joints, positions),) if count else ()
 
-    @property
-    def skeleton(self) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-        return make_skeleton(self.full)
+    def draw(self, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+        """Return NAO with its arms and its head; a robot with other links is drawn as any biped."""
+        if not DRAWN <= set(self.full.links):
+            return super().draw(signals, parameters)
+        feet = {side: signals.arrays[f"{side}_foot"] for side in LETTER}
+        lines = connect_joints(self.full, skeleton.locate_links(self.full, signals), feet)
+        limbs = [Limb(side=side, points=np.stack(points, axis=1)) for side, points in lines]
+        soles = [skeleton.make_level_sole(self.full, *foot) for foot in feet.items()]
+        return make_flat_skeleton(signals, limbs, soles)
 
 
 def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", arms: Arms = "carried") -> NaoBody:
@@ -271,13 +277,6 @@ DRAWN = {
 LETTER = {LEFT: "L", RIGHT: "R"}
 
 
-def make_skeleton(robot: Robot) -> Callable[[Signals, Mapping[str, float]], Skeleton]:
-    """Return the function that draws a robot with NAO's links; a robot with other links is drawn as any biped."""
-    if not DRAWN <= set(robot.links):
-        return skeleton.make_skeleton(robot)
-    return lambda signals, parameters: _draw(robot, signals)
-
-
 def connect_joints(robot: Robot, at: Mapping[str, Any], feet: Mapping[str, Any]) -> list[tuple[str, list[Any]]]:
     """Return the side and the points of each line, from places of links and under the ankles: (T, 3) numbers or (3,) symbols."""
     torso, shoulders = at[robot.root], (at["LShoulder"] + at["RShoulder"]) / 2
@@ -288,10 +287,3 @@ def connect_joints(robot: Robot, at: Mapping[str, Any], feet: Mapping[str, Any])
         lines.append((side, [torso, *leg, at[robot.feet[side].link], feet[side]]))
         lines.append((side, [shoulders, *arm, at[f"{letter.lower()}_wrist tip"]]))
     return lines
-
-
-def _draw(robot: Robot, signals: Signals) -> Skeleton:
-    feet = {side: signals.arrays[f"{side}_foot"] for side in LETTER}
-    lines = connect_joints(robot, skeleton.locate_links(robot, signals), feet)
-    limbs = [Limb(side=side, points=np.stack(points, axis=1)) for side, points in lines]
-    return make_flat_skeleton(signals, limbs, [skeleton.make_level_sole(robot, *foot) for foot in feet.items()])
