@@ -24,9 +24,8 @@ from casadi import DM, MX
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.goals import HEAT_LOSS, PowerModel
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
-from nlp_gait.gaits.biped.samples import Samples, time_mean
+from nlp_gait.gaits.biped.samples import HEAT_LOSS, PowerModel, Samples, time_mean
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

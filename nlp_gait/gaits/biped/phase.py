@@ -14,9 +14,8 @@ from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.formulation.gait_problem import Start
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
-from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant, Loader, Planner, Samples, Trace
+from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Goal, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth

@@ -15,13 +15,12 @@ from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
-from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, RecordedMotion, make_instant_function
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Goal, Loader, Planner, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 

@@ -12,12 +12,11 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, hip_on_spline
-from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Goal, Instant, Loader
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
