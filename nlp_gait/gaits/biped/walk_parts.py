@@ -12,8 +12,8 @@ import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
+from nlp_gait.gaits.biped.cycle import STAND
 from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables, make_state_variables
-from nlp_gait.gaits.biped.joined_phases import STAND
 
 CYCLE_END, STAND_AT_END = "cycle_end", "stand_at_end"
 HALF_STEPS = 2  # the first and the last step are half steps
