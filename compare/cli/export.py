@@ -60,7 +60,7 @@ def export_solver(
     from nlp_gait.backends.solve import solve
     from nlp_gait.errors import InputError
     from nlp_gait.export.nl_file import export_nl
-    from nlp_gait.export.planner import check_planner
+    from nlp_gait.export.solver import check_planner
     from nlp_gait.export.solver import export_solver as write
 
     if planner and nl:
