@@ -8,7 +8,7 @@ import numpy as np
 
 from nlp_gait.columns import read_table
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.webots import read_motion
+from nlp_gait.export.set_points import read_motion
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.robots import Robot
 
