@@ -35,39 +35,12 @@ Shapes = Mapping[str, Sequence[Shape]]
 
 
 def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
-    """Return the model of a plan's robot and ground; see ``make_model``."""
-    return make_model(
-        plan.robot,
-        plan.shapes(sole),
-        drive,
-        plan.gravity,
-        friction,
-        slope_rad=plan.slope_rad,
-        ground=plan.ground,
-        planar=plan.planar,
-    )
-
-
-def make_model(
-    robot: Robot,
-    shapes: Shapes,
-    drive: Drive,
-    gravity: float,
-    friction: float = FRICTION,
-    *,
-    slope_rad: float = 0.0,
-    ground: Sequence[Tread] = (),
-    planar: bool = False,
-) -> str:
-    """Return the model of a robot on a floor with position drives; only solid shapes can touch the ground.
-
-    Gravity [m/s^2] is in the axes of the floor, which rises forward by an angle. The ground adds stairs; if planar, the robot's
-    root stays in the plane y = 0.
-    """
+    """Return the model of a plan's robot with position drives on its ground; only solid shapes can touch that."""
+    robot, shapes = plan.robot, plan.shapes(sole)
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     _, option, default, _, assets, world, actuators = root
     root.set("model", robot.name)
-    option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(*tilt_gravity(gravity, slope_rad))}
+    option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(*tilt_gravity(plan.gravity, plan.slope_rad))}
     default[0].set("friction", _numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
     for link, parts in shapes.items():
         for i, shape in enumerate(parts):
@@ -75,8 +48,8 @@ def make_model(
                 levels = (shape.bottom, shape.bottom + shape.thickness)
                 corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
                 Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
-    _add_stairs(world, ground)
-    bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if planar else "free")
+    _add_stairs(world, plan.ground)
+    bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if plan.planar else "free")
     _paint(bodies, robot)
     light = Xml.SubElement(bodies[robot.root], "light", mode="track", directional="true", pos="0.6 -0.8 1.5")
     light.attrib |= {"dir": "-0.6 0.8 -1.5", "diffuse": "0.5 0.5 0.5", "specular": "0.1 0.1 0.1"}

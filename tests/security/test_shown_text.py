@@ -21,9 +21,11 @@ from compare.report.study_report import make_study_document
 from compare.report.writing import html, markdown_page
 from compare.study.settings import Manifest, Session, SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
+from nlp_gait.formulation import Signals
 from nlp_gait.robots import load_robot
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import make_model
+from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.plan import Plan
 from tests.compare.records import study
 
 SCRIPT = "<script>alert(1)</script>"
@@ -107,7 +109,9 @@ def test_text_in_figures_is_escaped() -> None:
 
 def test_names_of_robots_are_escaped_in_models() -> None:
     robot = replace(load_robot("nao-v5"), name=f"{QUOTED}{SCRIPT}&")
-    root = ElementTree.fromstring(make_model(robot, {}, Drive(), 9.81))
+    still = Signals(joints=tuple(robot.joints), arrays={}, columns={})
+    plan = Plan(robot=robot, full_robot=robot, signals=still, heat_loss=0.0, gravity=9.81)
+    root = ElementTree.fromstring(make_plan_model(plan, Drive()))
     assert root.get("model") == f"{QUOTED}{SCRIPT}&"
     assert not list(root.iter("script"))
 

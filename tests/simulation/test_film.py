@@ -20,7 +20,7 @@ from nlp_gait.simulation.film import film  # noqa: E402
 from nlp_gait.simulation.film.film import parse_picture_size  # noqa: E402
 from nlp_gait.simulation.film.recording import record_film  # noqa: E402
 from nlp_gait.simulation.measurements import measure  # noqa: E402
-from nlp_gait.simulation.mjcf import make_model  # noqa: E402
+from nlp_gait.simulation.mjcf import make_plan_model  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
 from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
 
@@ -131,7 +131,7 @@ def test_legs_have_a_colour_for_each_side(gait):
     from xml.etree import ElementTree as Xml
 
     plan = make_plan(gait("dsp optimum"))
-    root = Xml.fromstring(make_model(plan.robot, plan.shapes("rectangle"), Drive(), plan.gravity))
+    root = Xml.fromstring(make_plan_model(plan, Drive()))
     colours = {body.get("name"): {geom.get("rgba") for geom in body.findall("geom")} for body in root.iter("body")}
     left, right = colours["l_ankle"], colours["r_ankle"]
     assert colours["LThigh"] == left != right == colours["RTibia"]

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, MissingExtraError
+from nlp_gait.formulation import Signals
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
-from nlp_gait.simulation.mjcf import make_model
+from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.shapes import Prism, make_shapes
 from nlp_gait.simulation.simulate import Conditions
 
@@ -58,10 +60,16 @@ def test_shapes_of_a_welded_head_move_to_the_torso():
     assert any(shape.start == shape.end and shape.start[2] > 0.15 for shape in shapes["torso"])
 
 
+def plan_of(robot):
+    """A plan without a motion."""
+    signals = Signals(joints=tuple(robot.joints), arrays={}, columns={})
+    return Plan(robot=robot, full_robot=NAO, signals=signals, heat_loss=0.0, gravity=GRAVITY)
+
+
 def test_the_engine_reads_our_masses_to_the_last_digit():
     engine = pytest.importorskip("mujoco")
     robot = weld(NAO, HEAD_JOINTS)
-    model = engine.MjModel.from_xml_string(make_model(robot, make_shapes(NAO, welded=HEAD_JOINTS), Drive(), GRAVITY))
+    model = engine.MjModel.from_xml_string(make_plan_model(plan_of(robot), Drive()))
     assert model.body_mass.sum() == pytest.approx(5.30535, abs=1e-12)
     for name, link in robot.links.items():
         body = model.body(name)
@@ -74,7 +82,7 @@ def test_the_engine_reads_our_masses_to_the_last_digit():
 
 
 def test_the_document_is_well_formed_without_the_engine():
-    root = Xml.fromstring(make_model(NAO, make_shapes(NAO), Drive(), GRAVITY, friction=0.5))
+    root = Xml.fromstring(make_plan_model(plan_of(NAO), Drive(), friction=0.5))
     assert len(root.findall(".//joint")) == len(NAO.joints) and len(root.findall(".//freejoint")) == 1
     assert len(root.findall("./actuator/position")) == len(NAO.joints)
     assert root.find("./default/geom").get("friction").startswith("0.5 ")
@@ -101,6 +109,6 @@ def test_the_engine_takes_a_link_without_extent():
     """A URDF may have zeros for a tensor: a point."""
     links = {**NAO.links, "Head": replace(NAO.links["Head"], inertia_com_kgm2=(0.0,) * 6)}
     engine = pytest.importorskip("mujoco")
-    model = engine.MjModel.from_xml_string(make_model(replace(NAO, links=links), make_shapes(NAO), Drive(), GRAVITY))
+    model = engine.MjModel.from_xml_string(make_plan_model(plan_of(replace(NAO, links=links)), Drive()))
     assert 0.0 < model.body("Head").inertia.max() < 1e-6
     assert model.body("Head").mass == pytest.approx(NAO.links["Head"].mass_kg)
