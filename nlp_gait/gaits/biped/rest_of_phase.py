@@ -20,12 +20,13 @@ from dataclasses import dataclass, replace
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import Display, GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
+from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
 from nlp_gait.formulation.assembly import Variable, variables
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.phase_problem import make_phase_problem
 from nlp_gait.gaits.biped.samples import Goal, Instant, Samples
 from nlp_gait.gaits.biped.support_phases import make_single_support_loads
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -188,7 +189,6 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         goal=PlannedEnd(objective=Objective(name="deviation", unit="1"), time=TIMES[name], swings=swings),
         state=_list_state(body, name),
     )
-
     planned = tuple(
         Parameter(name=f"{each}.planned", unit=unit, default=0.0, description="planned value")
         for each, unit in (
@@ -198,16 +198,8 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
             *((place, "m") for place in FOOT if swings),
         )
     )
-    return GaitProblem(
-        name=f"{body.family}-rest-of-{name}",
-        title=f"{body.title}, rest of a phase from a measured state",
-        variables=phase.variables,
-        own_parameters=(*planned, *phase.parameters),
-        objective=phase.goal.objective,
-        assemble=phase.assemble,
-        grid=phase.grid,
-        display=Display(at_time=phase.at_time, durations=(phase.duration,)),
-    )
+    problem = make_phase_problem(f"rest-of-{name}", "rest of a phase from a measured state", phase)
+    return replace(problem, own_parameters=(*planned, *phase.parameters))
 
 
 def _list_variables(body: Body, name: PhaseName) -> tuple[Variable, ...]:
