@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -68,34 +69,28 @@ class Drive:
         """
         before, share = np.divmod(times / self.period_s + ROUNDING, 1.0)
         last = int(before[-1]) + 1
-        sent = self._shift(at, self.period_s * np.arange(last + 1.0), joints)
+        sent = self._shift(joints, *(at(name, self.period_s * np.arange(last + 1.0)) for name in ("q", "qd", "tau")))
         k = before.astype(int)
         if self.interpolation == "held":
             return sent[k]
         return np.asarray(sent[k] + np.maximum(share - ROUNDING, 0.0)[:, None] * (sent[k + 1] - sent[k]))
 
-    def _shift(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
-        angles = at("q", times)
+    def _shift(self, joints: Sequence[Joint], q: Array, qd: Array, tau: Array) -> Array:
         if self.feed_forward == "none":
-            return angles
-        shifted = angles + self.time_constant_s * at("qd", times)
+            return q
+        shifted = q + self.time_constant_s * qd
         if self.feed_forward == "velocity":
             return shifted
-        return shifted + at("tau", times) / np.array([self.stiffness(joint) for joint in joints])
+        return shifted + tau / np.array([self.stiffness(joint) for joint in joints])
 
     def balance(self, plan: Plan, model: Any) -> BalanceController | StepPlanner | None:
         """Return the controller of one simulation, if the drive has a feedback."""
         if self.feedback is None:
             return None
         joints = [plan.robot.joint(name) for name in plan.joints]
-
-        def shift(*parts: Array) -> Array:
-            found = dict(zip(("q", "qd", "tau"), parts, strict=True))
-            return self._shift(lambda name, times: found[name], np.zeros(1), joints)
-
         if isinstance(self.feedback, Replanning):
-            return StepPlanner(self.feedback, plan, shift, model)
-        stiffness = np.array([self.stiffness(plan.robot.joint(name)) for name in plan.joints])
+            return StepPlanner(self.feedback, plan, partial(self._shift, joints), model)
+        stiffness = np.array([self.stiffness(joint) for joint in joints])
         return BalanceController(self.feedback, plan, stiffness, model)
 
     def torque_limit(self, joint: Joint) -> float:
