@@ -124,17 +124,12 @@ class Walker:
         first, second = (math.ceil(duration / SAMPLE_S) + 1 for duration in (single, double))
         return np.concatenate([np.linspace(0.0, single, first), np.linspace(single, single + double, second)[1:]])
 
-    @property
-    def planned_zmp(self) -> Callable[[Array], Array]:
-        """Planned ZMP (2, k) at times (k,) of the cycle: the middle of the supporting sole, then straight to the next [m]."""
+    def planned_zmp(self, t: Array) -> Array:
+        """Return the planned ZMP (2, k) at times (k,): the middle of the supporting sole, then straight to the next [m]."""
         left, right = (np.array(self._middle(side)) for side in BOTH_FEET)
         ahead = right + (self.footsteps.step_m, 0.0)
-
-        def zmp(t: Array) -> Array:
-            share = np.clip((t - self.footsteps.single_s) / self.footsteps.double_s, 0.0, 1.0)
-            return np.asarray(left[:, None] + share * (ahead - left)[:, None])
-
-        return zmp
+        share = np.clip((t - self.footsteps.single_s) / self.footsteps.double_s, 0.0, 1.0)
+        return np.asarray(left[:, None] + share * (ahead - left)[:, None])
 
     def follow(
         self, zmp: Callable[[Array], Array], height_m: float, *, advances: bool = True

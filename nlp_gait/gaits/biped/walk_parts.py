@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -98,18 +97,12 @@ def make_pose_variables(body: Body) -> list[Variable]:
     return [replace(v, description=v.description.replace("at stand", "standing")) for v in found]
 
 
-@cache
-def _load_start() -> dict[str, float]:
-    """Shares of the bounds' ranges at a walk of NAO."""
-    shares: dict[str, float] = json.loads(files(__package__).joinpath("walk_start.json").read_text(encoding="utf-8"))
-    return shares
-
-
 def start_walk(
     variables: Sequence[Variable], rise: float, parameters: Mapping[str, float], rng: np.random.Generator
 ) -> Array:
     """Draw a start point (n,) near NAO's walk in proportion to the bounds, at the required speed, on ground that may rise."""
-    shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
+    shares: dict[str, float] = json.loads(files(__package__).joinpath("walk_start.json").read_text(encoding="utf-8"))
+    widths = [variable.upper - variable.lower for variable in variables]
     x = {
         variable.name: variable.lower + width * shares.get(EACH_STEP.sub("", variable.name), 0.5)
         for variable, width in zip(variables, widths, strict=True)

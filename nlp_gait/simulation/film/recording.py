@@ -2,8 +2,9 @@
 
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -14,7 +15,7 @@ from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.simulate import OnStep, Simulation
+from nlp_gait.simulation.simulate import Simulation
 
 # Averaging times [s]: without them the numbers flicker with every set-point.
 POWER_WINDOW, PRESSURE_WINDOW, SPEED_WINDOW, PATH_WINDOW = 0.1, 0.02, 0.4, 2.0
@@ -23,11 +24,7 @@ ROUNDING = 1e-9  # [s]
 HOLD_FALL = 1.0  # [s] of simulated time for which a film shows the robot after a fall
 
 
-class Simulator(Protocol):
-    """Function that simulates one gait."""
-
-    def __call__(self, *, on_step: OnStep | None = None) -> Simulation:
-        """Simulate it; call ``on_step`` before every step."""
+Simulator = Callable[..., Simulation]  # simulates one gait, and calls ``on_step`` of its keywords before every step
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
