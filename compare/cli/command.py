@@ -17,10 +17,10 @@ import tomllib
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, get_origin
 
 import typer
 
@@ -74,13 +74,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
             _report_os_error(error)
             raise typer.Exit(1) from None
 
-    options: list[inspect.Parameter] = []
-    for parameter in parameters:
-        if parameter.name in groups:
-            options += _options(groups[parameter.name])
-        else:
-            annotation = _annotate(parameter.annotation, parameter.name, [function.__name__])
-            options.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=annotation))
+    options = list(_list_options(function, [function.__name__]))
     if any(option.name in OUTPUTS for option in options):
         options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
@@ -100,12 +94,15 @@ def _find_inputs(given: Mapping[str, Any]) -> Iterator[Path]:
                         yield Path(part)
 
 
-def _options(group: Any) -> Iterator[inspect.Parameter]:
-    hints = get_type_hints(group, include_extras=True)
-    for field in fields(group):
-        default = inspect.Parameter.empty if field.default is MISSING else field.default
-        annotation = _annotate(hints[field.name], field.name, [kind.__name__ for kind in group.__mro__])
-        yield inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+def _list_options(function: Callable[..., Any], owners: Sequence[str]) -> Iterator[inspect.Parameter]:
+    """Yield the parameters of a function or group as options, described by the owners' texts; a group stands for its fields."""
+    for parameter in inspect.signature(function, eval_str=True).parameters.values():
+        kind = parameter.annotation
+        if is_dataclass(kind) and isinstance(kind, type):
+            yield from _list_options(kind, [base.__name__ for base in kind.__mro__])
+        else:
+            annotation = _annotate(kind, parameter.name, owners)
+            yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=annotation)
 
 
 def _annotate(annotation: Any, name: str, owners: Sequence[str]) -> Any:
