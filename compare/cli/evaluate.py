@@ -61,32 +61,28 @@ def evaluate(
             fail("--rounded takes one candidate as printed, and no --signals or --csv; give --x as numbers")
         _evaluate_rounded(loaded, x, as_json)
         return
-    if x.endswith(".csv"):
-        if signals is not None:
-            fail("--signals takes one candidate; give it as numbers")
-        target = None if table is None else output_file(table)
-        judged = [judge(loaded, row) for row in read_points(Path(x), loaded, FINALS)[1]]
-        if target is not None:
-            _write(target, judged)
-        points = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
-        print_result(as_json, points, [] if target is None else [target], lambda: _print_many(judged))
-        return
-    point = loaded.check_x(parse_x(x))
+    many = x.endswith(".csv")
+    if many and signals is not None:
+        fail("--signals takes one candidate; give it as numbers")
+    if signals is not None and loaded.display.motion is None:
+        fail(f"problem {problem.name!r} has no signals")
+    written = [output_file(path) for path in (signals, table) if path is not None]
+    points = read_points(Path(x), loaded, FINALS)[1] if many else [loaded.check_x(parse_x(x))]
+    judged = [judge(loaded, point) for point in points]
     if signals is not None:
-        if loaded.display.motion is None:
-            fail(f"problem {problem.name!r} has no signals")
         from nlp_gait.export.formats import write_npz
 
-        target = output_file(signals)
-        write_npz(target, loaded.signals(point))
-    evaluation = judge(loaded, point)
+        write_npz(signals, loaded.signals(points[0]))
     if table is not None:
-        _write(output_file(table), [evaluation])
-    if as_json:
-        print_json(evaluation.to_json())
+        _write(table, judged)
+    if many:
+        data = {"schema": 1, "points": [evaluation.to_json() for evaluation in judged]}
+        print_result(as_json, data, written, lambda: _print_many(judged))
+    elif as_json:
+        print_json(judged[0].to_json())
     else:
-        _print(evaluation)
-        print_written(*(path for path in (signals, table) if path is not None))
+        _print(judged[0])
+        print_written(*written)
 
 
 def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
@@ -171,18 +167,10 @@ def _print_gait(judged: JudgedGait) -> None:
 
 
 def _print_many(judged: Sequence[Evaluation]) -> None:
-    objective = judged[0].objective
+    objective = heading(judged[0].objective["name"], judged[0].objective["unit"])
     print_table(
         f"{judged[0].problem}: {len(judged)} candidates",
-        (
-            "row",
-            heading(objective["name"], objective["unit"]),
-            "violation",
-            "feasible",
-            "between samples",
-            "guaranteed",
-            "largest violation",
-        ),
+        ("row", objective, "violation", "feasible", "between samples", "guaranteed", "largest violation"),
         [
             (
                 str(k),
