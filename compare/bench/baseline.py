@@ -37,9 +37,7 @@ def choose_instances(
 ) -> tuple[str, ...]:
     """Return the ids of instances: of a suite, or those of a list, or those that families draw by seeds; both as texts.
 
-    Raises:
-        InputError: seeds that are not FIRST:LAST or numbers with commas.
-        UnknownNameError: no such instance or family.
+    Raises as ``parse_seeds``, and UnknownNameError if there is no such instance or family.
     """
     chosen = () if instances is None else tuple(name.strip() for name in instances.split(","))
     if families is not None:

@@ -47,9 +47,7 @@ class FrontResult:
 def make_front_search(name: str) -> FrontAlgorithm:
     """Return a search by name or, for the user's code, the object that a reference names.
 
-    Raises:
-        SearchError: an unknown name.
-        UserCodeError: the code fails, or is no search for several objectives.
+    Raises SearchError for an unknown name, and UserCodeError if the code fails or is no search for several objectives.
     """
     if name in FRONT_ALGORITHMS or not is_reference(name):
         return front_algorithm(name)
@@ -71,35 +69,30 @@ def run_fronts(
     jobs: int,
     progress: Progress,
 ) -> list[FrontResult]:
-    """Run searches on instances with two objectives; each finished run is stored, and run k has the seed k.
+    """Run searches on instances with two objectives; run k has the seed k. Finished runs are stored: the same call continues.
 
-    Raises:
-        InputError, SearchError, UserCodeError: an unknown instance or search, or a budget that is not allowed.
-        Interrupted: Ctrl-C; the same call continues.
+    Raises as ``make_front_search``, and InputError for an unknown instance or a budget that is not allowed.
     """
     for solver in solvers:
         check_budgets(make_front_search(solver), [evaluations])
+    pairs = [(id, solver) for id in instances for solver in solvers]
     computations = [
         Computation(
             name=f"{id}-{shorten_name(solver)}-{run}".replace(":", "_"),
             inputs={
-                **{
-                    "instance": asdict(get_front_definition(id)),
-                    "solver": solver,
-                    "evaluations": evaluations,
-                    "seed": run,
-                },
+                "instance": asdict(get_front_definition(id)),
+                "solver": solver,
+                "evaluations": evaluations,
+                "seed": run,
                 "source": hash_source(solver, "algorithm") if is_reference(solver) else repr(front_algorithm(solver)),
             },
             function=partial(run_search, id, solver, evaluations, run),
         )
-        for id in instances
-        for solver in solvers
+        for id, solver in pairs
         for run in range(runs)
     ]
     found = list(Store(folder).compute_all(computations, jobs=jobs, progress=progress).values())
     groups = [found[k : k + runs] for k in range(0, len(found), runs)]
-    pairs = [(id, solver) for id in instances for solver in solvers]
     return [_collect(id, shorten_name(solver), group) for (id, solver), group in zip(pairs, groups, strict=True)]
 
 

@@ -25,14 +25,9 @@ LEAST_RUNS = 2
 
 
 def pack_submission(folder: Path, out: Path) -> Path:
-    """Write the submission of a folder of ``nlp-gait bench``, and return it.
+    """Write the submission of a folder of ``nlp-gait bench``, an archive as by ``pack_study``, and return it.
 
-    It contains records, user code, settings, budget and versions, with their hashes.
-
-    Raises:
-        InputError: a record is no evidence, or a rule of ``check_rules`` is broken.
-        UserCodeError: user code took part that the command does not name.
-        OutputError: the file cannot be written.
+    Raises as ``pack_study``, and InputError if a record is no evidence, or a rule of ``check_rules`` is broken.
     """
     records, excluded = read_evidence(folder, "all")
     wrong = [exclusion.sentence for exclusion in excluded] + [f.sentence for f in check_rules(records) if not f.holds]
@@ -42,15 +37,9 @@ def pack_submission(folder: Path, out: Path) -> Path:
 
 
 def verify_submission(path: Path, *, share: float, progress: Progress = ignore_progress) -> Verification:
-    """Judge every final point of a submission again, repeat a share of its runs, and check the rules.
+    """Check a submission as ``verify_archive``, and the rules; its user code runs only if the caller has allowed it.
 
-    Args:
-        path: the file; its user code runs only if the caller has allowed it.
-        share: of the runs that are repeated bit by bit, drawn at random; only a repeated run proves its history.
-        progress: receives a line for each repeated run.
-
-    Raises:
-        InputError: the file cannot be unpacked.
+    Only a repeated run proves its history.
     """
     findings, records = verify_archive(path, share=share, has_report=False, progress=progress)
     return Verification([*findings, *check_rules(records)], records)
@@ -89,11 +78,7 @@ def write_public_pages(
     """Verify all submissions of a folder, and write the pages of those that hold; return the files and what was rejected.
 
     Submissions are ranked together if their instances and budgets are equal; a user's algorithm has its file's name in brackets.
-
-    Args:
-        folder: with ``*.zip`` of ``nlp-gait bench --submit``.
-        out: of the pages; the first one is ``index.html``.
-        progress: called with each file's name.
+    The first page is ``index.html``. ``progress`` is called with each file's name.
     """
     boards: dict[tuple[int, tuple[str, ...]], dict[tuple[str, str, int], RunRecord]] = {}
     rejected = []

@@ -31,8 +31,7 @@ class Output:
     def answer(self, question: Question[Any]) -> None:
         """Answer a question, continuing from stored results; write and print the answer, also a partial one after Ctrl-C.
 
-        Raises:
-            OutputError: a file cannot be written; the answer is printed nevertheless.
+        Raises as ``write``.
         """
         from compare.questions.question import Work
         from compare.study.store import Store
@@ -66,15 +65,9 @@ class Output:
             fail("; ".join(failures))
 
     def write(self, answer: Answer, stopped: str = "", problems: Sequence[Mapping[str, Any]] = ()) -> None:
-        """Write an answer and print it, as a JSON object or as tables and sentences.
+        """Write an answer, citing the sources of problems, and print it; where the work stopped, end with that message.
 
-        Args:
-            answer: of a question.
-            stopped: where the work was interrupted; the command ends with this message.
-            problems: whose sources the report cites.
-
-        Raises:
-            OutputError: a file cannot be written; the answer is printed nevertheless.
+        Raises OutputError if a file cannot be written; the answer is printed nevertheless.
         """
         from compare.report.writing import add_session
 
