@@ -198,7 +198,7 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
             [HEADER[i] for i in order],
             [[row[i] for i in order] for row in rows],
         )
-        failures = find_failures([record for solver in comparison.solvers for record in solver.records])
+        failures = find_failures(comparison.records)
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
             print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)

@@ -134,11 +134,11 @@ def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_
     from compare.questions.recorded import judge_gait
     from nlp_gait.export.formats import write_npz
 
-    target = None if signals is None else output_file(signals)
+    written = [] if signals is None else [output_file(signals)]
     judged = judge_gait(gait, in_engine=engine)
-    if target is not None:
-        write_npz(target, gait.problem.signals(gait.x))
-    print_result(as_json, judged.to_json(), [] if target is None else [target], lambda: _print_gait(judged))
+    for path in written:
+        write_npz(path, gait.problem.signals(gait.x))
+    print_result(as_json, judged.to_json(), written, lambda: _print_gait(judged))
 
 
 def _print_gait(judged: JudgedGait) -> None:

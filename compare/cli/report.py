@@ -146,16 +146,11 @@ def plain_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
 
 def print_simulations(simulated: Sequence[SimulatedGait]) -> None:
     """Print a table per problem, and the agreement of engine and model."""
-    from compare.analysis.simulated_gaits import (
-        GAIT_HEADER,
-        describe_drive,
-        group_by_problem,
-        make_engine_rows,
-        measure_agreement,
-    )
+    from compare.analysis import simulated_gaits
 
-    for problem, own in group_by_problem(simulated).items():
-        print_table(f"{problem} simulated: {describe_drive(own[0].drive)}", GAIT_HEADER, make_engine_rows(own))
-        stdout.print(measure_agreement(own).describe())
+    for problem, own in simulated_gaits.group_by_problem(simulated).items():
+        title = f"{problem} simulated: {simulated_gaits.describe_drive(own[0].drive)}"
+        print_table(title, simulated_gaits.GAIT_HEADER, simulated_gaits.make_engine_rows(own))
+        stdout.print(simulated_gaits.measure_agreement(own).describe())
     if simulated:
         stdout.print(ENGINE_TABLE)

@@ -219,7 +219,6 @@ def plan(
     `nlp-gait export walk.json --format csv --period-ms 1`
     """
     import nlp_gait
-    from nlp_gait.files import replace_nan
 
     target = None if out is None else output_file(out)
     found = nlp_gait.plan_walk(
@@ -240,7 +239,7 @@ def plan(
     if target is not None:
         found.save(target)
     if as_json:
-        print_json(replace_nan(found.to_json()))
+        print_json(found.to_json())
     else:
         step = found.solution.x.get("step_length_m")
         stdout.print(

@@ -1,17 +1,64 @@
-"""Sections on solvers over many problems: at all budgets, next to the ranks by their medians; how their settings were tuned."""
+"""Sections on solvers over many problems: their median gaps and ranks, results at all budgets, and tuned settings."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from compare.analysis.anytime import EQUIVALENT, SHARES, AnytimeScore, score_anytime
 from compare.analysis.comparison import Comparison
-from compare.analysis.overview import describe_tests, rank_over_problems
+from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning, describe_choice
 from compare.analysis.units import join_words, percent
-from compare.drawing.comparison_figures import plot_critical_difference
-from compare.report.document import Figure, Part, Section, text_table
+from compare.analysis.verdict import find_leaders
+from compare.drawing.comparison_figures import list_expected_costs, plot_critical_difference, plot_performance_profile
+from compare.report.document import Figure, Part, Section, Table, text_table
+
+
+def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Section:
+    """Return the section on all problems of a study together."""
+    parts: list[Part] = [
+        "Median gap to the best known value over all runs. A star marks the best median and those that do not differ from it "
+        "significantly (rank-sum test at 5 %, Holm-corrected over all pairs on the problem). Ranks are those of the medians, of "
+        f"solvers that ran on all problems; equals share a rank. {describe_tests(ranking)}".strip(),
+        _make_matrix(comparisons, ranking.mean_ranks),
+        *(_make_wins(comparisons, solver) for solver in list_user_solvers(comparisons)),
+    ]
+    if list_expected_costs(comparisons):
+        parts.append(
+            Figure(
+                name="performance-profile",
+                caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected "
+                "evaluations.",
+                drawing=plot_performance_profile(comparisons),
+            )
+        )
+    if ranking.mean_ranks:
+        parts.append(make_anytime_section(comparisons))
+    return Section(title="All problems", parts=parts)
+
+
+def _make_matrix(comparisons: Sequence[Comparison], ranks: Mapping[str, float]) -> Table:
+    names = list(dict.fromkeys([*ranks, *(solver.name for c in comparisons for solver in c.solvers)]))
+    rows = []
+    for comparison in comparisons:
+        leaders, medians = find_leaders(comparison), {s.name: s.median_cost for s in comparison.solvers}
+        rows.append((comparison.problem, *(_format_cell(comparison, name, medians, leaders) for name in names)))
+    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
+    return text_table(("problem", *names), rows, "Median gap of each solver on each problem")
+
+
+def _format_cell(comparison: Comparison, name: str, medians: dict[str, float], leaders: set[str]) -> str:
+    if name not in medians:
+        return "-"
+    gap = comparison.gap(medians[name])
+    return f"{comparison.format_gap(gap)}{' *' if name in leaders else ''}" if math.isfinite(gap) else "infeasible"
+
+
+def _make_wins(comparisons: Sequence[Comparison], solver: str) -> Table:
+    rows = [(r.other, str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
+    caption = f"Problems on which {solver} is significantly better, not different, or worse"
+    return text_table(("against", "wins", "ties", "losses"), rows, caption)
 
 
 def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
@@ -69,16 +116,12 @@ def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:
         for tuning in tunings
     ]
     header = ("solver", "area before", "tuned", "trials", "evaluations", "time of all runs", "chosen settings")
-    return (
-        Section(
-            title="Tuning",
-            parts=(
-                f"A trial of a search is one run on each of {join_words(tunings[0].training)}, which are not judged here or have "
-                "other seeds; the first has the settings before. Optuna's tree-structured Parzen estimator proposes the others "
-                "within the ranges that belong to the search's settings, and the trial with the largest mean area over the "
-                "convergence curve (AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before the judged "
-                "runs, and are not counted there.",
-                text_table(header, rows, "Settings before and after tuning", prose=True),
-            ),
-        ),
+    words = (
+        f"A trial of a search is one run on each of {join_words(tunings[0].training)}, which are not judged here or have other "
+        "seeds; the first has the settings before. Optuna's tree-structured Parzen estimator proposes the others within the "
+        "ranges that belong to the search's settings, and the trial with the largest mean area over the convergence curve "
+        "(AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before the judged runs, and are not counted "
+        "there."
     )
+    table = text_table(header, rows, "Settings before and after tuning", prose=True)
+    return (Section(title="Tuning", parts=(words, table)),)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, stdev
@@ -60,7 +60,9 @@ class FurtherFiles:
             check_style(self.style)
         written = []
         if self.csv or (folder / "runs.csv").exists():
-            written += _write_csv(folder, {"runs": make_runs_table(comparisons), **_make_point_tables(comparisons)})
+            tables = {"runs": make_runs_table(comparisons), **_make_point_tables(comparisons)}
+            for name, rows in tables.items():
+                written.append(write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))))
         if self.parquet:
             written.append(_write_parquet(folder / "runs.parquet", make_runs_table(comparisons)))
         for comparison in comparisons:
@@ -103,10 +105,6 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
             ),
         ]
     return tables
-
-
-def _write_csv(folder: Path, tables: Mapping[str, TableRows]) -> list[Path]:
-    return [write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))) for name, rows in tables.items()]
 
 
 def _write_parquet(path: Path, table: TableRows) -> Path:

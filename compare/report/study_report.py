@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_problems, label_editions
-from compare.analysis.overview import (
-    Ranking,
-    count_wins,
-    describe_tests,
-    list_user_solvers,
-    rank_over_problems,
-    write_overall_verdict,
-)
+from compare.analysis.overview import rank_over_problems, write_overall_verdict
 from compare.analysis.published import write_better_points
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import Tuning, read_tunings
-from compare.analysis.verdict import find_leaders, write_verdict
-from compare.drawing.comparison_figures import list_expected_costs, plot_performance_profile
-from compare.report.document import Document, Figure, Part, Section, Table, list_section, text_table
+from compare.analysis.verdict import write_verdict
+from compare.report.document import Document, Section, list_section, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.solver_sections import make_anytime_section, make_tuning_section
+from compare.report.solver_sections import make_overview, make_tuning_section
 from compare.report.study_files import FurtherFiles
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence
@@ -34,53 +25,6 @@ from compare.study.record_files import RECORDS
 from compare.study.settings import Manifest, read_manifest
 from compare.study.simulations import SimulatedGait, load_simulations
 from nlp_gait.files import write_text
-
-
-def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Section:
-    """Return the section on all problems of a study together."""
-    parts: list[Part] = [
-        "Median gap to the best known value over all runs. A star marks the best median and those that do not differ from it "
-        "significantly (rank-sum test at 5 %, Holm-corrected over all pairs on the problem). Ranks are those of the medians, of "
-        f"solvers that ran on all problems; equals share a rank. {describe_tests(ranking)}".strip(),
-        _make_matrix(comparisons, ranking.mean_ranks),
-        *(_make_wins(comparisons, solver) for solver in list_user_solvers(comparisons)),
-    ]
-    if list_expected_costs(comparisons):
-        parts.append(
-            Figure(
-                name="performance-profile",
-                caption="Share of problems and targets that a solver reaches within a factor of the cheapest one's expected "
-                "evaluations.",
-                drawing=plot_performance_profile(comparisons),
-            )
-        )
-    if ranking.mean_ranks:
-        parts.append(make_anytime_section(comparisons))
-    return Section(title="All problems", parts=parts)
-
-
-def _make_matrix(comparisons: Sequence[Comparison], ranks: Mapping[str, float]) -> Table:
-    names = list(dict.fromkeys([*ranks, *(solver.name for c in comparisons for solver in c.solvers)]))
-    rows = []
-    for comparison in comparisons:
-        leaders, medians = find_leaders(comparison), {s.name: s.median_cost for s in comparison.solvers}
-        rows.append((comparison.problem, *(_format_cell(comparison, name, medians, leaders) for name in names)))
-    rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
-    return text_table(("problem", *names), rows, "Median gap of each solver on each problem")
-
-
-def _format_cell(comparison: Comparison, name: str, medians: dict[str, float], leaders: set[str]) -> str:
-    if name not in medians:
-        return "-"
-    gap = comparison.gap(medians[name])
-    return f"{comparison.format_gap(gap)}{' *' if name in leaders else ''}" if math.isfinite(gap) else "infeasible"
-
-
-def _make_wins(comparisons: Sequence[Comparison], solver: str) -> Table:
-    rows = [(r.other, str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
-    caption = f"Problems on which {solver} is significantly better, not different, or worse"
-    return text_table(("against", "wins", "ties", "losses"), rows, caption)
-
 
 REPORT_ALONE = FurtherFiles()
 RELOAD = '<head>\n<meta http-equiv="refresh" content="5">'  # seconds between reloads of the page

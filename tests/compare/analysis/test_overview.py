@@ -8,7 +8,7 @@ from scipy.stats import friedmanchisquare
 from compare.analysis.comparison import Comparison, compare_problems
 from compare.analysis.overview import count_wins, list_user_solvers, rank_over_problems, write_overall_verdict
 from compare.report.document import Table
-from compare.report.study_report import make_overview
+from compare.report.solver_sections import make_overview
 from tests.compare.records import record
 
 MEDIANS = {"walk": (1.0, 2.0, 3.0), "run": (1.0, 3.0, 2.0), "climb": (1.0, 2.0, 2.0)}
