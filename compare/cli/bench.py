@@ -115,14 +115,12 @@ def bench(
     written = write_document(out, page, "leaderboard")
 
     def tables() -> None:
-        print_table(
-            f"GaitBench, {suite_name}: {len(chosen)} instances",
-            ("rank", "solver", "mean rank", "targets solved", "runs feasible"),
-            [
-                (str(k), s.solver, f"{s.mean_rank:.2f}", f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %")
-                for k, s in enumerate(board.standings, start=1)
-            ],
-        )
+        rows = [
+            (str(k), s.solver, f"{s.mean_rank:.2f}", f"{100 * s.solved:.1f} %", f"{100 * s.feasible:.0f} %")
+            for k, s in enumerate(board.standings, start=1)
+        ]
+        header = ("rank", "solver", "mean rank", "targets solved", "runs feasible")
+        print_table(f"GaitBench, {suite_name}: {len(chosen)} instances", header, rows)
         for sentence in () if name is None else make_verdict(board, name):
             stdout.print(sentence)
 

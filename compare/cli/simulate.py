@@ -107,13 +107,6 @@ class FilmOptions:
     speed: float = 1.0
     frames_per_s: float = 25.0
 
-    @property
-    def note(self) -> str:
-        """The film's caption of its speed."""
-        if self.speed == 1.0:
-            return ""
-        return f"{'slow motion' if self.speed < 1.0 else 'fast'}: {self.speed:g} x real time"
-
 
 def _parse_pair(text: str, flag: str) -> tuple[float, float]:
     parts = text.split(",")
@@ -223,11 +216,13 @@ def _write_film(
     from nlp_gait.simulation.film.video import write_video
 
     interval_s = film.speed / film.frames_per_s
+    factor = f"{'slow motion' if film.speed < 1.0 else 'fast'}: {film.speed:g} x real time"
+    note = "" if film.speed == 1.0 else factor
     recordings = [record_film(title, plan, player, interval_s) for title, plan, player in gaits]
 
     def with_progress() -> Iterator[Frame]:
         with progress_bar("frames", max(len(recording.t) for recording in recordings)) as advance:
-            for picture in draw_pictures(recordings, size, film.note):
+            for picture in draw_pictures(recordings, size, note):
                 yield picture
                 advance("")
 

@@ -11,7 +11,7 @@ from compare.analysis.solver_table import HEADER, SolverSummary, count, describe
 from compare.analysis.units import BY_UNIT, heading, seconds
 from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
-from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
+from compare.drawing.gait_figure import plot_gaits, prepare_gait
 from compare.report.document import Figure, Part, Prose, Section, list_section, text_table
 from compare.report.interactive import describe_gaits, describe_runs
 from compare.study.record import RunRecord, load_gait
@@ -258,20 +258,15 @@ def make_gaits_part(comparison: Comparison) -> Figure | str | None:
     if not records:
         return None
     try:
-        gaits = {record.solver: _gait(record) for record in records}
+        loaded = {record.solver: load_gait(record) for record in records}
+        gaits = {name: prepare_gait(gait) for name, gait in loaded.items() if gait.problem.display.motion is not None}
     except GaitError as error:
         return f"The gaits are not drawn: {error}."
-    found = {title: gait for title, gait in gaits.items() if gait is not None}
-    if not any(gait.skeleton is not None or gait.power is not None for gait in found.values()):
+    if not any(gait.skeleton is not None or gait.power is not None for gait in gaits.values()):
         return None
     return Figure(
         name=f"{make_file_name(comparison.problem)}-gaits",
         caption=CAPTION,
-        drawing=plot_gaits(found),
-        data=describe_gaits(found),
+        drawing=plot_gaits(gaits),
+        data=describe_gaits(gaits),
     )
-
-
-def _gait(record: RunRecord) -> GaitCurves | None:
-    gait = load_gait(record)
-    return None if gait.problem.display.motion is None else prepare_gait(gait)

@@ -11,7 +11,7 @@ from compare.cli.endings import describe_stored, end_interrupted, fail
 from compare.cli.options import RESULTS
 from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stdout
 from nlp_gait.files import make_writable_folder
-from nlp_gait.interrupts import Interrupted, defer_interrupts
+from nlp_gait.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
     from compare.questions.question import Answer, Question
@@ -51,10 +51,8 @@ class Output:
                 for found in question.find(Work(store=store, progress=progress)):
                     findings = found
             except KeyboardInterrupt as interrupt:
-                total = question.total
-                stopped = "interrupted" if total is None else f"interrupted after {notes} of {total} {question.counts}"
-                if isinstance(interrupt, Interrupted):
-                    stopped = interrupt.sentence
+                part = "" if question.total is None else f" after {notes} of {question.total} {question.counts}"
+                stopped = str(interrupt) or f"interrupted{part}"
         if findings is None:
             end_interrupted(f"{stopped}; {describe_stored(self.out)}")
         if store.summary:
