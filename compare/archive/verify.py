@@ -78,11 +78,7 @@ def verify_archive(
 
 
 def verify_folder(
-    folder: Path,
-    *,
-    share: float = 0.0,
-    robots: Mapping[str, str] | None = None,
-    progress: Progress = ignore_progress,
+    folder: Path, *, share: float = 0.0, robots: Mapping[str, str] | None = None, progress: Progress = ignore_progress
 ) -> Verification:
     """Check everything in a study's folder that can be checked.
 

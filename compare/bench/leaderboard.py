@@ -114,11 +114,7 @@ def filter_instances(instances: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
 
 
 def make_leaderboard_page(
-    board: Leaderboard,
-    solver: str | None,
-    suite: str,
-    evaluations: int = EVALUATIONS,
-    tunings: Sequence[Tuning] = (),
+    board: Leaderboard, solver: str | None, suite: str, evaluations: int = EVALUATIONS, tunings: Sequence[Tuning] = ()
 ) -> Document:
     """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
     count_of = len(board.comparisons)

@@ -155,11 +155,10 @@ def end_if_none_left(records: Sequence[RunRecord]) -> None:
     """Report failed runs on stderr, and end with status 1 if a solver has no result on some problem."""
     from compare.analysis.solver_table import find_failures
 
-    without_result = []
-    for failure in find_failures(records):
-        if failure.failed == failure.runs:
-            without_result.append(failure.solver)
+    failures = find_failures(records)
+    for failure in failures:
         say_error(failure.sentence)
+    without_result = [failure.solver for failure in failures if failure.failed == failure.runs]
     if without_result:
         fail(
             f"without any result: {', '.join(without_result)}; fix the cause, and delete the failed records to run them again"
@@ -191,13 +190,10 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     from compare.analysis.verdict import describe_best_known
 
     for comparison in compare_problems(records):
-        rows = [format_cells(summary, comparison) for summary in summarise(comparison)]
-        order = [HEADER.index(name) for name in (*READ_FIRST, *(n for n in HEADER if n not in READ_FIRST))]
-        print_table(
-            title or f"{comparison.problem}: judged by the exact functions",
-            [HEADER[i] for i in order],
-            [[row[i] for i in order] for row in rows],
-        )
+        cells = [dict(zip(HEADER, format_cells(s, comparison), strict=True)) for s in summarise(comparison)]
+        header = [*READ_FIRST, *(name for name in HEADER if name not in READ_FIRST)]
+        rows = [[row[name] for name in header] for row in cells]
+        print_table(title or f"{comparison.problem}: judged by the exact functions", header, rows)
         failures = find_failures(comparison.records)
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
