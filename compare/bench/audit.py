@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -77,9 +78,8 @@ class Audit:
             )
         if self.edge > CLIPPED:
             found.append(f"clips: on noise, {100 * self.edge:.1f} % of the variables end exactly at a bound")
-        test = binomtest(
-            round(self.middle * self.runs * NOISE_VARIABLES), self.runs * NOISE_VARIABLES, MIDDLE, "greater"
-        )
+        values = self.runs * NOISE_VARIABLES
+        test = binomtest(round(self.middle * values), values, MIDDLE, "greater")
         if self.middle > EXCESS * MIDDLE and test.pvalue < SIGNIFICANT:
             found.append(f"on noise, {100 * self.middle:.1f} % of the variables end in the middle 10 % of their ranges")
         return tuple(found)
@@ -138,21 +138,13 @@ def audit_search(
     """
     costs: dict[str, list[list[float]]] = {change: [] for change in ("reference", *CHANGES)}
     for number, id in enumerate(instances):
-        instance = gaitbench.load(id)
+        instance, seeds = gaitbench.load(id), range(1000 * number, 1000 * number + runs)
         for change, rows in costs.items():
-            rows.append(
-                [
-                    run_once(algorithm, MovedProblem(instance, make_change(instance.best_x, change, k)), evaluations, k)
-                    for k in range(1000 * number, 1000 * number + runs)
-                ]
-            )
+            moved = {seed: MovedProblem(instance, make_change(instance.best_x, change, seed)) for seed in seeds}
+            rows.append([run_once(algorithm, problem, evaluations, seed) for seed, problem in moved.items()])
         progress(id)
-    ends = np.array(
-        [
-            metaheuristics.minimize(Noise(k), algorithm, evaluations=NOISE_EVALUATIONS, seed=k).x
-            for k in range(10 * runs)
-        ]
-    )
+    on_noise = partial(metaheuristics.minimize, algorithm=algorithm, evaluations=NOISE_EVALUATIONS)
+    ends = np.array([on_noise(Noise(seed), seed=seed).x for seed in range(10 * runs)])
     progress("noise")
     tests = [compare_stratified(costs[change], costs["reference"]) for change in CHANGES]
     corrected = holm([p for _, p in tests])

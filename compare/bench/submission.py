@@ -54,15 +54,17 @@ def check_rules(records: Sequence[RunRecord]) -> list[Finding]:
     for record in records:
         seeds.setdefault((record.solver, record.problem), []).append(record.seed)
         budgets.add((record.definition.get("stop") or {}).get("evaluations"))
-    equal = (
-        all(sorted(own) == list(range(len(own))) for own in seeds.values())
-        and len({len(s) for s in seeds.values()}) == 1
-    )
-    enough = min(len(own) for own in seeds.values()) >= LEAST_RUNS
+    counts = {len(own) for own in seeds.values()}
+    equal = len(counts) == 1 and all(sorted(own) == list(range(len(own))) for own in seeds.values())
+    enough = min(counts) >= LEAST_RUNS
     drawn = {parse_id(r.problem)[1].seed for r in records if is_generated(r.problem)}
     days = set(map(find_test_day, drawn))
     return [
-        Finding("seeds of runs", equal and enough, f"at least {LEAST_RUNS} runs, 0, 1, ..., as many on each instance"),
+        Finding(
+            "seeds of runs",
+            equal and enough,
+            f"at least {LEAST_RUNS} runs, 0, 1, ..., as many on each instance",
+        ),
         Finding("budget", len(budgets) == 1, f"evaluations of a run: {', '.join(map(str, budgets))}"),
         Finding(
             "instances",

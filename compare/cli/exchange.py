@@ -76,12 +76,8 @@ def logs(folder: Path, to: Path, form: Literal["ioh", "coco"] = "ioh", as_json: 
         say(f"not in the logs: {sentence}")
     written = (write_ioh if form == "ioh" else write_coco)(comparisons, to)
     data = {"problems": [comparison.problem for comparison in comparisons], "runs": len(records)}
-    print_result(
-        as_json,
-        data,
-        () if not as_json else written,
-        lambda: stdout.print(f"wrote {len(written)} files to {to}", soft_wrap=True),
-    )
+    listed = written if as_json else ()  # there are hundreds
+    print_result(as_json, data, listed, lambda: stdout.print(f"wrote {len(written)} files to {to}", soft_wrap=True))
     end_if_excluded(evidence.sentences)
 
 
