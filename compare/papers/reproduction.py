@@ -1,7 +1,7 @@
 """The common frame of the reproductions of papers.
 
 A reproduction runs what a paper ran, checks its claims, and writes tables, figures and a report. Its text is a template in
-Markdown (see ``compare.report.document``) with places for values, tables and figures; ``{claims}`` and ``{differences}`` are the
+Markdown (see ``fill_template``) with places for values, tables and figures; ``{claims}`` and ``{differences}`` are the
 tables of ``<paper>_claims.toml``. To add a claim, add it to that file. If our numbers decide it, ``checks`` has a function with
 its id, or the file names one (``claims.bind_checks``); else the file gives ``found`` and ``verdict``. ``summary.json`` has both
 tables and what computed them: its copy from a full reproduction, ``docs/papers/<paper>.json``, is what the documentation shows.
@@ -10,6 +10,7 @@ tables and what computed them: its copy from a full reproduction, ``docs/papers/
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -32,7 +33,7 @@ from compare.papers.claims import (
     read_tables,
 )
 from compare.papers.paper_runs import Effort, Runner
-from compare.report.document import Rows, Section, Table, fill_template, text_table
+from compare.report.document import Document, Figure, Part, Prose, Rows, Section, Table, text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section, write_document, write_parts
 from compare.study.settings import Session
@@ -43,7 +44,7 @@ from nlp_gait.files import convert_errors, make_writable_folder, read_json, writ
 from nlp_gait.progress import Progress, ignore_progress
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
 E = TypeVar("E", bound=Effort)
 F = TypeVar("F")
@@ -68,7 +69,7 @@ class Reproduction(Generic[E, F]):
     run: Callable[[Runner, E], F]  # computes the findings
     values: Callable[[F], Mapping[str, Any]]  # of the places in the text and in the table of differences
     tables: Callable[[F], Mapping[str, Rows]]  # rows by name in the text, which has their headings and formats
-    figures: Callable[[F], Mapping[str, Figure]]  # by name in the text
+    figures: Callable[[F], Mapping[str, Drawing]]  # by name in the text
     checks: Mapping[str, Callable[[F], Check]] = field(default_factory=dict)  # by id of the claim
     csv_tables: Callable[[F], Sequence[Table]] = lambda _: ()  # that are not in the text
 
@@ -139,10 +140,8 @@ class Reproduction(Generic[E, F]):
         differences = fill_differences(self.printed.differences, values)
         with style():
             figures = self.figures(findings)
-        whole = [make_claims_table(claims.values()), make_differences_table(differences)]
-        document = fill_template(
-            template, values=values, tables=self.tables(findings), figures=figures, whole_tables=whole
-        )
+        own = {"claims": make_claims_table(claims.values()), "differences": make_differences_table(differences)}
+        document = fill_template(template, values=values, tables={**self.tables(findings), **own}, figures=figures)
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
         settings = [(name, format_settings(value)) for name, value in asdict(effort).items()]
         parts = (text_table(("effort", "value"), settings, prose=True), TERMS, make_reference_table(records))
@@ -176,3 +175,64 @@ def count_verdicts(claims: Mapping[str, Claim]) -> str:
     every = {name: claim.reading_of or name for name, claim in claims.items()}
     tested = {every[name] for name, claim in claims.items() if claim.verdict != ClaimVerdict.UNTESTABLE}
     return f"{len(claims)} rows on {len({*every.values()})} claims, of which {len(tested)} are tested here: {words}."
+
+
+HEADING = re.compile(r"(#+) (.+)")
+TABLE = re.compile(r"\{([\w-]+)\}(?:\n\|(.+)\|\n\|(.+)\|)?")
+FIGURE = re.compile(r"!\[(.*)\]\((.+)\.png\)", re.DOTALL)
+
+
+def fill_template(
+    text: str,
+    *,
+    values: Mapping[str, Any],
+    tables: Mapping[str, Rows | Table],
+    figures: Mapping[str, Drawing],
+) -> Document:
+    """Return the document of a text.
+
+    Blocks of the text are separated by empty lines. A block is the title after ``#``, a heading after ``##`` or ``###``, a table,
+    or ``![what it shows](name.png)`` for the drawing of that name. Anything else is a paragraph, a list or a table in Markdown,
+    in which ``{name:.3f}`` is a value as ``str.format`` writes it. A table has three lines, the last one with the formats of the
+    columns; ``:--`` in all of them makes it a table of sentences::
+
+        {name}
+        | solver | power [W] |
+        | | .3f |
+
+    ``{name}`` alone is a table that has its own headings.
+
+    Raises:
+        KeyError: the text names a value, table or drawing that is missing.
+    """
+    title, *blocks = re.split(r"\n{2,}", text.strip())
+    open_sections: list[tuple[str, list[Part]]] = [(title.removeprefix("# "), [])]
+
+    def close(level: int) -> None:
+        while len(open_sections) > level:
+            name, parts = open_sections.pop()
+            open_sections[-1][1].append(Section(title=name, parts=parts))
+
+    for block in blocks:
+        parts = open_sections[-1][1]
+        if heading := HEADING.fullmatch(block):
+            close(len(heading[1]) - 1)
+            open_sections.append((heading[2].format_map(values), []))
+        elif (place := TABLE.fullmatch(block)) and place[1] in tables:
+            name, *lines = place.groups()
+            table = tables[name]
+            filled = (line.format_map(values) for line in lines)
+            parts.append(table if isinstance(table, Table) else _make_table(table, name, *filled))
+        elif figure := FIGURE.fullmatch(block):
+            parts.append(Figure(name=figure[2], caption=figure[1].format_map(values), drawing=figures[figure[2]]))
+        else:
+            parts.append(Prose(block.format_map(values)))
+    close(1)
+    return Document(title=open_sections[0][0], parts=open_sections[0][1])
+
+
+def _make_table(rows: Rows, name: str, header: str, formats: str) -> Table:
+    headings, forms = ([cell.strip() for cell in line.split("|")] for line in (header, formats))
+    prose = set(forms) == {":--"}
+    columns = {heading: "" if prose else form for heading, form in zip(headings, forms, strict=True)}
+    return Table(name=name, columns=columns, rows=rows, prose=prose)

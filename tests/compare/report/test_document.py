@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from compare.drawing.figures import new_figure
-from compare.report.document import Document, Figure, Prose, Section, Table, fill_template
+from compare.papers.reproduction import fill_template
+from compare.report.document import Document, Figure, Prose, Section, Table
 from compare.report.writing import write_document, write_parts
 
 TEXT = """
