@@ -149,8 +149,7 @@ def simulate(
     from nlp_gait.simulation.load_sharing import share_loads as redistribute
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.simulate import SETTLE_TIME, simulate_plan
-    from nlp_gait.simulation.simulate import measure_robustness as sweep
+    from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, simulate_plan
 
     load_mujoco(pictures=film.video is not None)
     if viewer and film.video is not None:
@@ -191,7 +190,7 @@ def simulate(
         lost = "nothing was written; name a folder with --out"
         where = lost if folder is None else f"the simulation is stored in {folder}"
         with interruptible(f"interrupted in the tests of robustness; {where}"):
-            survival = sweep(plan, drive)
+            survival = measure_robustness(plan, drive)
         data["robustness"] = asdict(survival)
         if folder is not None:
             write_json(folder / "report.json", replace_nan(data))

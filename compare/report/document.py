@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 Value = str | float | int | bool | None
 """Content of a cell; None for an empty one."""
 
-
 Rows = Sequence[Sequence[Value]]
 """One value for each column."""
 
