@@ -9,7 +9,7 @@ begins at the last plan's end.
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -251,35 +251,30 @@ class StepPlanner:
         left = (1.0 - share) * phase.duration_s
         rate, foot = faster * end.hip_rate, faster[:2] * end.foot if name == "ssp" else state.foot
         place = faster * end.hip + [*foot, 0.0]
-        values = {f"{duration}.planned": left, **dict(_pair(rest.HIP_PLACES, place, ".planned"))}
-        values |= {**_pair(rest.HIP_RATES, rate, ".planned"), **_pair(("x", "y", "z"), state.hip, "_start_m", "hip_")}
-        values |= _pair(("x", "y", "z"), state.hip_rate, "_start_m_s", "hip_v")
-        angles = self._body.angle_names(name)
-        for numbers, kind in ((state.arms, "start"), (end.arms, "end"), (state.arms_rate, "start_rate")):
-            values |= _pair(angles, numbers, f"_{kind}")
-        values |= _pair(angles, end.arms_rate, "_end_rate")
-        free = self._settings.free.split(",")
-        times = (min(FASTEST_S[name] * (1.0 - share), left), SLOWEST * left) if "time" in free else (left, left)
-        values |= {f"{duration}.lower": times[0], f"{duration}.upper": times[1]}
+        ends = {**_pair(rest.HIP_PLACES, place), **_pair(rest.HIP_RATES, rate), duration: left}
         if name == "ssp":
-            values |= {**_pair(rest.FOOT, foot, ".planned"), "swing_share_start": share, "swing_height_m": phase.height}
-            values |= _pair(("x", "y"), state.foot, "_start_m", "foot_")
-            values |= _pair(("x", "y"), state.foot_rate, "_start_m_s", "foot_v")
-            for each, what, value in zip(rest.FOOT, FREE, foot.tolist(), strict=False):
-                if what not in free:
-                    values |= {f"{each}.lower": value, f"{each}.upper": value}
+            ends |= _pair(rest.FOOT, foot)
+        values = {f"{each}.planned": value for each, value in ends.items()}
+        values |= _pair("xyz", state.hip, "_start_m", "hip_")
+        values |= _pair("xyz", state.hip_rate, "_start_m_s", "hip_v")
+        arms = {"start": state.arms, "end": end.arms, "start_rate": state.arms_rate, "end_rate": end.arms_rate}
+        for kind, numbers in arms.items():
+            values |= _pair(self._body.angle_names(name), numbers, f"_{kind}")
+        values[f"{duration}.lower"] = min(FASTEST_S[name] * (1.0 - share), left)
+        values[f"{duration}.upper"] = SLOWEST * left
+        for each, what in zip((*rest.FOOT, duration), FREE, strict=True):
+            if each in ends and what not in self._settings.free.split(","):
+                values |= {f"{each}.lower": ends[each], f"{each}.upper": ends[each]}
+        if name == "ssp":
+            values |= {"swing_share_start": share, "swing_height_m": phase.height}
+            values |= _pair("xy", state.foot, "_start_m", "foot_")
+            values |= _pair("xy", state.foot_rate, "_start_m_s", "foot_v")
         else:
             values |= _pair(rest.FOOT, foot)
         values |= self._list_edges([np.array([0.0, left_y])] + [foot] * (name == "dsp"))
-        ends = PlanState(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
-        named = {
-            duration: left,
-            **_pair(rest.HIP_PLACES, ends.hip),
-            **_pair(rest.HIP_RATES, rate),
-            **_pair(rest.FOOT, foot),
-        }
-        x = np.array([named.get(each, 0.0) for each in self._planners[name].names])
-        return Pursuit(phase, t, share, left, state, ends, values, x)
+        x = np.array([ends.get(each, 0.0) for each in self._planners[name].names])
+        planned = PlanState(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
+        return Pursuit(phase, t, share, left, state, planned, values, x)
 
     def _find_lean(self, t: float) -> Array:
         """Return the lean (3,) of the torso for which the swinging foot, or the one that has landed, is placed [rad]."""
@@ -318,7 +313,7 @@ def find_ankle_joints(body: Body, side: str) -> list[Joint]:
     return [below[last.parent], last]
 
 
-def _pair(names: tuple[str, ...], numbers: Array, after: str = "", before: str = "") -> dict[str, float]:
+def _pair(names: Sequence[str], numbers: Array, after: str = "", before: str = "") -> dict[str, float]:
     return {f"{before}{name}{after}": value for name, value in zip(names, numbers.tolist(), strict=True)}
 
 
