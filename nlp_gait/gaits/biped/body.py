@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, Self, TypeAlias
 
+import casadi as ca
 import numpy as np
-from casadi import MX, SX, fmax
+from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
 from nlp_gait.formulation.assembly import variables
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
-from nlp_gait.gaits.biped.limits import Limit, Margins
+from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, HEAT_LOSS, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import draw_robot
@@ -34,7 +35,7 @@ TIMED_UNITS = ("s", "m/s", "rad/s")  # of variables whose bounds are this packag
 
 def read_duration(at: InstantPoint, phase: PhaseName) -> SX:
     """Return the duration of a phase [s], never zero."""
-    return fmax(at[TIMES[phase]], LEAST_DURATION)
+    return ca.fmax(at[TIMES[phase]], LEAST_DURATION)
 
 
 # Angles that are planned besides the hip, by name [rad]: of swinging arms, or of a leaning torso; in a turn also the yaw of the
@@ -262,9 +263,11 @@ class Body(ABC):
     def compute_cosines(self, q: MX) -> MX:
         """Return the cosines (2, n) of both knees, as ``plan`` has them, from the angles (J, n) of all joints."""
 
-    @abstractmethod
     def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
-        """Return the balance margins in x and y on the left sole, whose ankle is at ``support_xy`` [m]."""
+        """Return the balance margins on the left sole, whose ankle is at ``support_xy`` [m]: distances to the nearer edges."""
+        foot = self.robot.feet["left"]
+        sole = Box(back=-foot.back_m, front=foot.front_m, right=-foot.right_m, left=foot.left_m)
+        return lambda zmp, at, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
 
     def make_curve_limits(
         self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]

@@ -18,19 +18,12 @@ from nlp_gait.formulation.assembly import Objective, Parameter, Point, RowsOverT
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
-from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, make_rows
+from nlp_gait.gaits.biped.limits import BalanceMargins, Box, Limit, compute_margins, make_rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Goal, Loader, Planner, Samples
-from nlp_gait.gaits.biped.support_phases import (
-    Box,
-    compute_margins,
-    limit_to_box,
-    limit_to_sole,
-    make_single_support_loads,
-    make_support_box,
-)
+from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"

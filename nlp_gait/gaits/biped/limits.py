@@ -4,7 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -25,6 +25,7 @@ TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
 LEGS = ("left leg", "right leg")
 CLOSURE_M = 1e-9  # by which a leg may miss its foot: far below what matters, far above rounding
 
+Side = TypeVar("Side", float, MX)
 # Balance margins in x and y, (1, N + 1) each [m], from the ZMP (2, N + 1) [m], the point and an interpretation.
 Margins = Callable[[MX, Point, Nonsmooth], tuple[MX, MX]]
 
@@ -148,6 +149,21 @@ class TorqueChange(Limit):
         return [make_rows("torque_change", "Nm", ca.vec(change), -limit, limit, names, "interval", self._size)], {
             "torque_change_Nm": ca.mmax(ca.fabs(change))
         }
+
+
+class Box(NamedTuple, Generic[Side]):
+    """Sides of a rectangle [m]."""
+
+    back: Side
+    front: Side
+    right: float
+    left: float
+
+
+def compute_margins(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
+    """Compute the distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
+    x, y = zmp[0, :].T, zmp[1, :].T
+    return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T
 
 
 class BalanceMargins(Limit):

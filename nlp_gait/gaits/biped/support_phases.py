@@ -4,15 +4,14 @@ Phases of sections 3 and 4 of Gupta, Pratihar, Deb (2023), with the margins of t
 """
 
 from collections.abc import Mapping
-from typing import Generic, NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias
 
-import casadi as ca
-from casadi import DM, MX, SX
+from casadi import SX
 
 from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, hip_on_spline
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, FootClearance, Margins
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, FootClearance, Margins, compute_margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
@@ -28,16 +27,6 @@ from nlp_gait.symbolic.trajectories import Motion
 SOLE_SHARES, BOX_SHARES = (1 / 3, 1 / 4), (8 / 21, 4 / 9)
 
 Point2: TypeAlias = tuple[float, float]
-Side = TypeVar("Side", float, MX)
-
-
-class Box(NamedTuple, Generic[Side]):
-    """Sides of a rectangle [m]."""
-
-    back: Side
-    front: Side
-    right: float
-    left: float
 
 
 def make_support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
@@ -49,18 +38,6 @@ def make_support_box(robot: Robot, soles: Mapping[str, Point2]) -> Box[float]:
         right=min(soles[side][1] - foot.right_m for side, foot in feet.items()),
         left=max(soles[side][1] + foot.left_m for side, foot in feet.items()),
     )
-
-
-def compute_margins(box: Box[float] | Box[MX], zmp: MX, ops: Nonsmooth) -> tuple[MX, MX]:
-    """Compute the distances (1, N + 1) of the ZMP (2, N + 1) to the sides of a box in x and in y [m]."""
-    x, y = zmp[0, :].T, zmp[1, :].T
-    return ops.min(box.front - x, x - box.back).T, ops.min(box.left - y, y - box.right).T
-
-
-def make_nearest_edge_margins(support_xy: Point2, foot: Foot) -> Margins:
-    """Return the distances of the ZMP to the nearer edges of one sole in x and in y, whose ankle is at ``support_xy`` [m]."""
-    sole = Box(back=-foot.back_m, front=foot.front_m, right=-foot.right_m, left=foot.left_m)
-    return lambda zmp, at, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
 
 
 def compute_mean_margins(shares: Point2, length: float, width: float) -> Point2:

@@ -13,10 +13,9 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
 from nlp_gait.formulation.assembly import variables
 from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
-from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM, Margins
+from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import BOTH_FEET, HEAT_LOSS, Instant
-from nlp_gait.gaits.biped.support_phases import make_nearest_edge_margins
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
@@ -71,9 +70,6 @@ class Humanoid(Body):
 
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         return dict(zip(LEAN, coordinates, strict=True))
-
-    def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
-        return make_nearest_edge_margins(support_xy, self.robot.feet["left"])
 
     def compute_cosines(self, q: MX) -> MX:
         angles = SX.sym("q", len(self.joints))
