@@ -23,7 +23,7 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, R
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
-from nlp_gait.gaits.biped.support_phases import compute_sole_means
+from nlp_gait.gaits.biped.support_phases import compute_sole_margins, limit_to_sole
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
 from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, Part, make_phase_variables, make_pose_variables
 from nlp_gait.gaits.several_steps import join_steps
@@ -145,7 +145,7 @@ def make_stance_margins(body: Body, right: Foothold) -> BalanceMargins:
     """Return the limit of the ZMP to the hull of both soles; the mean margins are those of a single sole."""
     left, soles = Foothold(0.0, body.feet_y[0], 0.0), body.robot.feet
     sides = find_support_sides([left.outline(soles["left"]), right.outline(soles["right"])])
-    return BalanceMargins(make_polygon_margins(sides), compute_sole_means(soles["left"]))
+    return BalanceMargins(make_polygon_margins(sides), compute_sole_margins(soles["left"]))
 
 
 def make_polygon_margins(sides: Array) -> Margins:
@@ -209,10 +209,8 @@ def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, 
     given = (replace(last, name=name, unit=name.rpartition("_")[2], description="of the right foot") for name in RIGHT)
     planners = [make_footstep_planner(body, turning, swings) for swings in (False, True)]
     phases = make_walk_phases(body, (*others[:-1], *given), planners, grid, loads)
-    sole, margins = body.robot.feet["left"], body.make_sole_margins((0.0, body.feet_y[0]))
-    least = round((sole.back_m + sole.front_m) * LEAST_SHARE, 4), round((sole.left_m + sole.right_m) * LEAST_SHARE, 4)
-    single = BalanceMargins(margins, compute_sole_means(sole), least)
-    phases["ssp"] = replace_margins(phases["ssp"], single)
+    least = compute_sole_margins(body.robot.feet["left"], (LEAST_SHARE, LEAST_SHARE))
+    phases["ssp"] = replace_margins(phases["ssp"], limit_to_sole(body, (0.0, body.feet_y[0]), least))
     phases["dsp"] = replace_margins(phases["dsp"], make_stance_margins(body, feet[0]))
     variables = make_footstep_variables(body, steps)
     both_ways = tuple(

@@ -45,14 +45,15 @@ def compute_mean_margins(shares: Point2, length: float, width: float) -> Point2:
     return round(shares[0] * length, 4), round(shares[1] * width, 4)
 
 
-def limit_to_sole(body: Body, support_xy: Point2) -> BalanceMargins:
-    """Return the limit of the ZMP on the left sole, whose ankle is at ``support_xy`` [m]."""
-    return BalanceMargins(body.make_sole_margins(support_xy), compute_sole_means(body.robot.feet["left"]))
+def limit_to_sole(body: Body, support_xy: Point2, least_m: Point2 = (0.0, 0.0)) -> BalanceMargins:
+    """Return the limit of the ZMP on the left sole, whose ankle is at ``support_xy`` [m], perhaps with least margins."""
+    means = compute_sole_margins(body.robot.feet["left"])
+    return BalanceMargins(body.make_sole_margins(support_xy), means, least_m)
 
 
-def compute_sole_means(foot: Foot) -> Point2:
-    """Return the least mean margins on one sole [m]."""
-    return compute_mean_margins(SOLE_SHARES, foot.back_m + foot.front_m, foot.left_m + foot.right_m)
+def compute_sole_margins(foot: Foot, shares: Point2 = SOLE_SHARES) -> Point2:
+    """Return margins on one sole as shares of its size, by default the least mean ones [m]."""
+    return compute_mean_margins(shares, foot.back_m + foot.front_m, foot.left_m + foot.right_m)
 
 
 def limit_to_box(box: Box[float], margins: Margins | None = None) -> BalanceMargins:
