@@ -10,7 +10,7 @@ Source:
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from casadi import SX
 from scipy.interpolate import PPoly
 from scipy.linalg import solve_discrete_are
 
-from nlp_gait.errors import InputError, check_count
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import CLOSURE_M
@@ -187,14 +187,12 @@ class Walker:
         return (foot.front_m - foot.back_m) / 2, y + (foot.left_m - foot.right_m) / 2
 
 
-def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes: int = 2) -> Result:
+def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps) -> Result:
     """Plan a walking cycle from footsteps and the hip's height alone, judged by the limits of a planned one.
 
-    One pass models the robot as a cart; each further pass moves the hip so that a cart would remove the distance of the whole
-    body's ZMP from the planned one. The source has two.
-    Raises InputError if a foot is out of reach of the hip.
+    The first pass models the robot as a cart; the second one moves the hip so that a cart would remove the distance of the whole
+    body's ZMP from the planned one. Raises InputError if a foot is out of reach of the hip.
     """
-    passes = check_count("passes", passes)
     walker = Walker(cycles=cycles, footsteps=footsteps)
     planned = walker.planned_zmp
     # A first gait with the cart at the hip gives the place of the mass; the cart is then moved there.
@@ -203,19 +201,14 @@ def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps, *, passes
     mass = (first["com"] - first["hip"]).mean(axis=0) - np.array(cycles.body.hip_m)
     ahead, _, height = mass + (0.0, 0.0, footsteps.hip_height_m)
     cart = walker.follow(planned, height)
-    corrections: list[Callable[[Array], Array]] = []
 
     def path(t: Array) -> Array:
-        return sum((correction(t) for correction in corrections), cart(t) - np.array([[ahead], [0.0]]))
+        return cart(t) - np.array([[ahead], [0.0]])
 
-    gait = walker.make_gait(path)
-    for _ in range(passes - 1):
-        arrays = sample_finely(gait).arrays
+    arrays = sample_finely(walker.make_gait(path)).arrays
 
-        def zmp_error(t: Array, arrays: Mapping[str, Array] = arrays) -> Array:
-            zmp = np.stack([np.interp(t, arrays["t"], arrays["zmp"][:, k]) for k in range(2)])
-            return planned(t) - zmp
+    def zmp_error(t: Array) -> Array:
+        return planned(t) - np.stack([np.interp(t, arrays["t"], arrays["zmp"][:, k]) for k in range(2)])
 
-        corrections.append(walker.follow(zmp_error, height, advances=False))
-        gait = walker.make_gait(path)
-    return gait
+    correction = walker.follow(zmp_error, height, advances=False)
+    return walker.make_gait(lambda t: path(t) + correction(t))

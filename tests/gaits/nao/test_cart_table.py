@@ -71,25 +71,24 @@ def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_
     assert len(walker().times) == 201 and walker().times[120] == STEPS.single_s
 
 
+# Root mean square distance of the whole body's ZMP from the planned one in x and y, without the second pass (measured).
+FIRST_PASS_M = np.array([0.0042, 0.0082])
+
+
 @pytest.fixture(scope="module")
-def walks() -> dict[int, Result]:
-    """The same footsteps with the cart alone, and with the whole body's ZMP."""
-    return {passes: plan_cart_table_walk(make_nao_cycles(), STEPS, passes=passes) for passes in (1, 2)}
+def gait() -> Result:
+    return plan_cart_table_walk(make_nao_cycles(), STEPS)
 
 
 @pytest.mark.slow
-def test_the_second_pass_brings_the_whole_bodys_zmp_to_the_planned_one(walks: dict[int, Result]) -> None:
-    planned = walker().planned_zmp
-    errors = {}
-    for passes, gait in walks.items():
-        arrays = histories(gait)
-        errors[passes] = np.sqrt(np.mean((arrays["zmp"].T - planned(arrays["t"])) ** 2, axis=1))
-    assert (errors[1] < 0.01).all() and (errors[2] < 0.3 * errors[1]).all()
+def test_the_whole_bodys_zmp_is_near_the_planned_one(gait: Result) -> None:
+    arrays = histories(gait)
+    error = np.sqrt(np.mean((arrays["zmp"].T - walker().planned_zmp(arrays["t"])) ** 2, axis=1))
+    assert (error < 0.3 * FIRST_PASS_M).all()
 
 
 @pytest.mark.slow
-def test_the_cycle_is_one_step_and_continues_mirrored(walks: dict[int, Result]) -> None:
-    gait = walks[2]
+def test_the_cycle_is_one_step_and_continues_mirrored(gait: Result) -> None:
     hip = histories(gait)["hip"]
     assert gait.problem.name == "recorded-cycle" and gait.x == pytest.approx((0.6, 0.4, 0.05), abs=1e-12)
     assert hip[-1] == pytest.approx(hip[0] * (1, -1, 1) + (0.05, 0, 0), abs=1e-9)
@@ -99,7 +98,7 @@ def test_the_cycle_is_one_step_and_continues_mirrored(walks: dict[int, Result]) 
 
 @pytest.mark.slow
 def test_another_robot_walks_on_its_own_legs() -> None:
-    gait = plan_cart_table_walk(make_nao_cycles("nao-v6", 2), STEPS, passes=1)
+    gait = plan_cart_table_walk(make_nao_cycles("nao-v6", 2), STEPS)
     assert gait.problem.options["robot"] == "nao-v6" and gait.problem.display.robot is not None
     assert gait.problem.display.robot.name == load_nao("nao-v6").name
 
