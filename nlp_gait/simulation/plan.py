@@ -12,7 +12,6 @@ from nlp_gait.formulation.display import Tread
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.robots import Robot
-from nlp_gait.simulation.shapes import Shape, make_shapes
 
 SIDES = ("left", "right")
 ON_GROUND = 1e-6  # [m]; above the rounding of splines
@@ -130,11 +129,6 @@ class Plan:
         """Return planned rates of ``q``, ``zmp``, ``hip`` or a foot at any times (T,): zero after the end."""
         within = np.clip(times, 0.0, self.duration_s)
         return np.asarray(self._splines[name](within, 1) * (times <= self.duration_s)[:, None])
-
-    def shapes(self, sole: str) -> dict[str, list[Shape]]:
-        """Return the shapes of the simulated robot's links."""
-        welded = [joint for joint in self.full_robot.joints if joint not in self.robot.joints]
-        return make_shapes(self.full_robot, sole, welded=welded)
 
 
 @lock_casadi

@@ -15,9 +15,8 @@ from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import make_plan_model
+from nlp_gait.simulation.mjcf import Prism, make_plan_model, make_shapes
 from nlp_gait.simulation.plan import make_plan
-from nlp_gait.simulation.shapes import Prism
 
 pytest.importorskip("mujoco")
 
@@ -114,7 +113,7 @@ def test_feet_begin_on_their_treads_and_toes_are_part_of_them(climb: Result) -> 
     for foot in start.values():
         assert foot[2] == pytest.approx(float(plan.level(foot[:1])[0]), abs=1e-9)
     assert start["left"][2] > start["right"][2] == pytest.approx(0.0, abs=1e-9)
-    shapes = plan.shapes("rectangle")
+    shapes = make_shapes(plan.full_robot)
     assert all(isinstance(shapes[f"{side} {part}"][-1], Prism) for side in start for part in ("sole", "toe"))
     assert not [shape for shape in shapes["left shank"] if getattr(shape, "solid", True)]  # its end lies on the ground
 
