@@ -105,9 +105,8 @@ class Closure(Limit):
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         # A gradient solver needs the same rows in the same places: there they are far below their bound.
-        miss = ca.vec(samples.miss) if ops.exact else -MX.ones(len(LEGS) * (samples.steps + 1))
-        names = make_labels(LEGS, range(samples.steps + 1))
-        return [make_rows("closure", "m", miss, upper=MX(CLOSURE_M), labels=names, over="instant")], {}
+        miss = samples.miss if ops.exact else -MX.ones(len(LEGS), samples.steps + 1)
+        return [make_rows_at_samples("closure", "m", miss, LEGS, None, MX(CLOSURE_M))], {}
 
 
 class DriveLimits(Limit):

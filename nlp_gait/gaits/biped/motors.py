@@ -23,8 +23,7 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
-from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import HEAT_LOSS, PowerModel, Samples, time_mean
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
@@ -163,13 +162,9 @@ class MotorLimits(Limit):
         drop = ca.repmat(slope, 1, n) * (ca.sparsify(place) @ qd)
         speed = DM([self._motors.robot.joint(joint).velocity_limit_rad_s for joint in moving])
         fastest, strongest = MX(ca.repmat(speed, n, 1)), supply * ca.repmat(stall, n, 1)
-        too_fast = make_rows(
-            "joint_speed", "rad/s", ca.vec(qd), -fastest, fastest, make_labels(moving, range(n)), "instant"
-        )
+        too_fast = make_rows_at_samples("joint_speed", "rad/s", qd, moving, -fastest, fastest)
         too_weak = [
-            make_rows(
-                f"torque_{kind}", "Nm", ca.vec(turned), -strongest, strongest, make_labels(names, range(n)), "instant"
-            )
+            make_rows_at_samples(f"torque_{kind}", "Nm", turned, names, -strongest, strongest)
             for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
         ]
         continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
