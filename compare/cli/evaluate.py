@@ -111,7 +111,7 @@ def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
 
 def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
     """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
-    from nlp_gait.export.joint_angles import read_joint_angles
+    from nlp_gait.export.set_points import read_joint_angles
     from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve
     from nlp_gait.robots import load_robot
 

@@ -1,6 +1,6 @@
-"""Set-points of joint angles for a robot or a simulator: the arguments of NAOqi, and Webots' `.motion` files.
+"""Joint angles over time for other programs and from them: arguments of NAOqi, Webots' `.motion` files, and CSV.
 
-The grammar is that of Webots' own parser (`src/controller/c/motion.c`), and stricter where that guesses: a header
+The grammar of `.motion` is that of Webots' own parser (`src/controller/c/motion.c`), and stricter where that guesses: a header
 ``#WEBOTS_MOTION,V1.0,<motor>,...``; then rows ``[[MM:]SS:]mmm,<pose name>,<radians or *>,...`` with strictly increasing times and
 one value a motor; lines shorter than 4,096 characters; an empty line ends the file. Webots interpolates linearly between rows.
 """
@@ -14,10 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import InputError
+from nlp_gait.columns import read_table
+from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import read_text, write_text
 from nlp_gait.formulation import Array, Result, sample_finely
 from nlp_gait.formulation.result import count_periods
+from nlp_gait.formulation.signals import JointAngles
+from nlp_gait.robots import Robot
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
@@ -28,6 +31,10 @@ UNTOUCHED = "*"
 # Up to four digits of seconds: a longer motion is a damaged file, and would overflow the parser's integers.
 _TIME = re.compile(r"(?:(?:(\d{1,4}):)?(\d{1,4}):)?(\d{1,7})", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# ``LKneePitch``, ``LKneePitch_deg``, ``LKneePitch [deg]``, and ``q_LKneePitch_rad`` of `export --format csv`.
+COLUMN = re.compile(r"(?P<name>\w+?)(?:_(?P<suffix>rad|deg)| ?\[(?P<unit>[^\]]*)\])?")
+TIMES = ("t", "time", "time_s")
+FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,3 +152,43 @@ def _parse_angle(text: str, joint: str, where: str) -> float:
     if _NUMBER.fullmatch(text) is None or not math.isfinite(float(text)):
         raise InputError(f"{where}: expected an angle of {joint} in radians or {UNTOUCHED}, got {text!r}")
     return float(text)
+
+
+def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
+    """Read angles over time of a robot's joints from a ``.motion`` file of Webots or CSV; raises InputError, UnknownNameError.
+
+    CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch_deg``; other columns
+    of ``nlp-gait export --format csv`` are ignored.
+    """
+    if path.suffix == ".motion":
+        points = read_motion(path, robot.joints)
+        known = [k for k, column in enumerate(points.angles.T) if not np.isnan(column).all()]
+        joints = tuple(points.joints[k] for k in known)
+        t = np.array(points.times_ms) / 1000.0
+        return JointAngles(owner=f"motion {str(path)!r}", joints=joints, t=t, q=points.angles[:, known])
+    table = read_table(path, "motion")
+    times: int | None = None
+    angles: dict[str, tuple[int, float]] = {}
+    exported = "t_s" in table.header  # which has other columns, too
+    for k, heading in enumerate(table.header):
+        match = COLUMN.fullmatch(heading)
+        name, unit = (match["name"], match["suffix"] or match["unit"] or "") if match else (heading, "")
+        name = name.removeprefix("q_") if exported else name
+        name = heading if heading in robot.joints else name
+        if name in TIMES or heading == "t_s":
+            if unit not in ("", "s"):
+                raise InputError(f"{table.owner}: times must be in s, got [{unit}]")
+            times = k
+        elif name in robot.joints:
+            if unit not in FACTORS:
+                raise InputError(f"{table.owner}: {name} must be in rad or deg, got [{unit}]")
+            angles[name] = k, FACTORS[unit]
+        elif not exported:
+            raise unknown(f"joint in {table.owner}", heading, robot.joints)
+    if times is None:
+        raise InputError(
+            f"{table.owner} needs a header with a column t of times [s]; it has {', '.join(table.header) or 'none'}"
+        )
+    values = np.array(table.rows)
+    q = np.reshape([values[:, k] * factor for k, factor in angles.values()], (len(angles), len(values))).T
+    return JointAngles(owner=table.owner, joints=tuple(angles), t=values[:, times], q=q)
