@@ -1,9 +1,9 @@
 """Problems of recorded motions: judged by the limits of the planned phases; their times and their step are the variables."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, NoReturn
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -27,16 +27,12 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 MOVES = 1e-9  # [rad]; a joint that turns by less is held
 
 
-def _refuse_plan(*_: object) -> NoReturn:
-    raise NotImplementedError("a recorded phase has no plan")
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedPhase(Phase):
     """A phase whose angles over time are given, so that it has no plan."""
 
     recorded: RecordedMotion  # the motion, of the same joints
-    plan: Planner = _refuse_plan
+    plan: Planner = field(init=False)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -55,7 +51,8 @@ class RecordedPhase(Phase):
         the right sole's place [m, m/s].
         """
         q, qd, qdd = (MX(part) for part in self._angles(at))
-        torque, zmp, _, hip, hip_rate, ankle, corners, *_ = self._instant.map(self.grid.parts + 1)(q, qd, qdd)
+        instant = make_instant_function(self.body, self.loads).map(self.grid.parts + 1)
+        torque, zmp, _, hip, hip_rate, ankle, corners, *_ = instant(q, qd, qdd)
         rows_of = [self.body.joints.index(name) for name in self.moving]
         planned = [self.body.joints.index(name) for name in self.body.planned]
         sole = {"heights": corners[2::3, :], "sides": corners[1::3, :], "ground": ankle[:2, :]}
@@ -80,7 +77,7 @@ class RecordedPhase(Phase):
         q, qd, qdd = self._angles(at)
         n = self.grid.parts + 1
         torque, zmp, torso, _, _, ankle, _, com, *wrenches = (
-            np.asarray(DM(part).full().T) for part in self._instant.map(n)(q, qd, qdd)
+            np.asarray(DM(part).full().T) for part in make_instant_function(self.body, self.loads).map(n)(q, qd, qdd)
         )
         support, right = np.array(self.body.support), self.body.robot.feet["right"]
         left_foot = np.tile(support * (1.0, 1.0, 0.0), (n, 1))
@@ -106,10 +103,6 @@ class RecordedPhase(Phase):
         speed = recorded.duration_s / ca.fmax(at[self.duration], LEAST_DURATION)
         q, qd, qdd = (DM(recorded.spline(times, order).T) for order in range(3))
         return q, qd * speed, qdd * speed**2
-
-    @property
-    def _instant(self) -> ca.Function:
-        return make_instant_function(self.body, self.loads)
 
 
 # Largest distance of a recorded sole from its place: rounding, and the spline between samples.
@@ -220,6 +213,7 @@ def make_refinable(
     return refine(1)
 
 
+@lru_cache(maxsize=8)  # as ``make_instant_function``, whose functions have them
 def make_recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
     """Return the loads of both phases for any angles, at which no link stays upright."""
     freed = replace(body, upright=frozenset())
@@ -299,12 +293,8 @@ class RecordedCycles:
                 goal=Goal(heat=body.heat),
                 recorded=motions[name],
             )
-            for name, loads in self._loads.items()
+            for name, loads in make_recorded_loads(body, "lever").items()
         }
         cycle = WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=False)
         problem = make_cycle_problem("recorded-cycle", cycle, rows_over_time=False, repeats=repeats)
         return replace(problem, title=f"A recorded gait of {body.title}, a walking cycle")
-
-    @cached_property
-    def _loads(self) -> dict[PhaseName, Loader]:
-        return make_recorded_loads(self.body, "lever")
