@@ -266,7 +266,8 @@ class StepPlanner:
             if each in ends and what not in self._settings.free.split(","):
                 values |= {f"{each}.lower": ends[each], f"{each}.upper": ends[each]}
         if name == "ssp":
-            values |= {"swing_share_start": share, "swing_height_m": phase.height}
+            values["swing_share_start"] = share
+            values["swing_height_m"] = phase.height
             values |= _pair("xy", state.foot, "_start_m", "foot_")
             values |= _pair("xy", state.foot_rate, "_start_m_s", "foot_v")
         else:
