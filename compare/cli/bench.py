@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
+from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import command
 from compare.cli.compare import run_in_folder
@@ -14,6 +15,11 @@ from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import output_file
 from compare.cli.printing import describe_command, print_result, print_table, print_written, progress_bar, say, stdout
+from compare.study.record import RunRecord
+from compare.study.settings import SolverSpec
+from compare.study.task import check_task
+from nlp_gait import gaitbench
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 from nlp_gait.user_code import is_reference
@@ -56,14 +62,10 @@ def bench(
     `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`,
     `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
     """
-    from compare.analysis.tuning import read_tunings
     from compare.bench.baseline import list_drawn, list_instances
     from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
     from compare.bench.submission import SUFFIX, pack_submission, verify_submission, write_public_pages
     from compare.report.writing import add_session, write_document
-    from compare.study.record import RunRecord
-    from compare.study.settings import SolverSpec
-    from nlp_gait.backends.kernel.compiled import available_cores
 
     if submit is not None or verify is not None:
         name_all([*(code or ()), *([algorithm] if algorithm and is_reference(algorithm) else ())])
@@ -147,8 +149,6 @@ def _bench_fronts(
     """Run searches on the instances with two objectives and write their page."""
     from compare.bench.fronts import SEARCHES, make_fronts_page, rank_searches, run_fronts
     from compare.report.writing import add_session, write_document
-    from nlp_gait import gaitbench
-    from nlp_gait.backends.kernel.compiled import available_cores
 
     chosen = parse_names(instances) if instances else list(gaitbench.fronts())
     solvers = list(SEARCHES if against == RIVALS else parse_names(against))
@@ -171,8 +171,6 @@ def _bench_fronts(
 def _audit(algorithm: str | None, as_json: bool) -> None:
     """Audit a search and print what was found."""
     from compare.bench.audit import INSTANCES, audit_search
-    from compare.study.settings import SolverSpec
-    from compare.study.task import check_task
 
     if algorithm is None:
         raise InputError("--audit examines one search: name it with --algorithm")

@@ -5,27 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from compare.analysis.comparison import compare_problems
+from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
+from compare.analysis.tuning import tune_solvers, write_tunings
+from compare.analysis.verdict import describe_best_known
 from compare.cli.command import command
 from compare.cli.endings import end_if_excluded, end_interrupted, fail, interruptible, say_error
 from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stderr, stdout
 from compare.cli.report import plain_simulations, print_simulations, simulate_best
-from compare.study.settings import SolverSpec, read_settings, resolve_user_code
+from compare.study.import_runs import read_imported_records
+from compare.study.record import RunRecord
+from compare.study.run_study import Study, check_study, run_study
+from compare.study.settings import (
+    Session,
+    SolverSpec,
+    StudySettings,
+    read_manifest,
+    read_settings,
+    resolve_user_code,
+    write_manifest,
+)
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import installed_algorithms
 from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
 from metaheuristics.adapters.egobox import BayesianOptimisation
+from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted
-
-if TYPE_CHECKING:
-    from compare.study.record import RunRecord
-    from compare.study.settings import StudySettings
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
@@ -73,8 +85,6 @@ def compare(
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
     from compare.report import FurtherFiles, write_report
-    from compare.study.import_runs import read_imported_records
-    from compare.study.settings import read_manifest
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import load_mujoco
 
@@ -124,11 +134,6 @@ def run_in_folder(
 
     The remedy says how to continue, in the sentence with which Ctrl-C ends the command.
     """
-    from compare.analysis.tuning import tune_solvers, write_tunings
-    from compare.study.run_study import Study, check_study, run_study
-    from compare.study.settings import Session, write_manifest
-    from nlp_gait.backends.kernel.compiled import available_cores
-
     study = Study(
         tasks=settings.tasks(), folder=make_writable_folder(out), jobs=jobs or available_cores(), scheduler=scheduler
     )
@@ -153,8 +158,6 @@ def run_in_folder(
 
 def end_if_none_left(records: Sequence[RunRecord]) -> None:
     """Report failed runs on stderr, and end with status 1 if a solver has no result on some problem."""
-    from compare.analysis.solver_table import find_failures
-
     failures = find_failures(records)
     for failure in failures:
         say_error(failure.sentence)
@@ -172,9 +175,6 @@ def _advance_by(advance: Callable[[str], None], count: int) -> None:
 
 def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
     """Return the table of solvers by problem as plain data."""
-    from compare.analysis.comparison import compare_problems
-    from compare.analysis.solver_table import summarise
-
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
 
@@ -185,10 +185,6 @@ HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best 
 
 def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Print the table of solvers for each problem, titled by the problem unless a title is given."""
-    from compare.analysis.comparison import compare_problems
-    from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
-    from compare.analysis.verdict import describe_best_known
-
     for comparison in compare_problems(records):
         cells = [dict(zip(HEADER, format_cells(s, comparison), strict=True)) for s in summarise(comparison)]
         header = [*READ_FIRST, *(name for name in HEADER if name not in READ_FIRST)]

@@ -15,12 +15,18 @@ from compare.cli.options import AnyProblem, parse_values, parse_x
 from compare.cli.outputs import output_file
 from compare.cli.printing import print_json, print_result, print_rows, print_table, print_written, stdout
 from compare.judge import Evaluation
+from compare.judge import evaluate as judge
+from compare.rounding import evaluate_rounded
+from compare.study.import_runs import FINALS, read_points
 from nlp_gait.errors import InputError
+from nlp_gait.export.set_points import read_joint_angles
 from nlp_gait.files import format_csv, write_text
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve
+from nlp_gait.robots import load_robot
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
-    from nlp_gait.formulation import GaitProblem
     from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 
 SHOWN_VIOLATIONS = 10
@@ -44,9 +50,6 @@ def evaluate(
     Examples: `nlp-gait evaluate nao-ssp --x 0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4`, also with `--rounded`,
     `nlp-gait evaluate nao-ssp --x points.csv --csv judged.csv`, `nlp-gait evaluate --motion gait.csv --robot nao-v5`
     """
-    from compare.judge import evaluate as judge
-    from compare.study.import_runs import FINALS, read_points
-
     if (x is None) == (motion is None):
         fail("give a point with --x, or a motion with --motion")
     if rounded and motion is not None:
@@ -86,8 +89,6 @@ def evaluate(
 
 
 def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
-    from compare.rounding import evaluate_rounded
-
     found = evaluate_rounded(problem, x.split(","))
     if as_json:
         print_json(found.to_json())
@@ -111,10 +112,6 @@ def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
 
 def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
     """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
-    from nlp_gait.export.set_points import read_joint_angles
-    from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve
-    from nlp_gait.robots import load_robot
-
     options = {"--option": problem.option, "--fix": problem.fix, "--derivatives": problem.derivatives}
     for flag, value in options.items():
         if value:

@@ -6,13 +6,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from compare.analysis.comparison import compare_problems, label_editions
+from compare.analysis.solver_table import describe_unknown
 from compare.cli.command import command
 from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.endings import end_if_excluded, fail
 from compare.cli.options import RESULTS, NamedProblem, name_all
 from compare.cli.outputs import output_file
 from compare.cli.printing import print_json, print_result, print_written, progress_bar, say, stdout
+from compare.logs import write_coco, write_ioh
+from compare.study.citations import find_citations
+from compare.study.evidence import read_evidence
+from compare.study.import_runs import import_runs
+from compare.study.record_files import write_record
+from compare.study.settings import read_manifest
 from nlp_gait.errors import InputError
+from nlp_gait.files import make_writable_folder
 
 if TYPE_CHECKING:
     from compare.archive import Finding
@@ -34,13 +43,7 @@ def import_results(
 
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
-    from compare.analysis.comparison import label_editions
     from compare.report import FurtherFiles, write_report
-    from compare.study.evidence import read_evidence
-    from compare.study.import_runs import import_runs
-    from compare.study.record_files import write_record
-    from compare.study.settings import read_manifest
-    from nlp_gait.files import make_writable_folder
 
     spec = problem.spec()
     records = import_runs(spec, finals, label, history, evaluations)
@@ -64,11 +67,6 @@ def logs(folder: Path, to: Path, form: Literal["ioh", "coco"] = "ioh", as_json: 
 
     Example: `nlp-gait logs results --to logs --format ioh`
     """
-    from compare.analysis.comparison import compare_problems
-    from compare.analysis.solver_table import describe_unknown
-    from compare.logs import write_coco, write_ioh
-    from compare.study.evidence import read_evidence
-
     evidence = read_evidence(folder)
     records = evidence.records
     comparisons = compare_problems(records)
@@ -89,11 +87,8 @@ def archive(*, folder: Path, out: Path = Path("study.zip"), code: list[str] | No
 
     Example: `nlp-gait archive results --out study.zip`
     """
-    from compare.analysis.comparison import label_editions
     from compare.archive import pack_study
     from compare.report import write_report
-    from compare.study.evidence import read_evidence
-    from compare.study.settings import read_manifest
 
     name_all(code)
     target = output_file(out)
@@ -150,8 +145,6 @@ def cite(name: str | None = None, as_json: bool = False) -> None:
 
     Examples: `nlp-gait cite`, `nlp-gait cite nao-ssp`, `nlp-gait cite ssp-v5`
     """
-    from compare.study.citations import find_citations
-
     found = find_citations(name)
     if as_json:
         print_json({"entries": found})

@@ -7,7 +7,17 @@ from compare.cli.endings import interruptible
 from compare.cli.options import NamedProblem, StoredGait
 from compare.cli.outputs import output_file
 from compare.cli.printing import print_result, print_written
+from compare.study.references import find_reference
+from nlp_gait import gaitbench
+from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.solve import solve
+from nlp_gait.errors import InputError
+from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.set_points import PERIOD_MS
+from nlp_gait.export.solver import check_planner
+from nlp_gait.export.solver import export_solver as write
+from nlp_gait.gaitbench import c_export
+from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
 SHEET = ".png"  # suffix of a contact sheet
 
@@ -34,10 +44,7 @@ def export_objective(instance: str, to: Path, as_json: bool = False) -> None:
 
     Example: `nlp-gait export-objective ssp-v5 --to DIR`, then `sh DIR/build.sh && DIR/main < /dev/null`
     """
-    from nlp_gait import gaitbench
-    from nlp_gait.gaitbench.c_export import export_objective as export
-
-    written = export(gaitbench.load(instance), to)
+    written = c_export.export_objective(gaitbench.load(instance), to)
     print_result(as_json, {"instance": instance}, written, lambda: None)
 
 
@@ -55,14 +62,6 @@ def export_solver(
     `nlp-gait export-solver nao-ssp --to DIR --planner`, then `sh DIR/build.sh && DIR/plan`,
     `nlp-gait export-solver nao-ssp --to DIR --nl`
     """
-    from compare.study.references import find_reference
-    from nlp_gait.backends.identity import identify_problem
-    from nlp_gait.backends.solve import solve
-    from nlp_gait.errors import InputError
-    from nlp_gait.export.nl_file import export_nl
-    from nlp_gait.export.solver import check_planner
-    from nlp_gait.export.solver import export_solver as write
-
     if planner and nl:
         raise InputError("--planner writes C code and --nl an .nl file; give one of them")
     loaded, near = problem.spec().load(), None
@@ -90,7 +89,6 @@ def animate(
     from compare.drawing.animation import draw_frames, write_contact_sheet
     from compare.drawing.gait_figure import make_skeleton
     from compare.report.interactive import animate_gait
-    from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
 
     loaded = stored.load()
     target = output_file(stored.result.with_suffix(".gif") if out is None else out)

@@ -9,8 +9,13 @@ from typing import Any
 from compare.cli.command import command
 from compare.cli.outputs import output_file
 from compare.cli.printing import print_json, print_table, print_written, stdout
+from compare.study.description import describe_solver, list_described_names
+from compare.study.task import list_solvers
+from metaheuristics.multi_objective import FRONT_ALGORITHMS
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load, problem_names
+from nlp_gait.robots import robot_names
+from nlp_gait.user_code import find_entry_points
 
 
 @command
@@ -26,8 +31,6 @@ def list_problems(
     Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
-    from compare.study.description import list_described_names
-
     if robot is not None and name is None:
         _robot(robot, out, as_json)
         return
@@ -45,8 +48,6 @@ def list_problems(
 
 
 def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
-    from compare.study.description import describe_solver
-
     found = [describe_solver(name) for name in names]
     if as_json:
         print_json({"algorithms": [asdict(one) for one in found]})
@@ -92,11 +93,6 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
 
 
 def _overview(as_json: bool) -> None:
-    from compare.study.task import list_solvers
-    from metaheuristics.multi_objective import FRONT_ALGORITHMS
-    from nlp_gait.robots import robot_names
-    from nlp_gait.user_code import find_entry_points
-
     problems = {name: load(name) for name in problem_names()}
     installed = {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")}
     if as_json:

@@ -10,17 +10,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from compare.analysis.comparison import compare_problems, label_editions
+from compare.analysis.record_statistics import Weighting
 from compare.cli.command import command
 from compare.cli.endings import end_if_excluded, interruptible
 from compare.cli.options import name_all
 from compare.cli.printing import describe_command, print_result, print_table, print_written, progress_bar, say, stdout
 from compare.cli.simulate import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
+from compare.study.evidence import read_evidence
+from compare.study.record import RunRecord
+from compare.study.settings import read_manifest
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
-    from compare.study.record import RunRecord
     from compare.study.simulations import SimulatedGait
     from nlp_gait.simulation.drive import Drive
 
@@ -60,11 +64,7 @@ def report(
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
     `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
     """
-    from compare.analysis.comparison import label_editions
-    from compare.analysis.record_statistics import Weighting
     from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
-    from compare.study.evidence import read_evidence
-    from compare.study.settings import read_manifest
 
     if not engine and drive_options != DriveOptions():
         raise InputError("the drive applies to simulated gaits: add --engine")
@@ -116,7 +116,6 @@ def reproduce(
 
 def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
     """Simulate every solver's best gait, unless stored; raises InputError if none of the problems can be simulated."""
-    from compare.analysis.comparison import compare_problems
     from compare.analysis.simulated_gaits import select_best_gaits
     from compare.study.simulations import simulate_records
 

@@ -18,11 +18,13 @@ from compare.cli.options import StoredGait, parse_number
 from compare.cli.outputs import output_file
 from compare.cli.printing import print_json, print_table, print_written, progress_bar, stdout
 from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
+from nlp_gait.formulation.result import load_result
+from nlp_gait.simulation.film.video import Frame, check_frames, check_video_path, write_video
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.film.recording import Simulator
-    from nlp_gait.simulation.film.video import Frame
     from nlp_gait.simulation.measurements import Measurements, Walk
     from nlp_gait.simulation.plan import Plan
     from nlp_gait.simulation.simulate import Conditions, Robustness, Simulation
@@ -139,12 +141,9 @@ def simulate(
     """
     from compare.drawing.robot_figures import plot_simulation
     from nlp_gait.export.formats import write_npz
-    from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
-    from nlp_gait.formulation.result import load_result
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.film.film import parse_picture_size
     from nlp_gait.simulation.film.recording import show_in_window
-    from nlp_gait.simulation.film.video import check_frames, check_video_path
     from nlp_gait.simulation.load_sharing import Sharing
     from nlp_gait.simulation.load_sharing import share_loads as redistribute
     from nlp_gait.simulation.mjcf import make_plan_model
@@ -212,7 +211,6 @@ def _write_film(
 ) -> list[Simulation]:
     from nlp_gait.simulation.film.film import draw_pictures
     from nlp_gait.simulation.film.recording import record_film
-    from nlp_gait.simulation.film.video import write_video
 
     interval_s = film.speed / film.frames_per_s
     factor = f"{'slow motion' if film.speed < 1.0 else 'fast'}: {film.speed:g} x real time"

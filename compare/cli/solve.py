@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import nlp_gait
 from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
 from compare.cli.command import command
@@ -14,12 +15,16 @@ from compare.cli.endings import end_interrupted, fail, until_interrupted
 from compare.cli.options import NamedProblem, SearchOptions, parse_names, parse_number, parse_values, parse_x
 from compare.cli.outputs import output_file
 from compare.cli.printing import print_json, print_rows, print_table, print_written, progress_bar, say, stdout
+from compare.study.record import RunRecord
+from compare.study.references import find_reference
+from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec
 from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.kernel.compiled import available_cores
+from nlp_gait.backends.solvers import registry
+from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation.solution import Solution
-
-if TYPE_CHECKING:
-    from compare.study.record import RunRecord
+from nlp_gait.proofs.guarantee import guarantee
 
 
 @command
@@ -39,12 +44,6 @@ def solve(
 
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
-    import nlp_gait
-    from compare.study.references import find_reference
-    from nlp_gait.backends.solvers import registry
-    from nlp_gait.files import replace_nan, write_json
-    from nlp_gait.proofs.guarantee import guarantee
-
     target = None if out is None else output_file(out)
     loaded = problem.spec().load()
     first = None if x0 is None else loaded.check_x(parse_x(x0))
@@ -135,9 +134,6 @@ def search(
     Examples: `nlp-gait search nao-ssp --algorithm pso --runs 11 --seed 0 --evaluations 10000`,
     `nlp-gait search nao-ssp --algorithm ga --handling penalty --penalty-weight 1 --polish`
     """
-    from compare.study.run_study import Study, run_study
-    from nlp_gait.backends.kernel.compiled import available_cores
-
     spec = problem.spec()
     solver = SolverSpec(name=algorithm, runs=searches.runs, polish=searches.polish)
     tasks = searches.make_study([spec], [solver]).tasks()
@@ -218,8 +214,6 @@ def plan(
     Examples: `nlp-gait plan --robot nao-v5 --steps 10 --speed 0.05 --out walk.json`, then `nlp-gait simulate walk.json` and
     `nlp-gait export walk.json --format csv --period-ms 1`
     """
-    import nlp_gait
-
     target = None if out is None else output_file(out)
     found = nlp_gait.plan_walk(
         robot,

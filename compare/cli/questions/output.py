@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from compare.cli.endings import describe_stored, end_interrupted, fail
 from compare.cli.options import RESULTS
 from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stdout
+from compare.study.store import Store
+from nlp_gait.backends.identity import identify_problem
 from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import defer_interrupts
 
@@ -34,8 +36,6 @@ class Output:
         Raises as ``write``.
         """
         from compare.questions.question import Work
-        from compare.study.store import Store
-        from nlp_gait.backends.identity import identify_problem
 
         findings, stopped, notes = None, "", 0
         with progress_bar(question.counts, question.total) as advance:
