@@ -1,7 +1,5 @@
 """A study as one ZIP file: with everything needed to check and to repeat it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

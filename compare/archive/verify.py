@@ -1,7 +1,5 @@
 """Verification of a study: what holds and what does not, in a folder or in an archive."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -6,8 +6,6 @@ rotated, and with permuted variables. Random search has the same distribution of
 On noise, an objective without information, the final points of an unbiased search are anywhere in the box with equal probability.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

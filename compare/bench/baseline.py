@@ -3,8 +3,6 @@
 A packed record lacks time histories, the dense grid, prices and indexes; ``benchmarks.gaitbench.baseline`` packs them.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import re

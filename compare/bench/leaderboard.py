@@ -1,7 +1,5 @@
 """The leaderboard: ranking of the solvers on the suite, by expected running time and by solved targets, and its page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

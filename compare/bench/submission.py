@@ -1,7 +1,5 @@
 """Submissions to GaitBench: the archive of a bench folder, its verification by the rules of the suite, and pages of all."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

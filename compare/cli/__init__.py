@@ -4,8 +4,6 @@ Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not 
 130 interrupted.
 """
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

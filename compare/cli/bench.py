@@ -1,7 +1,5 @@
 """``nlp-gait bench``."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Literal

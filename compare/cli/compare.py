@@ -1,7 +1,5 @@
 """``nlp-gait compare``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path

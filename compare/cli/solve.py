@@ -1,7 +1,5 @@
 """``nlp-gait solve``, ``nlp-gait search`` and ``nlp-gait plan``."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any

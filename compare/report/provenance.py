@@ -1,7 +1,5 @@
 """Where numbers come from: settings and seeds of solvers, shipped best known values."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from functools import cache

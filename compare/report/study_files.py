@@ -1,7 +1,5 @@
 """Files of a study for other programs and papers: CSV, Parquet, LaTeX tables with booktabs, figures as PDF."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Report of a study from its records, written once or while the study runs."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
