@@ -1,6 +1,6 @@
 """``nlp-gait compare``."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -147,7 +147,7 @@ def run_in_folder(
             return run_study(
                 study,
                 progress=lambda task, r: advance(f"{task.problem.title} {task.title} {r.verdict.objective:.6g}"),
-                on_stored=lambda count: _advance_by(advance, count),
+                on_stored=lambda count: advance("stored", count),
                 on_outdated=say,
             )
         except Interrupted as interrupt:
@@ -164,11 +164,6 @@ def end_if_none_left(records: Sequence[RunRecord]) -> None:
         fail(
             f"without any result: {', '.join(without_result)}; fix the cause, and delete the failed records to run them again"
         )
-
-
-def _advance_by(advance: Callable[[str], None], count: int) -> None:
-    for _ in range(count):
-        advance("stored")
 
 
 def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:

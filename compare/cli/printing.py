@@ -138,8 +138,8 @@ def print_written(*paths: Path) -> None:
 
 
 @contextmanager
-def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str], None]]:
-    """Show progress on stderr, of unknown length if total is None; the yielded function adds one step with a note."""
+def progress_bar(description: str, total: int | None) -> Iterator[Callable[..., None]]:
+    """Show progress on stderr, of unknown length if total is None; the yielded function takes a note, and steps other than 1."""
     if not stderr.is_terminal:
         yield _ProgressLog(description, total)
         return
@@ -153,7 +153,7 @@ def progress_bar(description: str, total: int | None) -> Iterator[Callable[[str]
     )
     with Progress(*columns, console=stderr, transient=True) as progress:
         task = progress.add_task(escape_controls(description), total=total, note="")
-        yield lambda note: progress.update(task, advance=1, note=escape_controls(note))
+        yield lambda note, steps=1: progress.update(task, advance=steps, note=escape_controls(note))
 
 
 class _ProgressLog:
@@ -163,8 +163,8 @@ class _ProgressLog:
         self.description, self.total, self.done = description, total, 0
         self.started = self.reported = time.monotonic()
 
-    def __call__(self, note: str) -> None:
-        self.done += 1
+    def __call__(self, note: str, steps: int = 1) -> None:
+        self.done += steps
         now = time.monotonic()
         if now - self.reported >= LOG_PERIOD_S:
             self.reported = now
