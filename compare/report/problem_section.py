@@ -21,6 +21,21 @@ from nlp_gait.files import make_file_name
 from nlp_gait.formulation.solution import ActiveConstraint
 
 SHOWN_CONSTRAINTS = 15
+# Figures of a problem by name: the function that draws it, and its captions on a page and in a paper.
+FIGURES = {
+    "convergence": (
+        plot_convergence,
+        "Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. Gaps below "
+        f"{100 * SMALLEST_GAP:g} % are drawn at that value: the solvers' tolerances end near it.",
+        "Gap to the best known value over equivalent evaluations, median and range of the runs",
+    ),
+    "runtime": (
+        plot_ecdf,
+        "Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
+        "Share of pairs of run and target solved, 31 targets from 100 % to 1e-4 % above the best known value",
+    ),
+    "final": (plot_final_gaps, "Gap of every run at its end.", "Gap of every run at its end; bars: medians"),
+}
 HOW = Prose(
     "The best gaits of this study have not been simulated in a physics engine. `nlp-gait report DIR --engine` simulates those "
     "that can be (extra `sim`) and adds their energy, fate and rank to this report."
@@ -38,27 +53,15 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
     summaries = summarise(comparison)
     objective = comparison.objective
     stem = make_file_name(comparison.problem)
-    figures = (
+    figures = [
         Figure(
-            name=f"{stem}-convergence",
-            caption="Best so far: bands from best to worst run, lines are medians; a gradient run is a point at its end. "
-            f"Gaps below {100 * SMALLEST_GAP:g} % are drawn at that value: the solvers' tolerances end near it.",
-            drawing=plot_convergence(comparison),
-            data=describe_runs(comparison),
-        ),
-        Figure(
-            name=f"{stem}-runtime",
-            caption="Share of pairs of run and target solved within a cost; 31 targets, 100 % to 1e-4 % above the best known.",
-            drawing=plot_ecdf(comparison),
-            data={"kind": "runtime", "of": f"{stem}-convergence"},
-        ),
-        Figure(
-            name=f"{stem}-final",
-            caption="Gap of every run at its end.",
-            drawing=plot_final_gaps(comparison),
-            data={"kind": "final", "of": f"{stem}-convergence"},
-        ),
-    )
+            name=f"{stem}-{name}",
+            caption=caption,
+            drawing=plot(comparison),
+            data=describe_runs(comparison) if name == "convergence" else {"kind": name, "of": f"{stem}-convergence"},
+        )
+        for name, (plot, caption, _) in FIGURES.items()
+    ]
     gaits = make_gaits_part(comparison)
     published = make_published_rows(comparison)
     return Section(

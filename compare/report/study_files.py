@@ -12,8 +12,8 @@ from compare.analysis.solver_table import summarise
 from compare.analysis.units import heading, join_words, with_unit
 from compare.analysis.verdict import SIGNIFICANT, compare_pairs, find_leaders
 from compare.drawing import PAPER_STYLE
-from compare.drawing.comparison_figures import plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.figures import add_styles, check_style, save_pdf
+from compare.report.problem_section import FIGURES
 from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
 from nlp_gait.errors import MissingExtraError
 from nlp_gait.files import format_csv, make_file_name, replace_file, replace_nan, write_text
@@ -23,17 +23,6 @@ TableRows = Sequence[Sequence[object]]
 
 MEASURED = ("n", "budget", "gap", "equivalent_evaluations")
 COSTS = ("evaluations", "seconds")
-FIGURES = {
-    "convergence": (
-        plot_convergence,
-        "Gap to the best known value over equivalent evaluations, median and range of the runs",
-    ),
-    "runtime": (
-        plot_ecdf,
-        "Share of pairs of run and target solved, 31 targets from 100 % to 1e-4 % above the best known value",
-    ),
-    "final": (plot_final_gaps, "Gap of every run at its end; bars: medians"),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +111,7 @@ def _write_figures(stem: Path, comparison: Comparison, style: Path | None) -> li
     """Write ``<problem>-<figure>.pdf`` for each figure, and ``<problem>-figures.tex`` with their captions."""
     written, text = [], ""
     with add_styles(PAPER_STYLE, *(() if style is None else (style,))):
-        for name, (plot, words) in FIGURES.items():
+        for name, (plot, _, words) in FIGURES.items():
             figure = f"{stem.name}-{name}"
             written.append(save_pdf(plot(comparison, column=True), stem.with_name(f"{figure}.pdf")))
             caption = escape_latex(f"{words}; {comparison.problem}, {describe_run_counts(comparison)}.")
