@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SEARCHES = ("NSGA2", "CMOPSO", "CMOEAD", "DCNSGA3")
 COLUMNS = 3  # of panels in the figure
+SMALL_RINGS: Mapping[str, Any] = {"markersize": 3, "markerfacecolor": "none"}  # markers of points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,17 +175,9 @@ def plot_fronts(results: Sequence[FrontResult]) -> Drawing:
             axes.plot(*load_front(id).front.T, color="black", linewidth=1.0)
             for result in (r for r in results if r.instance == id):
                 look = looks[result.solver]
-                axes.plot(
-                    *result.points.T,
-                    look.marker,
-                    color=look.colour,
-                    markersize=3,
-                    markerfacecolor="none",
-                    label=result.solver,
-                )
+                axes.plot(*result.points.T, look.marker, color=look.colour, label=result.solver, **SMALL_RINGS)
             axes.set_title(id, fontsize="small")
-            axes.set_xlim(-0.05, 1.15)
-            axes.set_ylim(-0.05, 1.15)
+            axes.set(xlim=(-0.05, 1.15), ylim=(-0.05, 1.15))
         for axes in panels[len(instances) :]:
             axes.set_visible(False)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(looks))
