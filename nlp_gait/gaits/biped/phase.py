@@ -83,7 +83,7 @@ class Phase:
             reads_motion = self._reads_motion
             found = self._map_instant(ats, ops, phases)
         else:
-            kinematics = self._write_kinematics(*self._symbolic_plan(ops), traces)
+            kinematics = self._write_kinematics(*self._symbolic_plan(ops), traces, self.moving)
             q, _, _, hip, planned, reach, world, _, *seen = self._map(kinematics, ats)
             n = self.grid.parts + 1
             qd, qdd = self._differences(q, ats[0])
@@ -140,22 +140,15 @@ class Phase:
         if self.derivatives == "finite-difference":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
-        torque, zmp, *wrenches = self._signal_loads.map(n)(q, qd, qdd, hip, world)
         rows = [self.body.joints.index(name) for name in self.moving]
-
-        def full(moved: Any, others: Array) -> Array:
-            values = np.tile(others, (n, 1))
-            values[:, rows] = _numbers(moved)
-            return values
-
-        still_rates = np.zeros(len(self.body.joints))
+        torque, zmp, *wrenches = self._signal_loads.map(n)(q[rows, :], qd[rows, :], qdd[rows, :], hip, world)
         com, left, right, *_ = (_numbers(part) for part in ca.vertsplit(world, 3))
         halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
             "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
-            "q": full(q, self._held),
-            "qd": full(qd, still_rates),
-            "qdd": full(qdd, still_rates),
+            "q": _numbers(q),
+            "qd": _numbers(qd),
+            "qdd": _numbers(qdd),
             "tau": _numbers(torque),
             "zmp": _numbers(zmp),
             "hip": _numbers(hip),
@@ -191,14 +184,8 @@ class Phase:
         return tuple(name for name in self.body.joints if not joints[name].velocity.is_zero())
 
     @cached_property
-    def _held(self) -> Array:
-        """(J,) angles of the joints that do not move, zero for the others [rad]."""
-        still = {name: motion.position for name, motion in self._exact_plan[1].joints.items()}
-        return np.array([0.0 if name in self.moving else float(still[name]) for name in self.body.joints])
-
-    @cached_property
     def _exact_kinematics(self) -> ca.Function:
-        return self._write_kinematics(*self._exact_plan, {})
+        return self._write_kinematics(*self._exact_plan, {}, self.body.joints)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -265,12 +252,12 @@ class Phase:
         torque = ca.vertcat(*(loads.torques[name] for name in self.body.joints))
         outputs = [planned, plan.reach, torque, power, loads.zmp, plan.miss]
         outputs += [loads.wrenches[side] for side in BOTH_FEET] if self._reads_wrenches else []
-        outputs += self._motion(plan) if self._reads_motion else []
+        outputs += _stack_motions(plan, self.moving) if self._reads_motion else []
         outputs += [trace(at, inputs[2]) for trace in self._traces.values()]
         return inputs, outputs
 
     def _write_kinematics(
-        self, inputs: list[SX], plan: Instant, at: InstantPoint, traces: Mapping[str, Trace]
+        self, inputs: list[SX], plan: Instant, at: InstantPoint, traces: Mapping[str, Trace], joints: Sequence[str]
     ) -> ca.Function:
         """One sample: motion, hip, planned angles, reach, world (mass centre, feet, planned wrench, yaw), attitude, traces."""
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
@@ -284,10 +271,7 @@ class Phase:
         world = ca.vertcat(com, *soles, plan.wrench, plan.yaw)
         seen = [trace(at, inputs[2]) for trace in traces.values()]
         known = [plan.hip, planned, plan.reach, world, plan.attitude]
-        return ca.Function("kinematics", inputs, [*self._motion(plan), *known, *seen])
-
-    def _motion(self, plan: Instant) -> list[SX]:
-        return [ca.vertcat(*(plan.joints[name][order] for name in self.moving)) for order in range(3)]
+        return ca.Function("kinematics", inputs, [*_stack_motions(plan, joints), *known, *seen])
 
     @cached_property
     def _dynamics(self) -> ca.Function:
@@ -358,6 +342,10 @@ class Phase:
         rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(at[self.duration], LEAST_DURATION))
         qd = q @ rate
         return qd, qd @ rate
+
+
+def _stack_motions(plan: Instant, joints: Sequence[str]) -> list[SX]:
+    return [ca.vertcat(*(plan.joints[name][order] for name in joints)) for order in range(3)]
 
 
 def _numbers(values: Any) -> Array:
