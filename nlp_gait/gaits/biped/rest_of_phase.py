@@ -189,14 +189,10 @@ def make_rest_of_phase(body: Body, name: PhaseName) -> GaitProblem:
         goal=PlannedEnd(objective=Objective(name="deviation", unit="1"), time=TIMES[name], swings=swings),
         state=_list_state(body, name),
     )
-    planned = tuple(
-        Parameter(name=f"{each}.planned", unit=unit, default=0.0, description="planned value")
-        for each, unit in (
-            (TIMES[name], "s"),
-            *((place, "m") for place in HIP_PLACES),
-            *((rate, "m/s") for rate in HIP_RATES),
-            *((place, "m") for place in FOOT if swings),
-        )
+    planned = (
+        Parameter(name=f"{variable.name}.planned", unit=variable.unit, default=0.0, description="planned value")
+        for variable in phase.variables
+        if variable.name in (TIMES[name], *HIP_PLACES, *HIP_RATES, *FOOT)
     )
     problem = make_phase_problem(f"rest-of-{name}", "rest of a phase from a measured state", phase)
     return replace(problem, own_parameters=(*planned, *phase.parameters))
