@@ -34,6 +34,14 @@ CONDITIONS: Mapping[str, Conditions] = {
     },
 }
 DEFAULT = Feedback()
+STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
+
+
+def scale_strength(feedback: Feedback, factor: float) -> Feedback:
+    """Return the feedback with springs and dampers times a factor."""
+    return replace(feedback, **{name: factor * getattr(feedback, name) for name in STRENGTHS})
+
+
 VARIANTS: Mapping[str, Feedback | None] = {
     "open loop": None,
     "default": DEFAULT,
@@ -41,8 +49,8 @@ VARIANTS: Mapping[str, Feedback | None] = {
     "ideal sensors": replace(DEFAULT.with_noise(0.0), delay_s=0.0),
     "twice the noise": DEFAULT.with_noise(2.0),
     "delay 20 ms": replace(DEFAULT, delay_s=0.02),
-    "half the springs and dampers": DEFAULT.with_strength(0.5),
-    "twice the springs and dampers": DEFAULT.with_strength(2.0),
+    "half the springs and dampers": scale_strength(DEFAULT, 0.5),
+    "twice the springs and dampers": scale_strength(DEFAULT, 2.0),
     "no growth": replace(DEFAULT, growth_per_s=0.0),
     "growth without limit": replace(DEFAULT, growth_limit=1e3),
 }

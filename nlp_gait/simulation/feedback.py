@@ -1,15 +1,13 @@
 """Balance feedback: a virtual spring between the torso and its planned place, with sensor noise and delay."""
 
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import Addresses, Sensing, SensorValues, TorsoSensor, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
-
-STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,10 +34,6 @@ class Feedback(Sensing):
     # at the height of the torso; 0.05 compensates a slope of 3 degrees
     growth_limit: float = 0.05
 
-    def with_strength(self, factor: float) -> Self:
-        """Return the feedback with springs and dampers times a factor."""
-        return replace(self, **{name: factor * getattr(self, name) for name in STRENGTHS})
-
 
 class BalanceController:
     """Controller of one simulation; ``stiffness`` (J,) is that of the drives as their driver assumes it [Nm/rad]."""
@@ -55,16 +49,12 @@ class BalanceController:
         weight, height = plan.robot.mass_kg * plan.gravity, plan.at("hip", np.zeros(1))[0, 2]
         self._most = feedback.growth_limit * weight * np.repeat([1.0, height], 3)
 
-    def shift(self, data: Any) -> Array:
-        """Return the correction of the set-points (J,) [rad]; call it once in each step of the engine."""
+    def correct(self, command: Array, data: Any) -> Array:
+        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
         seen = self._sensor.read(data)
         if seen is not None:
             self._shift = self._torques(seen) / self._stiffness
-        return self._shift
-
-    def correct(self, command: Array, data: Any) -> Array:
-        """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
-        return command + self.shift(data)
+        return command + self._shift
 
     def _torques(self, seen: SensorValues) -> Array:
         """Return the joint torques (J,) of the springs' force and moment [Nm]."""
