@@ -29,7 +29,7 @@ from nlp_gait.gaits.biped.cycle import (
     make_cycle_margins,
 )
 from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, make_state_variables, read_state
-from nlp_gait.gaits.biped.flight import Flight
+from nlp_gait.gaits.biped.footholds import Flight
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
