@@ -37,9 +37,10 @@ from nlp_gait.formulation import (
     Variable,
     maker,
 )
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
-from nlp_gait.gaits.biped.samples import Goal, Samples
+from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.providers import PROBLEMS

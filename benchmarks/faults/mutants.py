@@ -37,7 +37,7 @@ BELONGING: dict[str, tuple[str, ...]] = {
     "nlp_gait/gaits/stairs/planned_motion.py": ("tests/gaits/stairs/test_planned_motion.py",),
     "nlp_gait/gaits/stairs/leg_network.py": ("tests/gaits/stairs/test_leg_network.py",),
     "nlp_gait/gaits/stairs/stair.py": ("tests/gaits/stairs/test_plan.py", "tests/gaits/stairs/test_planned_motion.py"),
-    "nlp_gait/gaits/biped/samples.py": ("tests/gaits/nao/test_motor_model.py",),
+    "nlp_gait/gaits/biped/goals.py": ("tests/gaits/nao/test_motor_model.py",),
     "nlp_gait/gaits/nao/body.py": ("tests/gaits/nao/test_motor_model.py", "tests/gaits/nao/test_golden.py"),
     "nlp_gait/gaits/biped/cycle.py": ("tests/gaits/nao/test_cycle.py",),
     "nlp_gait/gaits/biped/cycle_motion.py": ("tests/gaits/nao/test_cycle.py",),

@@ -14,7 +14,7 @@ from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS, load_baseline
 from compare.drawing.comparison_figures import plot_suite_ecdf
-from compare.report.document import Document, Figure, Section, Table, list_section, text_table
+from compare.report.document import Document, Figure, Section, Table, make_table_section, text_table
 from compare.report.provenance import TERMS
 from compare.report.solver_sections import make_anytime_section, make_tuning_section
 from compare.study.record import RunRecord
@@ -238,7 +238,7 @@ def _make_scores(board: Leaderboard, solver: str) -> tuple[Section, ...]:
         for s in sorted(count_wins(board.comparisons, solver), key=lambda score: board.place(score.other))
     ]
     header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
-    return list_section(
+    return make_table_section(
         f"{solver} against each of the others",
         header,
         rows,

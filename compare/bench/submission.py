@@ -58,11 +58,7 @@ def check_rules(records: Sequence[RunRecord]) -> list[Finding]:
     drawn = {parse_id(r.problem)[1].seed for r in records if is_generated(r.problem)}
     days = set(map(find_test_day, drawn))
     return [
-        Finding(
-            "seeds of runs",
-            equal and enough,
-            f"at least {LEAST_RUNS} runs, 0, 1, ..., as many on each instance",
-        ),
+        Finding("seeds of runs", equal and enough, f"at least {LEAST_RUNS} runs, 0, 1, ..., as many on each instance"),
         Finding("budget", len(budgets) == 1, f"evaluations of a run: {', '.join(map(str, budgets))}"),
         Finding(
             "instances",

@@ -19,7 +19,7 @@ from compare.judge import evaluate as judge
 from compare.rounding import evaluate_rounded
 from compare.study.import_runs import FINALS, read_points
 from nlp_gait.errors import InputError
-from nlp_gait.export.set_points import read_joint_angles
+from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.capabilities import RECORDED_GAITS, resolve

@@ -213,8 +213,8 @@ def _write_film(
     from nlp_gait.simulation.film.recording import record_film
 
     interval_s = film.speed / film.frames_per_s
-    factor = f"{'slow motion' if film.speed < 1.0 else 'fast'}: {film.speed:g} x real time"
-    note = "" if film.speed == 1.0 else factor
+    pace = "slow motion" if film.speed < 1.0 else "fast"
+    note = "" if film.speed == 1.0 else f"{pace}: {film.speed:g} x real time"
     recordings = [record_film(title, plan, player, interval_s) for title, plan, player in gaits]
 
     def with_progress() -> Iterator[Frame]:

@@ -100,7 +100,7 @@ def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: st
     return Table(columns=dict.fromkeys(header, ""), rows=rows, caption=caption, prose=prose)
 
 
-def list_section(
+def make_table_section(
     title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *words: str, prose: bool = False
 ) -> tuple[Section, ...]:
     """Return a section of sentences and a table of texts; none without rows."""

@@ -12,7 +12,7 @@ from compare.analysis.units import BY_UNIT, heading, seconds
 from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.gait_figure import plot_gaits, prepare_gait
-from compare.report.document import Figure, Part, Prose, Section, list_section, text_table
+from compare.report.document import Figure, Part, Prose, Section, make_table_section, text_table
 from compare.report.interactive import describe_gaits, describe_runs
 from compare.study.record import RunRecord, load_gait
 from compare.study.simulations import SimulatedGait
@@ -77,7 +77,7 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
             *engine_section(simulated),
             *_tests(comparison),
             *_binding(comparison),
-            *(() if published is None else list_section("The paper's values and ours", *published)),
+            *(() if published is None else make_table_section("The paper's values and ours", *published)),
             *_failures(comparison),
             *_between(comparison),
         ),
@@ -148,7 +148,7 @@ def _tests(comparison: Comparison) -> tuple[Section, ...]:
         )
         for pair in compare_pairs(comparison)
     ]
-    return list_section(
+    return make_table_section(
         "Significance of differences",
         ("better median < other", "rank-sum p", "signed-rank p", "pairs of runs", "A12"),
         rows,
@@ -180,7 +180,7 @@ def _binding(comparison: Comparison) -> tuple[Section, ...]:
     ]
     left_out = len(record.active_constraints) - len(rows)
     note = f" {left_out} lower ones are omitted." if left_out else ""
-    return list_section(
+    return make_table_section(
         "Active constraints at the optimum",
         ("constraint", "side", "at", "price", "for a step"),
         rows,
@@ -204,7 +204,7 @@ def _failures(comparison: Comparison) -> tuple[Section, ...]:
         if not r.verdict.feasible
     ]
     header = ("solver", "run", "seed", "status", "violated, worst first")
-    return list_section("Runs that ended infeasible or failed", header, rows, prose=True)
+    return make_table_section("Runs that ended infeasible or failed", header, rows, prose=True)
 
 
 def _between(comparison: Comparison) -> tuple[Section, ...]:
@@ -214,7 +214,7 @@ def _between(comparison: Comparison) -> tuple[Section, ...]:
         if r.verdict.feasible and (r.verdict.dense_feasible is False or _proven(r) != "-")
     ]
     header = ("solver", "run", "violated on a dense grid, worst first", "proven at all times")
-    return list_section("Feasible at the samples, not at all times", header, rows, prose=True)
+    return make_table_section("Feasible at the samples, not at all times", header, rows, prose=True)
 
 
 def _proven(record: RunRecord) -> str:

@@ -11,7 +11,7 @@ from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import Tuning, read_tunings
 from compare.analysis.verdict import write_verdict
-from compare.report.document import Document, Section, list_section, text_table
+from compare.report.document import Document, Section, make_table_section, text_table
 from compare.report.problem_section import HOW, problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.solver_sections import make_overview, make_tuning_section
@@ -105,7 +105,7 @@ def _list_excluded(excluded: Sequence[Exclusion]) -> tuple[Section, ...]:
     words = (
         "All numbers of records are evaluated again. These records are no evidence, and nothing below contains them."
     )
-    return list_section("Excluded records", ("record", "reason"), rows, words, prose=True)
+    return make_table_section("Excluded records", ("record", "reason"), rows, words, prose=True)
 
 
 def _describe_counting(comparisons: Sequence[Comparison]) -> tuple[Section, ...]:
@@ -114,7 +114,7 @@ def _describe_counting(comparisons: Sequence[Comparison]) -> tuple[Section, ...]
         (c.problem, *(f"{w:g}" for w in c.weighting.of_kind(n).values()))
         for c, n in zip(comparisons, sizes, strict=True)
     ]
-    return list_section(
+    return make_table_section(
         "Counting",
         ("weight of a call", "f", "g", "gradient", "Jacobian", "Hessian"),
         rows,

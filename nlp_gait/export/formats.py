@@ -9,7 +9,8 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.set_points import COUPLED, make_set_points, to_naoqi, write_motion
+from nlp_gait.export.set_points import COUPLED, make_set_points, to_naoqi
+from nlp_gait.export.webots import write_motion
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
 from nlp_gait.formulation import Result, Signals, sample_signals
 from nlp_gait.formulation.result import SCHEMA, sample_at_period

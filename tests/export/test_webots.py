@@ -7,14 +7,8 @@ from hypothesis import strategies as st
 
 import nlp_gait
 from nlp_gait.errors import InputError
-from nlp_gait.export.set_points import (
-    SetPoints,
-    format_motion,
-    make_set_points,
-    parse_motion,
-    read_motion,
-    write_motion,
-)
+from nlp_gait.export.set_points import SetPoints, make_set_points
+from nlp_gait.export.webots import format_motion, parse_motion, read_motion, write_motion
 from nlp_gait.formulation import Result
 from nlp_gait.robots import load_robot
 

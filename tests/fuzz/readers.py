@@ -21,7 +21,7 @@ from compare.study.settings import FILE, StudySettings, read_manifest, read_sett
 from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
-from nlp_gait.export.set_points import format_motion, parse_motion, read_motion
+from nlp_gait.export.webots import format_motion, parse_motion, read_motion
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import load, load_result
 from nlp_gait.proofs.certificate import check_certificate, read_certificate

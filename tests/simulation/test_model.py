@@ -14,8 +14,9 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import weld
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
-from nlp_gait.simulation.mjcf import Prism, make_plan_model, make_shapes
+from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import Plan
+from nlp_gait.simulation.shapes import Prism, make_shapes
 from nlp_gait.simulation.simulate import Conditions
 
 HEAD_JOINTS = ("HeadYaw", "HeadPitch")

@@ -15,8 +15,9 @@ from nlp_gait.gaits.stairs.planar_biped import MOVING
 from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import Prism, make_plan_model, make_shapes
+from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
+from nlp_gait.simulation.shapes import Prism, make_shapes
 
 pytest.importorskip("mujoco")
 

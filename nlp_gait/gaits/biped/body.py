@@ -16,9 +16,10 @@ from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variab
 from nlp_gait.formulation.assembly import variables
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
+from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.motors import Motors
-from nlp_gait.gaits.biped.samples import BOTH_FEET, HEAT_LOSS, LEAST_DURATION, Instant
+from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import mirror_sign, tree_from

@@ -124,7 +124,7 @@ class Walker:
         first, second = (math.ceil(duration / SAMPLE_S) + 1 for duration in (single, double))
         return np.concatenate([np.linspace(0.0, single, first), np.linspace(single, single + double, second)[1:]])
 
-    def planned_zmp(self, t: Array) -> Array:
+    def plan_zmp(self, t: Array) -> Array:
         """Return the planned ZMP (2, k) at times (k,): the middle of the supporting sole, then straight to the next [m]."""
         left, right = (np.array(self._middle(side)) for side in BOTH_FEET)
         ahead = right + (self.footsteps.step_m, 0.0)
@@ -194,7 +194,7 @@ def plan_cart_table_walk(cycles: RecordedCycles, footsteps: Footsteps) -> Result
     body's ZMP from the planned one. Raises InputError if a foot is out of reach of the hip.
     """
     walker = Walker(cycles=cycles, footsteps=footsteps)
-    planned = walker.planned_zmp
+    planned = walker.plan_zmp
     # A first gait with the cart at the hip gives the place of the mass; the cart is then moved there.
     hip = walker.follow(planned, footsteps.hip_height_m)
     first = sample_finely(walker.make_gait(hip)).arrays

@@ -13,7 +13,7 @@ from casadi import DM, SX, fmax, vertcat, vertsplit
 from nlp_gait.formulation import InstantPoint, Variable
 from nlp_gait.formulation.assembly import variables
 from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, PhaseName, read_duration
-from nlp_gait.gaits.biped.footholds import Flight
+from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.support_phases import swing_foot

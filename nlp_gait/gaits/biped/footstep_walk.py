@@ -16,9 +16,9 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point, Signals
 from nlp_gait.formulation.assembly import Variable, parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
-from nlp_gait.gaits.biped.cycle import STAND, join_phases
 from nlp_gait.gaits.biped.cycle_motion import interpolate_states, make_cycle_variables, make_state_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
+from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase

@@ -23,8 +23,9 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
+from nlp_gait.gaits.biped.goals import HEAT_LOSS, PowerModel
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
-from nlp_gait.gaits.biped.samples import HEAT_LOSS, PowerModel, Samples, time_mean
+from nlp_gait.gaits.biped.samples import Samples, time_mean
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
 from nlp_gait.symbolic.nonsmooth import Nonsmooth

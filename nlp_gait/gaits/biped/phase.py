@@ -14,8 +14,9 @@ from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.formulation.gait_problem import Start
 from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
-from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Goal, Instant, Loader, Planner, Samples, Trace
+from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots.tree import tree_from
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -349,4 +350,4 @@ def _stack_motions(plan: Instant, joints: Sequence[str]) -> list[SX]:
 
 
 def _numbers(values: Any) -> Array:
-    return np.asarray(DM(values).full().T)
+    return np.ascontiguousarray(DM(values).full().T)  # in one order: sums over joints round as those of copies do

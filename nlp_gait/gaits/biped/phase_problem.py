@@ -15,8 +15,8 @@ from nlp_gait.formulation.display import Display, SimulationModel, Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body
+from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.samples import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]

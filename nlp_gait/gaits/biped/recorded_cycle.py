@@ -15,12 +15,13 @@ from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, RecordedMotion, make_instant_function
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Goal, Loader, Planner, Samples
+from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -213,7 +214,7 @@ def make_refinable(
     return refine(1)
 
 
-@lru_cache(maxsize=8)  # as ``make_instant_function``, whose functions have them
+@lru_cache(maxsize=8)  # as many as those of ``make_instant_function``, which finds them again by these loads
 def make_recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
     """Return the loads of both phases for any angles, at which no link stays upright."""
     freed = replace(body, upright=frozenset())

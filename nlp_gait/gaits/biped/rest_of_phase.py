@@ -24,10 +24,11 @@ from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Objective, Par
 from nlp_gait.formulation.assembly import Variable, variables
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
-from nlp_gait.gaits.biped.samples import Goal, Instant, Samples
+from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.biped.support_phases import make_single_support_loads
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, cubic, parabola_lift, stack

@@ -1,4 +1,4 @@
-"""One instant of a biped, which plans return, a phase at its samples, which limits read, and what it minimises of these."""
+"""One instant of a biped, which plans return, and a phase at its samples, which limits and goals read."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import InstantPoint, Objective, Parameter, Point
-from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.formulation import InstantPoint
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 
 BOTH_FEET = {"L": "left", "R": "right"}
@@ -79,60 +79,3 @@ def time_mean(values: MX) -> MX:
     weights = np.full(n, 1.0 / (n - 1))
     weights[[0, -1]] /= 2
     return values @ DM(weights)
-
-
-POWER = Objective(name="power", unit="W")
-HEAT_LOSS = Parameter(
-    name="heat_loss_W_per_Nm2", unit="W/(Nm)^2", default=0.025, description="K, heat loss (eq. 32)", minimum=0.0
-)
-
-# Mean electrical power [W] of samples at a point, under an interpretation of absolute values.
-PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
-
-
-def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
-    """Compute the mean electrical power by the trapezoidal rule [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
-    mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
-    return time_mean(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Goal:
-    """What is minimised: mean power, or another figure of the samples with power as an index."""
-
-    objective: Objective = POWER  # name and unit
-    power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
-    figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
-    reads_motion: bool = False  # whether it reads angles or their derivatives
-    heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
-
-    def evaluate(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
-        """Return the objective, and the indexes before and after those of the limits."""
-        if self.figure is not None:
-            figure = self.figure(samples)
-            return figure, {"power_W": compute_paper_power(at, samples, Exact())}, {self.objective.name: figure}
-        power = self.power(at, samples, ops)
-        more = {} if self.power is compute_paper_power else {"paper_power_W": compute_paper_power(at, samples, Exact())}
-        return power, {"power_W": power}, more
-
-
-def _mean_squared_rate(values: MX, samples: Samples) -> MX:
-    return ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
-
-
-# Goals that replace the power.
-INSTEAD = {
-    "jerk": Goal(
-        objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
-        figure=lambda samples: _mean_squared_rate(samples.qdd, samples),
-        reads_motion=True,
-    ),
-    "torque": Goal(
-        objective=Objective(name="squared_torque", unit="(Nm)^2"),
-        figure=lambda samples: time_mean(ca.sum1(samples.torque**2)),
-    ),
-    "torque-smoothness": Goal(
-        objective=Objective(name="torque_rate", unit="(Nm/s)^2"),
-        figure=lambda samples: _mean_squared_rate(samples.torque, samples),
-    ),
-}

@@ -11,11 +11,12 @@ from casadi import SX
 from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, hip_on_spline
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, FootClearance, Margins, compute_margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Goal, Instant, Loader
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic import trajectories
 from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
@@ -46,7 +47,7 @@ def compute_mean_margins(shares: Point2, length: float, width: float) -> Point2:
 
 
 def limit_to_sole(body: Body, support_xy: Point2, least_m: Point2 = (0.0, 0.0)) -> BalanceMargins:
-    """Return the limit of the ZMP on the left sole, whose ankle is at ``support_xy`` [m], perhaps with least margins."""
+    """Return the limit of the ZMP on the left sole, whose ankle is at ``support_xy``, by default without least margins [m]."""
     means = compute_sole_margins(body.robot.feet["left"])
     return BalanceMargins(body.make_sole_margins(support_xy), means, least_m)
 
@@ -103,7 +104,7 @@ def make_support_phase(
     sharing: LoadSharing | None = None,
     derivatives: Derivatives = "analytic",
 ) -> Phase:
-    """Return a phase with feet ``step_m`` apart; in double support the load is shared.
+    """Return a phase with feet ``step_m`` apart; ``sharing`` is that of double support, None in single support.
 
     Single support is from rest behind the standing foot to rest in front of it, double support from touch-down of the right foot,
     a step ahead of the left one, to lift-off of the left one.

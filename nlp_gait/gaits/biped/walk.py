@@ -19,17 +19,17 @@ from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Gri
 from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, RowsOverTime, parameters
 from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
-from nlp_gait.gaits.biped.cycle import (
+from nlp_gait.gaits.biped.cycle import make_cycle_margins
+from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, make_state_variables, read_state
+from nlp_gait.gaits.biped.flight import Flight
+from nlp_gait.gaits.biped.joined_phases import (
     ENERGY_PER_METRE,
     STAND,
     assemble_part,
     collect_parameters,
     join_phases,
     list_rows_over_time,
-    make_cycle_margins,
 )
-from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, make_state_variables, read_state
-from nlp_gait.gaits.biped.footholds import Flight
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase

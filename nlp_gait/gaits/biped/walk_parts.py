@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -11,8 +12,8 @@ import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
-from nlp_gait.gaits.biped.cycle import STAND
 from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables, make_state_variables
+from nlp_gait.gaits.biped.joined_phases import STAND
 
 CYCLE_END, STAND_AT_END = "cycle_end", "stand_at_end"
 HALF_STEPS = 2  # the first and the last step are half steps
@@ -97,12 +98,18 @@ def make_pose_variables(body: Body) -> list[Variable]:
     return [replace(v, description=v.description.replace("at stand", "standing")) for v in found]
 
 
+@cache
+def _load_start() -> dict[str, float]:
+    """Shares of the bounds' ranges at a walk of NAO."""
+    shares: dict[str, float] = json.loads(files(__package__).joinpath("walk_start.json").read_text(encoding="utf-8"))
+    return shares
+
+
 def start_walk(
     variables: Sequence[Variable], rise: float, parameters: Mapping[str, float], rng: np.random.Generator
 ) -> Array:
     """Draw a start point (n,) near NAO's walk in proportion to the bounds, at the required speed, on ground that may rise."""
-    shares: dict[str, float] = json.loads(files(__package__).joinpath("walk_start.json").read_text(encoding="utf-8"))
-    widths = [variable.upper - variable.lower for variable in variables]
+    shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
     x = {
         variable.name: variable.lower + width * shares.get(EACH_STEP.sub("", variable.name), 0.5)
         for variable, width in zip(variables, widths, strict=True)

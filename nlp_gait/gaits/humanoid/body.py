@@ -13,9 +13,10 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
 from nlp_gait.formulation.assembly import variables
 from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
+from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
 from nlp_gait.gaits.biped.motors import Motors, parse_features
-from nlp_gait.gaits.biped.samples import BOTH_FEET, HEAT_LOSS, Instant
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg

@@ -6,7 +6,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
-from nlp_gait.gaits.biped.footholds import CLEARANCE_M, Flight, parse_footholds
+from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
+from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem

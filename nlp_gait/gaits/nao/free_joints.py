@@ -18,9 +18,10 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, 
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import LIFT, read_duration
 from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.recorded_motion import CORNERS, FreeParts, locate_free_parts
-from nlp_gait.gaits.biped.samples import Goal, Instant, Samples
+from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES

@@ -15,6 +15,7 @@ from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, PhaseTrajectory, Traject
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem
@@ -25,7 +26,6 @@ from nlp_gait.gaits.biped.recorded_cycle import (
     make_refinable,
 )
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, RecordedMotion, make_places_function
-from nlp_gait.gaits.biped.samples import Goal
 from nlp_gait.gaits.biped.support_phases import hip_ends, make_support_phase, place_soles, place_stance
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao

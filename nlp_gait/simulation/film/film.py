@@ -14,7 +14,8 @@ from matplotlib.transforms import IdentityTransform
 
 from nlp_gait.errors import InputError
 from nlp_gait.interrupts import delay_interrupts
-from nlp_gait.simulation.film.recording import Recording, Scene, View, find_stairs
+from nlp_gait.simulation.film.recording import Recording
+from nlp_gait.simulation.film.scene import Scene, View, find_stairs
 from nlp_gait.simulation.film.video import Frame
 
 SMALLEST, LARGEST = (320, 240), (3840, 2160)

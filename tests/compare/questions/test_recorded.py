@@ -11,7 +11,7 @@ from compare.questions import recorded as module
 from compare.questions.recorded import judge_gait
 from nlp_gait import load
 from nlp_gait.export.formats import write_as
-from nlp_gait.export.set_points import read_joint_angles
+from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.nao.problems import make_recorded_gait

@@ -61,7 +61,7 @@ def test_a_course_is_exact_between_its_samples() -> None:
 
 
 def test_the_planned_zmp_goes_from_the_middle_of_one_sole_to_that_of_its_mirror_image() -> None:
-    first, last = walker().planned_zmp(np.array([0.0, STEPS.period_s])).T
+    first, last = walker().plan_zmp(np.array([0.0, STEPS.period_s])).T
     assert last == pytest.approx(first * (1, -1) + (STEPS.step_m, 0), abs=1e-12)
     robot = load_nao("nao-v5")
     foot, ankle = robot.feet["left"], robot.joint("LHipYawPitch").origin_m[1]
@@ -83,7 +83,7 @@ def gait() -> Result:
 @pytest.mark.slow
 def test_the_whole_bodys_zmp_is_near_the_planned_one(gait: Result) -> None:
     arrays = histories(gait)
-    error = np.sqrt(np.mean((arrays["zmp"].T - walker().planned_zmp(arrays["t"])) ** 2, axis=1))
+    error = np.sqrt(np.mean((arrays["zmp"].T - walker().plan_zmp(arrays["t"])) ** 2, axis=1))
     assert (error < 0.3 * FIRST_PASS_M).all()
 
 

@@ -10,8 +10,8 @@ import pytest
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
+from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import share_load
-from nlp_gait.gaits.biped.samples import Goal
 from nlp_gait.gaits.nao.body import GRAVITY, make_nao
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated

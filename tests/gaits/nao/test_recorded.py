@@ -12,7 +12,7 @@ from compare.judge import Evaluation, evaluate
 from nlp_gait import load
 from nlp_gait.errors import GaitError
 from nlp_gait.export.formats import write_as
-from nlp_gait.export.set_points import read_joint_angles
+from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
