@@ -10,16 +10,17 @@ from nlp_gait.gaits.stairs.planned_motion import Posture, StairPlan, StepKind, l
 from nlp_gait.symbolic.trajectories import Motion
 
 _FOOT, _SWING = ("A'S'", "S'T'"), ("HK", "KA", "AS", "ST")
-# Of each joint: its point, the links on the side away from the stance toe, and whether its torque turns these clockwise.
+# Of each joint: its point, the links on the side away from the stance toe, whether its torque turns these clockwise, and the two
+# links between which it is: its rate is the difference of theirs, or their sum for the torso, which turns counter-clockwise.
 JOINT_SIDES = {
-    "ankle'": ("A'", ("K'A'", "HK'", "UH", *_SWING), 1),
-    "knee'": ("K'", ("HK'", "UH", *_SWING), 1),
-    "hip'": ("H", ("UH", *_SWING), -1),
-    "hip": ("H", _SWING, 1),
-    "knee": ("K", ("KA", "AS", "ST"), 1),
-    "ankle": ("A", ("AS", "ST"), 1),
-    "toe": ("S", ("ST",), 1),
-    "toe'": ("S'", ("A'S'", "K'A'", "HK'", "UH", *_SWING), 1),
+    "ankle'": ("A'", ("K'A'", "HK'", "UH", *_SWING), 1, ("K'A'", "A'S'")),
+    "knee'": ("K'", ("HK'", "UH", *_SWING), 1, ("HK'", "K'A'")),
+    "hip'": ("H", ("UH", *_SWING), -1, ("HK'", "UH")),
+    "hip": ("H", _SWING, 1, ("HK", "UH")),
+    "knee": ("K", ("KA", "AS", "ST"), 1, ("KA", "HK")),
+    "ankle": ("A", ("AS", "ST"), 1, ("AS", "KA")),
+    "toe": ("S", ("ST",), 1, ("ST", "AS")),
+    "toe'": ("S'", ("A'S'", "K'A'", "HK'", "UH", *_SWING), 1, ("A'S'", "S'T'")),
 }
 LEAST_ARM = 1.0  # of the force on the rear foot about the centre of pressure of the other one [N m]
 
@@ -42,14 +43,17 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     the forces on them are parallel. In the first step the swing foot carries nothing.
     """
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
-    place, middles = _move_points(Motion(q, v, a), step.stance_ankle)
-    push = {link: biped.rod(link).mass_kg * (middles[link][1] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS}
+    place = biped.points(q, step.stance_ankle.position)
+    middles, accelerations = biped.centres(place), _accelerate_centres(Motion(q, v, a), step.stance_ankle)
+    push = {
+        link: biped.rod(link).mass_kg * (accelerations[link] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS
+    }
     turn = {
         link: biped.rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(biped.LINKS)
     }
     force = sum(push.values(), SX(2, 1))
     load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.toe_foot_biped().mass_kg)
-    points = sum((_moment(middles[link][0], push[link]) for link in biped.LINKS), SX(0))
+    points = sum((_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
     moment = points + sum(turn.values(), SX(0))
 
     sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
@@ -65,10 +69,11 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     share = SX(0) if kind == "first" else double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
 
     torque, rate = [], []
-    for name, (joint, links, sense) in JOINT_SIDES.items():
-        total = sum((_moment(middles[link][0] - place[joint], push[link]) + turn[link] for link in links), SX(0))
+    for joint, links, sense, between in JOINT_SIDES.values():
+        total = sum((_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0))
         torque.append(-sense * (total - share * _moment(back - place[joint], force)))
-        rate.append(_joint_rate(name, v))
+        first, second = (v[biped.LINKS.index(link)] for link in between)
+        rate.append(first + second if "UH" in between else first - second)
     pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, biped.LEAST_LOAD * load)
     behind = heel if kind == "first" else double * rear
     return Balance(
@@ -81,36 +86,15 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     )
 
 
-def _move_points(q: Motion, ankle: Motion) -> tuple[dict[str, SX], dict[str, tuple[SX, SX]]]:
-    """Return places of all points, and places and accelerations of the links' centres."""
-
-    def position(link: str) -> SX:
-        return biped.rod(link).length_m * biped.direction(link, q.position[biped.LINKS.index(link)])
+def _accelerate_centres(q: Motion, ankle: Motion) -> dict[str, SX]:
+    """Return the accelerations (2,) of the links' centres [m/s^2] from angles (9,) and the stance ankle."""
 
     def acceleration(link: str) -> SX:
         angle, rate, change = (part[biped.LINKS.index(link)] for part in q)
         normal = biped.direction(link, angle + ca.pi / 2)
         return biped.rod(link).length_m * (change * normal - rate**2 * biped.direction(link, angle))
 
-    place = biped.sum_along_links("A'", ankle.position, position)
-    pushed = biped.centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
-    return place, {link: (at, pushed[link]) for link, at in biped.centres(place).items()}
-
-
-def _joint_rate(name: str, v: SX) -> SX:
-    """Return the rate of a joint from nine link rates: of the links on both its sides, torso counter-clockwise."""
-    pairs = {
-        "ankle'": ("K'A'", "A'S'"),
-        "knee'": ("HK'", "K'A'"),
-        "hip'": ("HK'", "UH"),
-        "hip": ("HK", "UH"),
-        "knee": ("KA", "HK"),
-        "ankle": ("AS", "KA"),
-        "toe": ("ST", "AS"),
-        "toe'": ("A'S'", "S'T'"),
-    }
-    first, second = (v[biped.LINKS.index(link)] for link in pairs[name])
-    return first + second if "UH" in pairs[name] else first - second
+    return biped.centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
 
 
 def _moment(at: SX, force: SX) -> SX:
