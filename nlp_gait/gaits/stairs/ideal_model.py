@@ -11,15 +11,8 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Assembly, Constraint, Point
 from nlp_gait.formulation.blocks import Layout
-from nlp_gait.gaits.stairs.planar_biped import (
-    JOINT_RATES,
-    MOVING,
-    StanceLoads,
-    link_angles,
-    make_loads,
-    points,
-    toe_foot_biped,
-)
+from nlp_gait.gaits.stairs import planar_biped as biped
+from nlp_gait.gaits.stairs.planar_biped import MOVING, StanceLoads
 from nlp_gait.gaits.stairs.planned_motion import Stair, stair_height
 from nlp_gait.gaits.stairs.stair import SETBACK, grip, knee_limits, read_stair, rows, stance_load, stance_zmp
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -46,7 +39,7 @@ class IdealModel:
         torque, stance, pressure = self._loads(x)
         effort = point["torque_weight"] * ca.sumsqr(torque)
         effort += point["acceleration_weight"] * ca.sumsqr(x["acceleration"])
-        rate = DM(JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
+        rate = DM(biped.JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
         return Assembly(
             objective=step * effort,
             constraints=(
@@ -74,14 +67,14 @@ class IdealModel:
     def _loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
         n = self.intervals
         toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
-        at_intervals = make_loads("T", "S").map(n)
+        at_intervals = biped.make_loads("T", "S").map(n)
         return StanceLoads(*at_intervals(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
 
     @cached_property
     def _instant(self) -> ca.Function:
         """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
-        found = points(link_angles(q), SX(2, 1))
+        found = biped.points(biped.link_angles(q), SX(2, 1))
         toe, sole, ankle, hip = (found[name] for name in "TSAH")
         stair = Stair(size[0], size[1])
         heights = [p[1] - stair_height(p[0], stair, SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
@@ -112,11 +105,11 @@ class IdealModel:
         q = x["angle"]
         swing_toe, _, ankle, hip, heights = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
-        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(toe_foot_biped().foot_m, 0) - size, 1, lift)
+        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.toe_foot_biped().foot_m, 0) - size, 1, lift)
         ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
         flat_at = [0, n]
         if self.ends == "moving":
-            ends[:, 1] = swing_toe[:, n] - ca.vertcat(toe_foot_biped().foot_m, 0) - size
+            ends[:, 1] = swing_toe[:, n] - ca.vertcat(biped.toe_foot_biped().foot_m, 0) - size
             flat_at = [0]
         advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
