@@ -124,14 +124,8 @@ def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     samples = len(signals.arrays["t"])
     if history.shape[1] == len(biped.MOVING):
         history = np.hstack([history, signals.arrays.get("stance_foot", np.zeros((samples, 2)))])
-    q, ankle = SX.sym("q", len(biped.LINKS)), SX.sym("ankle", 2)
-    found = biped.points(q, ankle)
-    function = ca.Function("points", [q, ankle], list(found.values()))
-    base = signals.arrays.get("stance_ankle", np.zeros((samples, 2)))
-    values = dict(zip(found, function.map(samples)(history.T, base.T), strict=True))
-    at = {name: np.array(value.full().T) for name, value in values.items()}
-    tread = parameters["stair_length_m"] / 2
-    rise = tread * parameters["rise_run_ratio"]
+    at = _locate_points(history, signals.arrays.get("stance_ankle", np.zeros((samples, 2))))
+    tread, rise = _stair(parameters)
     first, second = -SETBACK, tread - SETBACK
     edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
     ground = np.array([(x, level * rise) for x, level in edges])
@@ -184,8 +178,8 @@ def make_standing_step(
     torque, stance, pressure = (np.array(part).T for part in found)
     flat = np.zeros((len(t), len(biped.LINKS) - len(biped.MOVING)))
     q, qd, qdd = (np.hstack([part, flat]) for part in (q, qd, qdd))
-    *_, toe_x, sole_x = (np.array(part)[0] for part in _places().map(len(t))(q.T))
-    carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * toe_x + sole[:, 1] * sole_x
+    at = _locate_points(q)
+    carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * at["T"][:, 0] + sole[:, 1] * at["S"][:, 0]
     whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
     tau = joint_torques(torque, _stance_toe_torque(stance[:, 1], pressure[:, 0]))
     return StepMotion(t, q, qd, qdd, tau, carried / whole, double_support_s)
@@ -210,7 +204,7 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
 
 
 def _signals(step: StepMotion, rise: float) -> Signals:
-    hip, ankle, stance_ankle, *_ = (np.array(part).T for part in _places().map(len(step.t))(step.q.T))
+    at = _locate_points(step.q)
     lean = _forward_turns(step.q, 1.0)["UH"]  # from upright, forward
     still = np.zeros_like(lean)
     rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
@@ -226,10 +220,10 @@ def _signals(step: StepMotion, rise: float) -> Signals:
         "qdd": joint_angles(step.qdd, rates=True),
         "tau": step.tau,
         "zmp": np.column_stack([step.pressure, still]),
-        "hip": lift(hip),
+        "hip": lift(at["H"]),
         "attitude": np.column_stack([np.cos(lean / 2), still, np.sin(lean / 2), still]),
-        "left_foot": lift(stance_ankle),
-        "right_foot": lift(ankle),
+        "left_foot": lift(at["A'"]),
+        "right_foot": lift(at["A"]),
         "left_bears": np.ones((len(step.t), 1)),
         "right_bears": rear[:, None].astype(float),
     }
@@ -243,14 +237,16 @@ def _stance_toe_torque(load: Array, pressure: Array) -> Array:
     return np.maximum(load * (pressure - paper.sole_m) - weight, 0.0)
 
 
-def _stair(at: NumericPoint) -> tuple[float, float]:
+def _stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float]:
     """Tread and rise [m]."""
     tread = float(at["stair_length_m"]) / 2
     return tread, tread * float(at["rise_run_ratio"])
 
 
-@cache
-def _places() -> ca.Function:
-    q = SX.sym("q", len(biped.LINKS))
-    found = biped.points(q, SX(2, 1))
-    return ca.Function("places", [q], [found["H"], found["A"], found["A'"], found["T"][0], found["S"][0]])
+def _locate_points(q: Array, stance_ankle: Array | None = None) -> dict[str, Array]:
+    """Return the places (T, 2) of joints and ends by name [m], for angles (T, 9); from the stance ankle, or from its place."""
+    angles, ankle = SX.sym("q", len(biped.LINKS)), SX.sym("ankle", 2)
+    found = biped.points(angles, ankle)
+    base = np.zeros((len(q), 2)) if stance_ankle is None else stance_ankle
+    places = ca.Function("points", [angles, ankle], list(found.values())).map(len(q))(q.T, base.T)
+    return {name: np.array(place.full().T) for name, place in zip(found, places, strict=True)}

@@ -56,7 +56,7 @@ PARTS_AT_START = 10  # of each phase, at which the legs of a start point reach
 # the square of the number of intervals in a phase is kept in reserve [m]: a millimetre on the usual grid.
 SAMPLING_RESERVE = 0.1
 
-PHASE_ENDS = ("", "t1_s", "t2_s", "t_bc_s", "t3_s")  # the step begins at zero
+PHASE_ENDS = ("t1_s", "t2_s", "t_bc_s", "t3_s")
 
 FINE_INTERVALS = 250  # of each phase of a simulated gait
 
@@ -151,16 +151,16 @@ def stairs_plan(
 
 
 def _phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]:
-    """Return the start and end of a phase [s]."""
-    start, end = (values[name] if name else 0.0 for name in PHASE_ENDS[phase : phase + 2])
-    return start, end
+    """Return the start and end of a phase [s]; the step begins at zero."""
+    times = [0.0, *(values[name] for name in PHASE_ENDS)]
+    return times[phase], times[phase + 1]
 
 
 def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: Nonsmooth) -> Assembly:
     """Return the rows of one phase at fractions (1, k) of it; clearance has no reserve for the motion between samples here."""
     grid = grid_at(phase, fractions)
     samples = step.samples(point, ops, grid)
-    start, end = (point[name] if name else MX(0) for name in PHASE_ENDS[phase : phase + 2])
+    start, end = [MX(0), *(point[name] for name in PHASE_ENDS)][phase : phase + 2]
     share = {2: lambda s: GROUND_SHARE + (1 - GROUND_SHARE) * s, 3: lambda s: (1 - GROUND_SHARE) * s}.get(phase)
     clear: tuple[Constraint, ...] = ()
     if share is not None:
@@ -206,7 +206,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     if step.balance == "polygon":
         pressure, rear, front = samples.zmp.T, samples.support[0, :].T, samples.support[1, :].T
     least_clearance = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
-    ends = ca.vertcat(*(point[name] if name else 0 for name in PHASE_ENDS))
+    ends = ca.vertcat(0, *(point[name] for name in PHASE_ENDS))
     durations, least = ends[1:] - ends[:-1], point["least_phase_s"]
     leaning = samples.qd[MOVING.index("K'A'"), 0]
     rest = (stair.rows("rest", leaning, ("K'A'",), "rad/s", 0.1, lower=0.0, upper=0.0),) if step.kind == "first" else ()
@@ -249,7 +249,7 @@ def _start(
         x = np.clip(about + SCATTER * ranges * rng.standard_normal(len(variables)), lower, upper)
         plan = np.concatenate([x[: len(stair.GOVERNING_VARIABLES)], given])
         named = dict(zip(stair.GOVERNING, plan, strict=True))
-        durations = np.diff([0.0, *(named[name] for name in ("t1_s", "t2_s", "t_bc_s", "t3_s"))])
+        durations = np.diff([0.0, *(named[name] for name in PHASE_ENDS)])
         out_of_reach = np.array(reach_function(PARTS_AT_START, kind)(plan, size, margin)) - (1 - margin)
         too_short = parameters["least_phase_s"] - durations
         violation = float(np.maximum(too_short, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum())
