@@ -48,29 +48,6 @@ def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[
     return angles, ca.sumsqr(leg_vector(angles, thigh, shank) - target)  # (eq. 29)
 
 
-def make_training_path(
-    nodes: int, thigh: float, shank: float, poses: int, rate: float, iterations: int, tolerance: float
-) -> ca.Function:
-    """Return the function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
-
-    Each pose starts from the weights of the last one and is trained by gradient steps, at most ``iterations``, until the squared
-    distance of the ankle is within the tolerance [m^2] (Algorithm 1).
-    """
-    weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
-    angles, error = network_error(weights, target, thigh, shank)
-    trained = weights - rate * (error > tolerance) * ca.gradient(error, weights)  # (eq. 30)
-    step = ca.Function("step", [weights, target], [ca.cse(trained)])
-    answer = ca.Function("answer", [weights, target], [angles])
-
-    w, aim = ca.MX.sym("w", 4 * nodes), ca.MX.sym("aim", 2)
-    learned = step.fold(iterations)(w, ca.repmat(aim, 1, iterations))
-    pose = ca.Function("pose", [w, aim], [learned, answer(learned, aim)])
-    first, targets = ca.MX.sym("first", 4 * nodes), ca.MX.sym("targets", 2, poses)
-    _, found = pose.mapaccum(poses)(first, targets)
-    # Trained for given poses: nothing is ever differentiated with respect to them.
-    return ca.Function("path", [first, targets], [found], {"is_diff_in": [False, False]})
-
-
 Rule = Literal["gradient", "adam"]
 # Decay rates of Adam's two moments and its guard against division by zero (Kingma, Ba 2015).
 ADAM_DECAY, ADAM_GUARD = (0.9, 0.999), 1e-8
@@ -122,11 +99,8 @@ class NetworkPath(NamedTuple):
     time_s: Array  # (m,) wall time
 
 
-def network_angles(
-    hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings | None = None
-) -> NetworkPath:
+def network_angles(hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings) -> NetworkPath:
     """Return leg angles along a path (m, 2) from hip to ankle [m] (Algorithm 1); each pose starts from the last one's weights."""
-    settings = settings or NetworkSettings()
     training = _training(settings.hidden, thigh, shank)
     weights = settings.first_weights
     step = _Adam(settings.rate) if settings.rule == "adam" else lambda gradient: settings.rate * gradient
@@ -142,7 +116,7 @@ def network_angles(
     return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def solve_legs_by_network(desired: MX, settings: NetworkSettings = ONLINE) -> MX:
+def solve_legs_by_network(desired: MX, settings: NetworkSettings) -> MX:
     """Replace desired angles and rates (18, m) of thighs and shanks along a path by those of the network.
 
     The network learns the ankle's position relative to the hip; rates follow by differentiating its forward kinematics. It
@@ -158,14 +132,31 @@ def solve_legs_by_network(desired: MX, settings: NetworkSettings = ONLINE) -> MX
         reached = leg_vector(q, *lengths)
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
         rates = ca.Function("rates", [q, velocity], [compute_leg_rates(q, velocity, *lengths)]).map(columns)
-        train = make_training_path(
-            settings.hidden, *lengths, columns, settings.rate, settings.iterations, settings.tolerance_m2
-        )
         targets, velocities = follow(ca.vertcat(*(rows[i] for i in at[:2])), ca.vertcat(*(rows[i] for i in at[2:])))
-        angles = train(DM(settings.first_weights), targets)
+        angles = _make_training_path(settings, *lengths, columns)(DM(settings.first_weights), targets)
         for i, row in zip(at, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):
             rows[i] = row
     return ca.vertcat(*rows)
+
+
+def _make_training_path(settings: NetworkSettings, thigh: float, shank: float, poses: int) -> ca.Function:
+    """Return the function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
+
+    Each pose starts from the weights of the last one and is trained by gradient steps until the ankle is near (Algorithm 1).
+    """
+    weights, target = SX.sym("weights", 4 * settings.hidden), SX.sym("target", 2)
+    angles, error = network_error(weights, target, thigh, shank)
+    trained = weights - settings.rate * (error > settings.tolerance_m2) * ca.gradient(error, weights)  # (eq. 30)
+    step = ca.Function("step", [weights, target], [ca.cse(trained)])
+    answer = ca.Function("answer", [weights, target], [angles])
+
+    w, aim = MX.sym("w", 4 * settings.hidden), MX.sym("aim", 2)
+    learned = step.fold(settings.iterations)(w, ca.repmat(aim, 1, settings.iterations))
+    pose = ca.Function("pose", [w, aim], [learned, answer(learned, aim)])
+    first, targets = MX.sym("first", 4 * settings.hidden), MX.sym("targets", 2, poses)
+    _, found = pose.mapaccum(poses)(first, targets)
+    # Trained for given poses: nothing is ever differentiated with respect to them.
+    return ca.Function("path", [first, targets], [found], {"is_diff_in": [False, False]})
 
 
 @cache
