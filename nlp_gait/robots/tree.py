@@ -278,11 +278,10 @@ def are_mirror_images(
     return near and abs(float((image * axis) @ other_axis)) >= MIRROR_COSINE
 
 
-def mirror_sign(robot: Robot, joint: str, image: str | None = None) -> float:
+def mirror_sign(robot: Robot, joint: str, image: str) -> float:
     """Return +1 if a joint and its image turn the same way in motions mirrored left to right, otherwise -1.
 
-    A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z). Without an image, it is the partner by
-    name. Raises UnknownNameError.
+    A reflection at the plane y = 0 turns an axis (x, y, z) of rotation into (-x, y, -z). Raises UnknownNameError.
     """
-    (x, y, z), other = robot.joint(joint).axis, robot.joint(partner(joint) if image is None else image).axis
+    (x, y, z), other = robot.joint(joint).axis, robot.joint(image).axis
     return 1.0 if -x * other[0] + y * other[1] - z * other[2] > 0.0 else -1.0

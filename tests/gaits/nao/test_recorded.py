@@ -90,7 +90,7 @@ def angles_of(path: Path) -> JointAngles:
 def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     angles = angles_of(written(tmp_path, "nao-ssp"))
     columns = [angles.joints.index(partner(name)) for name in angles.joints]
-    signs = np.array([mirror_sign(ROBOT, name) for name in angles.joints])
+    signs = np.array([mirror_sign(ROBOT, name, partner(name)) for name in angles.joints])
     turned = JointAngles(owner="turned", joints=angles.joints, t=angles.t + 3.0, q=signs * angles.q[:, columns])
     gait, straight = make_recorded_gait(turned), make_recorded_gait(angles)
     assert gait.motion.mirrored and gait.gait == "nao-ssp"
