@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point, Signals
+from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import LIFT, read_duration
 from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
@@ -176,21 +176,13 @@ def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Tra
 
 def fit_joints(trajectory: Trajectory, planned: GaitProblem, x: Array) -> Array:
     """Return the point (n,) of free joints whose motion is nearest to a motion x of ``nao_ssp`` with the same robot and step."""
+    own = x[: sum("[" not in name for name in planned.names)]
+    spans = SPANS[trajectory]
+    if spans == 0:
+        return own
     dense = planned.dense(FIT_FACTOR)
     assert dense is not None  # a phase has one; for the type checker
-    own = x[: sum("[" not in name for name in planned.names)]
-    return np.concatenate([own, fit_coefficients(dense.signals(x), SPANS[trajectory])])
-
-
-def tie_entries(values: MX, ops: Nonsmooth) -> MX:
-    """Return a matrix whose entries are variables of a gradient solver (see ``Nonsmooth.tie``)."""
-    return ca.reshape(ops.tie(ca.vec(values)), *values.shape)
-
-
-def fit_coefficients(signals: Signals, spans: int) -> Array:
-    """Return the coefficients, curve by curve, of the free motion nearest to another, finely sampled one with the same ends."""
-    if spans == 0:
-        return np.zeros(0)
+    signals = dense.signals(x)
     t, q, qd = (signals.arrays[name] for name in ("t", "q", "qd"))
     phases, s = t / t[-1], SX.sym("s")
     start, end, v0, v1 = (SX(DM(row)) for row in (q[0], q[-1], qd[0], qd[-1]))
@@ -198,4 +190,9 @@ def fit_coefficients(signals: Signals, spans: int) -> Array:
     straight = np.array(hermite.map(len(phases))(DM(phases).T).full())
     columns = dict(zip(signals.joints, fit_spline(q - straight.T, spans, phases).T, strict=True))
     columns[YAW_PITCH] = np.mean([columns[name] for name in YAW_PITCHES], axis=0)
-    return np.concatenate([columns[curve] for curve in CURVES])
+    return np.concatenate([own, *(columns[curve] for curve in CURVES)])
+
+
+def tie_entries(values: MX, ops: Nonsmooth) -> MX:
+    """Return a matrix whose entries are variables of a gradient solver (see ``Nonsmooth.tie``)."""
+    return ca.reshape(ops.tie(ca.vec(values)), *values.shape)
