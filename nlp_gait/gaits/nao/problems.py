@@ -256,8 +256,8 @@ def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
     for name in JOINTS:
         if name in columns and not np.isfinite(columns[name]).all():
             raise InputError(f"{angles.owner}: an angle of {name} is missing")
-    held = (np.full(len(angles.t), RESTING_ARM_ANGLES.get(name, 0.0)) for name in JOINTS)
-    q = np.column_stack([columns.get(name, still) for name, still in zip(JOINTS, held, strict=True)])
+    columns |= {name: np.full(len(angles.t), RESTING_ARM_ANGLES[name]) for name in missing}
+    q = np.column_stack([columns[name] for name in JOINTS])
     motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=q, held=tuple(missing))
     heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
     return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
