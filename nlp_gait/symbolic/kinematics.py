@@ -20,7 +20,7 @@ class Pose(NamedTuple):
     com: SX  #: (3,) centre of mass [m]
 
 
-UP = (0.0, 0.0, 1.0)
+FORWARD, TO_THE_LEFT, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)  # axes of the world
 
 
 def axis_rotation(axis: Sequence[float], angle: SX) -> SX:

@@ -21,7 +21,7 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic import general_leg
-from nlp_gait.symbolic.kinematics import UP, axis_rotation, turn_quaternion
+from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT, UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
@@ -31,7 +31,6 @@ HEIGHT_SHARES = (0.5905, 0.95)
 LEAN = ("torso_roll", "torso_pitch")  # lean of the torso: roll to either side, pitch back and forward [rad]
 LARGEST_LEAN = dict(zip(LEAN, (0.15, 0.3), strict=True))
 LARGEST_LEAN_RATE = 1.0  # of NAO's size [rad/s]
-FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 # Nearly all poses are closed to this [1, rad] before the last Newton step, which squares the rest.
 NEARLY_CLOSED, CLOSED, SHARE = 1e-9, 1e-12, 0.995
 MOST_STEPS = 8

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from nlp_gait.errors import InputError
 from nlp_gait.robots import Joint, Robot
 from nlp_gait.robots.robot import Vector
+from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT
 
 LEG_JOINTS = ("HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRoll")
 ARM_JOINTS = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
@@ -33,7 +34,7 @@ RESTING_ARM_ANGLES = HELD_ARM_ANGLES | {
     "RElbowRoll": 0.53,
 }
 
-FORWARD, TO_THE_LEFT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)  # the axis about which each joint must turn
+# The axis about which each joint must turn.
 AXES = dict(zip(LEG_JOINTS, (FORWARD, TO_THE_LEFT, TO_THE_LEFT, TO_THE_LEFT, FORWARD), strict=True))
 
 # Published axes and origins are rounded: 1e-3 rad and 0.1 mm move a foot by less than the 4 mm by which margins reproduce.

@@ -16,21 +16,12 @@ from nlp_gait.gaits.biped.body import Angles, PhaseName, State
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
 from nlp_gait.gaits.nao.body import NaoBody
-from nlp_gait.gaits.nao.joints import (
-    AXIS_TOLERANCE,
-    FORWARD,
-    HELD_ARM_ANGLES,
-    LEG_JOINTS,
-    TO_THE_LEFT,
-    YAW_PITCHES,
-    measure_leg,
-)
+from nlp_gait.gaits.nao.joints import AXIS_TOLERANCE, HELD_ARM_ANGLES, LEG_JOINTS, YAW_PITCHES, measure_leg
 from nlp_gait.robots import Robot
-from nlp_gait.symbolic.kinematics import axis_rotation, leg_angles
+from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT, UP, axis_rotation, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, map_motion, stack
 
-UP = (0.0, 0.0, 1.0)
 LEAN = ("torso_roll", "torso_pitch")
 # A sole turned by this leaves the ground by a tenth of a micrometre: largest error of the closed chain [rad].
 FLAT = 1e-6
