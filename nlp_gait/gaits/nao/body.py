@@ -35,8 +35,9 @@ ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {
     "ssp": dict(zip(SWINGING, ((2.0, 1.0), (-0.42, -0.64), (1.0, 2.0), (0.64, 0.42)), strict=True)),
     "dsp": dict(zip(SWINGING, ((1.0, 1.5), (-0.64, -0.50), (2.0, 1.5), (0.42, 0.50)), strict=True)),
 }
-# Table 3 swings the shoulders about 1.5 rad and the elbows about 0.53 rad, their rolls by 0.22 rad for each rad of the shoulders.
-MIDDLE_SHOULDER, MIDDLE_ELBOW, ELBOW_PER_SHOULDER = 1.5, 0.53, 0.22
+# Of each joint, for each rad of the left shoulder's swing: in Table 3 the elbows' rolls swing by 0.22 rad for each rad of the
+# shoulders. Rolls turn against each other in mirrored motions, so that opposite swings have equal factors.
+PER_SHOULDER = {"LShoulderPitch": 1.0, "RShoulderPitch": -1.0, "LElbowRoll": 0.22, "RElbowRoll": 0.22}
 LARGEST_SWING, LARGEST_RATE = 0.5, 1.0  # [rad], [rad/s]; Table 3 swings the shoulders by 0.5 rad to either side
 # Ankle pitch, least and greatest roll of the left ankle [rad]; straight lines between. The right ankle mirrors it.
 # Source: public MATLAB tables "Nao Parameters v4.0" (there stored under the other side's name; the greatest range is that of
@@ -172,16 +173,10 @@ class NaoBody(Body):
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         """Return the joints of both arms, which swing against each other; elbows bend as their shoulders move."""
         (swing,) = coordinates
-
-        def joint(middle: float, factor: float) -> Motion:
-            return Motion(middle + factor * swing.position, factor * swing.velocity, factor * swing.acceleration)
-
+        middle = nao_joints.RESTING_ARM_ANGLES
         return {
-            "LShoulderPitch": joint(MIDDLE_SHOULDER, 1.0),
-            "RShoulderPitch": joint(MIDDLE_SHOULDER, -1.0),
-            # Rolls turn against each other in mirrored motions, so that opposite swings have equal factors.
-            "LElbowRoll": joint(-MIDDLE_ELBOW, ELBOW_PER_SHOULDER),
-            "RElbowRoll": joint(MIDDLE_ELBOW, ELBOW_PER_SHOULDER),
+            name: Motion(middle[name] + factor * swing.position, factor * swing.velocity, factor * swing.acceleration)
+            for name, factor in PER_SHOULDER.items()
         }
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
