@@ -2,24 +2,29 @@
 
 import math
 from collections.abc import Mapping
-from functools import cache, partial
+from dataclasses import dataclass
+from functools import cache, cached_property
 from math import inf
+from typing import Literal
 
 import casadi as ca
 import numpy as np
-from casadi import SX
+from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError, check_count
-from nlp_gait.formulation import Array, Display, GaitProblem, Grid, NumericPoint, Objective, Signals, SolverHints, maker
-from nlp_gait.formulation.assembly import parameters
+from nlp_gait.formulation import Array, Display, GaitProblem, Grid, Signals, SolverHints, maker
+from nlp_gait.formulation.assembly import Assembly, Constraint, NumericPoint, Objective, Point, parameters
 from nlp_gait.formulation.blocks import Block, Layout
+from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simulation_model, skeleton
-from nlp_gait.gaits.stairs.ideal_model import AXES, Ends, IdealModel
-from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING
-from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture
-from nlp_gait.symbolic.nonsmooth import Exact
+from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING, StanceLoads
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture, stair_height
+from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
+Ends = Literal["rest", "moving"]
+EDGE_WIDTH = 0.012  # of the sigmoid that replaces an edge of the stair [m]
+AXES = ("x", "z")
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
 STEP_TIME = 3.5  # t3, for which the times of the rear foot are given (Table III) [s]
@@ -79,42 +84,108 @@ def stairs_ideal(
     if not 0 < sole_off_s < toe_off_s < STEP_TIME:
         raise InputError(f"times must satisfy 0 < sole_off_s < toe_off_s < {STEP_TIME}, got {sole_off_s}, {toe_off_s}")
     sole_off, toe_off = (max(1, round(time / STEP_TIME * intervals)) for time in (sole_off_s, toe_off_s))
-    layout = _layout(intervals, sole_off, toe_off)
-    model = IdealModel(layout=layout, intervals=intervals, sole_off=sole_off, toe_off=toe_off, ends=ends)
+    step = IdealStep(intervals=intervals, sole_off=sole_off, toe_off=toe_off, ends=ends)
+    model = simulation_model(step.simulate, repeats=ends == "rest")
+    return GaitProblem(
+        name="stairs-ideal",
+        title="Stairs, full trajectory optimisation: least effort",
+        variables=step.layout.variables,
+        own_parameters=PARAMETERS,
+        objective=Objective(name="effort", unit="1"),
+        assemble=step.assemble,
+        grid=Grid(intervals=intervals),
+        display=Display(motion=step.compute_signals, skeleton=skeleton, simulation_model=model),
+        hints=SolverHints(start=step.start, starts=3, searchable=False),
+    )
 
-    def motion(at: NumericPoint) -> Signals:
-        values = layout.values(at.x.full().ravel())
-        step_time = float(at["step_time_s"])
-        loads = model.loads_at(values)
 
-        def repeat_last(columns: Array) -> Array:
-            """Return values of intervals at their first instants; the last instant repeats the last interval."""
-            return np.concatenate([columns, columns[:, -1:]], axis=1).T
+@dataclass(frozen=True, kw_only=True, eq=False)
+class IdealStep:
+    """One step as a trajectory optimisation."""
 
+    intervals: int  # N, equal parts of the step
+    sole_off: int  # number of intervals with load on the rear sole
+    toe_off: int  # number of intervals with load on the rear toe: the double support
+    ends: Ends
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Variables: angles and rates at all instants; accelerations and ground forces constant during an interval."""
+        angles = tuple(stair.ANGLE_LIMITS[link] for link in MOVING)
+        rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
+        accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
+        table = (
+            ("angle", "rad", MOVING, self.intervals + 1, angles, "absolute angle of link"),
+            ("rate", "rad/s", MOVING, self.intervals + 1, rates, "rate of link"),
+            ("acceleration", "rad/s^2", MOVING, self.intervals, accelerations, "acceleration of link"),
+            ("toe_force", "N", AXES, self.toe_off, FORCE_LIMITS, "force of the ground on the rear toe along"),
+            ("sole_force", "N", AXES, self.sole_off, FORCE_LIMITS, "force of the ground on the rear sole along"),
+        )
+        return Layout(
+            blocks=tuple(
+                Block(quantity=quantity, unit=unit, rows=rows, columns=columns, limits=limits, description=description)
+                for quantity, unit, rows, columns, limits, description in table
+            )
+        )
+
+    def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
+        """Return objective and constraints; everything is smooth."""
+        x = self.layout.split(point)
+        step = point["step_time_s"] / self.intervals
+        torque, stance, pressure = self._loads(x)
+        effort = point["torque_weight"] * ca.sumsqr(torque)
+        effort += point["acceleration_weight"] * ca.sumsqr(x["acceleration"])
+        rate = DM(biped.JOINT_RATES) @ (x["rate"][:, 1:] + x["rate"][:, :-1]) / 2
+        return Assembly(
+            objective=step * effort,
+            constraints=(
+                *self._motion(x, step),
+                *self._feet(x, point),
+                stair.grip("friction_toe", x["toe_force"], point["friction"]),
+                stair.grip("friction_sole", x["sole_force"], point["friction"]),
+                stair.grip("friction_stance", stance, point["stance_friction"]),
+                stair.stance_load(point, stance),
+                stair.stance_zmp(point, pressure),
+                stair.knee_limits("knee", x["angle"]),
+            ),
+            indexes={
+                "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
+                "peak_torque_Nm": ca.norm_inf(ca.vec(torque)),
+                "torso_pitch_rad": x["angle"][MOVING.index("UH"), 0],
+            },
+        )
+
+    def compute_signals(self, at: NumericPoint) -> Signals:
+        """Return time histories; values of intervals are those of their first instants, the last instant repeats the last one."""
+        values = self.layout.values(at.x.full().ravel())
+        symbolic = self._loads({name: MX(DM(value)) for name, value in values.items()})
+        intervals = [*(np.array(ca.evalf(part)) for part in symbolic), values["acceleration"]]
+        torque, force, pressure, acceleration = (np.concatenate([part, part[:, -1:]], axis=1).T for part in intervals)
         return Signals(
             joints=JOINTS,
             arrays={
-                "t": np.linspace(0.0, step_time, intervals + 1),
-                **stair.joint_signals(values["angle"].T, values["rate"].T, repeat_last(values["acceleration"])),
-                "tau": repeat_last(loads.torque),
-                "stance_force": repeat_last(loads.stance_force),
-                "zmp": repeat_last(loads.stance_pressure)[:, 0],
+                "t": np.linspace(0.0, float(at["step_time_s"]), self.intervals + 1),
+                **stair.joint_signals(values["angle"].T, values["rate"].T, acceleration),
+                "tau": torque,
+                "stance_force": force,
+                "zmp": pressure[:, 0],
             },
             columns=stair.COLUMNS,
         )
 
-    def step_motion(at: NumericPoint) -> StepMotion:
-        values = layout.values(at.x.full().ravel())
-        step = float(at["step_time_s"]) / intervals
-        per_interval = math.ceil(FINE_INTERVALS / intervals)
-        since = np.tile(np.arange(per_interval) * step / per_interval, intervals)
+    def simulate(self, at: NumericPoint) -> StepMotion:
+        """Return the step on a fine grid, for the engine."""
+        values = self.layout.values(at.x.full().ravel())
+        step = float(at["step_time_s"]) / self.intervals
+        per_interval = math.ceil(FINE_INTERVALS / self.intervals)
+        since = np.tile(np.arange(per_interval) * step / per_interval, self.intervals)
         # The last instant ends the last interval.
-        which = np.append(np.repeat(np.arange(intervals), per_interval), intervals - 1)
+        which = np.append(np.repeat(np.arange(self.intervals), per_interval), self.intervals - 1)
         since = np.append(since, step)[:, None]
         q, qd, qdd = (values[name].T[which] for name in ("angle", "rate", "acceleration"))
 
         def expand_force(name: str) -> Array:
-            force = np.zeros((intervals, 2))
+            force = np.zeros((self.intervals, 2))
             force[: values[name].shape[1]] = values[name].T
             return force[which]
 
@@ -125,65 +196,98 @@ def stairs_ideal(
             qdd,
             expand_force("toe_force"),
             expand_force("sole_force"),
-            toe_off * step,
+            self.toe_off * step,
         )
 
-    return GaitProblem(
-        name="stairs-ideal",
-        title="Stairs, full trajectory optimisation: least effort",
-        variables=layout.variables,
-        own_parameters=PARAMETERS,
-        objective=Objective(name="effort", unit="1"),
-        assemble=model.assemble,
-        grid=Grid(intervals=intervals),
-        display=Display(
-            motion=motion, skeleton=skeleton, simulation_model=simulation_model(step_motion, repeats=ends == "rest")
-        ),
-        hints=SolverHints(start=partial(_start, layout, intervals), starts=3, searchable=False),
-    )
-
-
-def _layout(intervals: int, sole_off: int, toe_off: int) -> Layout:
-    """Return the layout: angles and rates at all instants; accelerations and ground forces constant during an interval."""
-    angles = tuple(stair.ANGLE_LIMITS[link] for link in MOVING)
-    rates = ((-RATE_LIMIT, RATE_LIMIT),) * len(MOVING)
-    accelerations = ((-ACCELERATION_LIMIT, ACCELERATION_LIMIT),) * len(MOVING)
-    table = (
-        ("angle", "rad", MOVING, intervals + 1, angles, "absolute angle of link"),
-        ("rate", "rad/s", MOVING, intervals + 1, rates, "rate of link"),
-        ("acceleration", "rad/s^2", MOVING, intervals, accelerations, "acceleration of link"),
-        ("toe_force", "N", AXES, toe_off, FORCE_LIMITS, "force of the ground on the rear toe along"),
-        ("sole_force", "N", AXES, sole_off, FORCE_LIMITS, "force of the ground on the rear sole along"),
-    )
-    return Layout(
-        blocks=tuple(
-            Block(quantity=quantity, unit=unit, rows=rows, columns=columns, limits=limits, description=description)
-            for quantity, unit, rows, columns, limits, description in table
+    def start(self, values: Mapping[str, float], rng: np.random.Generator) -> Array:
+        """Return planned angles with noise, rates and accelerations by differences, and a part of the load on the rear foot."""
+        tread = values["stair_length_m"] / 2
+        ends = np.array([0.0, *stair.PAPER_TIMES])
+        times = np.linspace(0.0, ends[-1], self.intervals + 1)
+        fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
+        size = np.tile([[tread], [values["rise_run_ratio"] * tread]], self.intervals + 1)
+        angle = np.array(_angles().map(self.intervals + 1)(size, fractions))
+        angle += NOISE * rng.standard_normal(angle.shape)
+        step = values["step_time_s"] / self.intervals
+        rate = np.gradient(angle, step, axis=1)
+        return self.layout.join(
+            {
+                "angle": angle,
+                "rate": rate,
+                "acceleration": np.diff(rate, axis=1) / step,
+                "toe_force": np.tile([[0.0], [TOE_LOAD]], self.toe_off),
+                "sole_force": np.tile([[0.0], [SOLE_LOAD]], self.sole_off),
+            }
         )
-    )
+
+    def _loads(self, x: Mapping[str, MX]) -> StanceLoads[MX]:
+        n = self.intervals
+        toe, sole = (ca.horzcat(x[force], MX(2, n - x[force].shape[1])) for force in ("toe_force", "sole_force"))
+        at_intervals = biped.make_loads("T", "S").map(n)
+        return StanceLoads(*at_intervals(x["angle"][:, :n], x["rate"][:, :n], x["acceleration"], toe, sole))
+
+    @cached_property
+    def _instant(self) -> ca.Function:
+        """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
+        q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
+        found = biped.points(biped.link_angles(q), SX(2, 1))
+        toe, sole, ankle, hip = (found[name] for name in "TSAH")
+        on = Stair(size[0], size[1])
+        heights = [p[1] - stair_height(p[0], on, stair.SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
+        return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
+
+    def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
+        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends if required, and a still torso."""
+        n = self.intervals
+        q, v, a = x["angle"], x["rate"], x["acceleration"]
+        rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
+        angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
+        steps = range(1, n + 1)
+        torso = v[MOVING.index("UH"), 1:n]
+        rest = _equal("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
+        still = _equal("torso_starts_still", v[MOVING.index("UH"), 0], ("UH",), (0,), "rad/s", 1.0)
+        return (
+            _equal("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
+            _equal("angle_continuity", angles, MOVING, steps, "rad", 0.1),
+            rest if self.ends == "rest" else still,
+            _equal("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
+        )
+
+    def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
+        """Return rows of the swing foot's positions and of its height above the stair; one that moves lands on its toe."""
+        n, lift = self.intervals, self.toe_off
+        size = ca.vertcat(*stair.read_stair(point))
+        q = x["angle"]
+        swing_toe, _, ankle, hip, heights = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
+        flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
+        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.toe_foot_biped().foot_m, 0) - size, 1, lift)
+        ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
+        flat_at = [0, n]
+        if self.ends == "moving":
+            ends[:, 1] = swing_toe[:, n] - ca.vertcat(biped.toe_foot_biped().foot_m, 0) - size
+            flat_at = [0]
+        advance = hip[:, n] - hip[:, 0] - size
+        in_support, in_swing = range(lift), range(lift + 1, n + 1)
+
+        def above(name: str, heights: MX, points: tuple[str, ...], instants: range) -> Constraint:
+            return stair.rows(name, heights, points, "m", 0.01, lower=point["clearance_m"], columns=instants)
+
+        return (
+            _equal("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
+            _equal("toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1),
+            _equal("foot_flat", flat[:, flat_at], ("AS", "ST"), tuple(flat_at), "rad", 0.1),
+            _equal("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
+            _equal("hip_advance", advance, AXES, (n,), "m", 0.01),
+            above("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), in_support),
+            above("clearance_in_swing", heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
+        )
 
 
-def _start(layout: Layout, intervals: int, values: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Return planned angles with noise, rates and accelerations by differences, and a share of the weight on the rear foot."""
-    tread = values["stair_length_m"] / 2
-    ends = np.array([0.0, *stair.PAPER_TIMES])
-    times = np.linspace(0.0, ends[-1], intervals + 1)
-    fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
-    size = np.tile([[tread], [values["rise_run_ratio"] * tread]], intervals + 1)
-    angle = np.array(_angles().map(intervals + 1)(size, fractions))
-    angle += NOISE * rng.standard_normal(angle.shape)
-    step = values["step_time_s"] / intervals
-    rate = np.gradient(angle, step, axis=1)
-    blocks = {block.quantity: block for block in layout.blocks}
-    return layout.join(
-        {
-            "angle": angle,
-            "rate": rate,
-            "acceleration": np.diff(rate, axis=1) / step,
-            "toe_force": np.tile([[0.0], [TOE_LOAD]], blocks["toe_force"].columns),
-            "sole_force": np.tile([[0.0], [SOLE_LOAD]], blocks["sole_force"].columns),
-        }
-    )
+def _equal(
+    name: str, value: MX, of: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
+) -> Constraint:
+    """Return rows value == 0."""
+    return stair.rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)
 
 
 @cache
