@@ -1,4 +1,4 @@
-"""A planned step, sampled phase by phase: posture, torques, ground force and clearance."""
+"""A planned step, sampled phase by phase: posture, torques, ground force, balance as the paper checks it, and clearance."""
 
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -9,16 +9,31 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, Point
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, link_angles, make_loads, points
-from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind, posture, stair_height
+from nlp_gait.gaits.stairs import planar_biped as biped
+from nlp_gait.gaits.stairs import planned_motion as planned
+from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
-from nlp_gait.gaits.stairs.support import compute_balance
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.trajectories import Motion
 
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 # Checks of the swing foot against the stair per interval; none while the toe leaves or meets the ground.
 CLEARANCE_DENSITY = 4
 GROUND_SHARE = 0.1
+_SWING = ("HK", "KA", "AS", "ST")
+# Of each joint: its point, the links on the side away from the stance toe, whether its torque turns these clockwise, and the two
+# links between which it is: its rate is the difference of theirs, or their sum for the torso, which turns counter-clockwise.
+JOINT_SIDES = {
+    "ankle'": ("A'", ("K'A'", "HK'", "UH", *_SWING), 1, ("K'A'", "A'S'")),
+    "knee'": ("K'", ("HK'", "UH", *_SWING), 1, ("HK'", "K'A'")),
+    "hip'": ("H", ("UH", *_SWING), -1, ("HK'", "UH")),
+    "hip": ("H", _SWING, 1, ("HK", "UH")),
+    "knee": ("K", ("KA", "AS", "ST"), 1, ("KA", "HK")),
+    "ankle": ("A", ("AS", "ST"), 1, ("AS", "KA")),
+    "toe": ("S", ("ST",), 1, ("ST", "AS")),
+    "toe'": ("S'", ("A'S'", "K'A'", "HK'", "UH", *_SWING), 1, ("A'S'", "S'T'")),
+}
+LEAST_ARM = 1.0  # of the force on the rear foot about the centre of pressure of the other one [N m]
 BalanceRule = Literal["feet", "polygon"]
 """What keeps a planned step upright: ``feet``, the centre of pressure below the stance foot, with a variable share of the load
 on the rear toe; ``polygon``, as printed, the ZMP of (49) in the convex hull of all contact points."""
@@ -89,7 +104,7 @@ class PlannedStep:
 
     def jerk(self, samples: PlanSamples, quantum: MX, *, knots: bool = False) -> MX:
         """Return joint jerk between samples [rad/s^3] as a column, or between phases only, where a jump takes one quantum [s]."""
-        change = DM(JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
+        change = DM(biped.JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
         columns = []
         for k in range(change.shape[1]):
             jump = k + 1 in self._phase_starts
@@ -103,8 +118,7 @@ class PlannedStep:
         return tuple(i * (self.per_phase + 1) for i in range(len(PHASES)))
 
     def _map_samples(self, function: ca.Function, point: Point, s: MX | DM, passing: Array, *more: MX) -> MX:
-        stair = read_stair(point)
-        constants = (collect_governing(point), ca.vertcat(stair.tread, stair.rise), point["reach_margin"], *more)
+        constants = (collect_governing(point), ca.vertcat(*read_stair(point)), point["reach_margin"], *more)
         columns = s.shape[1]
         repeated = (ca.repmat(value, 1, columns) for value in constants)
         return function.map(columns)(s, DM(passing), *repeated)
@@ -133,7 +147,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     inputs, plan, stair, step = _make_symbols(ops, kind)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
-    dynamics = make_loads("T")
+    dynamics = biped.make_loads("T")
     support = ca.dot(plan.durations[:2], s[:2]) / ca.sum1(plan.durations[:2])
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))
@@ -141,7 +155,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     slope = _slope(stair, kind)
     # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
     zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
-    power = torque * (DM(JOINT_RATES) @ step.q.velocity)
+    power = torque * (DM(biped.JOINT_RATES) @ step.q.velocity)
     outputs = _list_outputs(inputs, plan, step, torque, power, stance_force, pressure, zmp, SX(2, 1))
     return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
 
@@ -150,10 +164,73 @@ def balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
     inputs, plan, stair, step = _make_symbols(ops, kind)
     s, passing, *_ = inputs
-    found = compute_balance(step, plan, s, passing, _slope(stair, kind), kind)
-    torque, power, *ground = found
-    outputs = _list_outputs(inputs, plan, step, torque[: len(JOINTS)], power, *ground)
+    torque, power, *ground = compute_balance(step, plan, s, passing, _slope(stair, kind), kind)
+    outputs = _list_outputs(inputs, plan, step, torque[: len(biped.JOINTS)], power, *ground)
     return ca.Function("sample", inputs, ca.cse(outputs))
+
+
+def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: SX, kind: StepKind) -> tuple[SX, ...]:
+    """Return torques, power, forces, ZMP and support at fractions s (4,) of the phases, of which one is ``passing`` (4,).
+
+    Outputs are those of ``PlanSamples``, with torques and power (8,) in the order of ``JOINT_SIDES``; the ZMP is (49) as printed:
+    of point masses, on the virtual slope in all phases.
+
+    Both feet share the load so that the stance foot carries what it can with its centre of pressure between its contact points;
+    the forces on them are parallel. In the first step the swing foot carries nothing.
+    """
+    q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
+    place = biped.points(q, step.stance_ankle.position)
+    middles, accelerations = biped.centres(place), _accelerate_centres(Motion(q, v, a), step.stance_ankle)
+    push = {
+        link: biped.rod(link).mass_kg * (accelerations[link] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS
+    }
+    turn = {
+        link: biped.rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(biped.LINKS)
+    }
+    force = sum(push.values(), SX(2, 1))
+    load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.toe_foot_biped().mass_kg)
+    points = sum((_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
+    moment = points + sum(turn.values(), SX(0))
+
+    sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
+    double = passing[0] + passing[1]
+    rear = rear_toe[0] + passing[0] * (rear_sole[0] - rear_toe[0])
+    heel = SX(0)
+    if kind == "landing":
+        on = planned.landing_share(plan, s)
+        heel = double * ((on > 1) * toe[0] + (on > 0) * (on <= 1) * sole[0])
+    front = ca.fmin(ca.fmax(moment / load, heel), toe[0])
+    back = ca.vertcat(ca.fmin(ca.fmax(moment / load, rear), rear_toe[0]), rear_toe[1])
+    arm = ca.fmin(_moment(back, force) - front * load, -LEAST_ARM)
+    share = SX(0) if kind == "first" else double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
+
+    torque, rate = [], []
+    for joint, links, sense, between in JOINT_SIDES.values():
+        total = sum((_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0))
+        torque.append(-sense * (total - share * _moment(back - place[joint], force)))
+        first, second = (v[biped.LINKS.index(link)] for link in between)
+        rate.append(first + second if "UH" in between else first - second)
+    pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, biped.LEAST_LOAD * load)
+    behind = heel if kind == "first" else double * rear
+    zmp = points / ca.fmax(force[1] - slope * force[0], biped.LEAST_LOAD * load)  # (eq. 49)
+    power = ca.vertcat(*torque) * ca.vertcat(*rate)
+    return ca.vertcat(*torque), power, (1 - share) * force, pressure, zmp, ca.vertcat(behind, toe[0])
+
+
+def _accelerate_centres(q: Motion, ankle: Motion) -> dict[str, SX]:
+    """Return the accelerations (2,) of the links' centres [m/s^2] from angles (9,) and the stance ankle."""
+
+    def acceleration(link: str) -> SX:
+        angle, rate, change = (part[biped.LINKS.index(link)] for part in q)
+        normal = biped.direction(link, angle + ca.pi / 2)
+        return biped.rod(link).length_m * (change * normal - rate**2 * biped.direction(link, angle))
+
+    return biped.centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
+
+
+def _moment(at: SX, force: SX) -> SX:
+    """Moment of a force about the origin, counter-clockwise [N m]."""
+    return at[0] * force[1] - at[1] * force[0]
 
 
 def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) -> list[SX]:
@@ -169,8 +246,10 @@ def _slope(stair: Stair[SX], kind: StepKind) -> SX:
 def clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``balanced_function``."""
     inputs, _, stair, step = _make_symbols(ops, kind)
-    found = points(link_angles(step.q.position), step.stance_ankle.position)
-    heights = [found[name][1] - stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind) for name in "TSA"]
+    found = biped.points(biped.link_angles(step.q.position), step.stance_ankle.position)
+    heights = [
+        found[name][1] - planned.stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind) for name in "TSA"
+    ]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
@@ -192,5 +271,5 @@ def _make_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, 
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = make_stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = posture(plan, stair, s, rates, margin, ops, kind)
+    step = planned.posture(plan, stair, s, rates, margin, ops, kind)
     return [s, passing, values, size, margin], plan, stair, step
