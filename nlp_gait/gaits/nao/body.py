@@ -86,26 +86,6 @@ def find_upright_links(robot: Robot) -> frozenset[str]:
     return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
 
 
-def upright_plan(
-    robot: Robot, hip: Motion, ankles: Mapping[str, Motion], arms: Mapping[str, Motion], margin: SX, ops: Nonsmooth
-) -> Instant:
-    """Return the motion of the whole robot under an upright torso: closed-form legs between the hip and both ankles."""
-    joints: dict[str, Motion] = {}
-    reach = []
-    for side, ankle in ankles.items():
-        geometry = nao_joints.measure_leg(robot, side)
-        (at, *rates), (hip_at, *hip_rates) = ankle, hip
-        moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
-        hip_to_ankle = Motion(at - hip_at - DM(geometry.hip_m), *moving)
-        leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
-        rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
-        joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
-        joints |= {f"{side}{name}": row for name, row in zip(nao_joints.LEG_JOINTS, rows, strict=True)}
-        reach.append(leg.reach)
-    places = {side: ankle.position for side, ankle in ankles.items()}
-    return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=vertcat(*reach))
-
-
 def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:
     """Return the joint motions of both arms: those in ``swing`` as cubics from rest to rest [rad], the others held."""
     still = SX(0)
@@ -180,8 +160,22 @@ class NaoBody(Body):
         }
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
-        arms = {**{name: constant_motion(angle) for name, angle in nao_joints.RESTING_ARM_ANGLES.items()}, **angles}
-        return upright_plan(self.robot, hip, ankles, arms, margin, ops)
+        """Return the motion of the whole robot under an upright torso: closed-form legs between the hip and both ankles."""
+        joints: dict[str, Motion] = {}
+        reach = []
+        for side, ankle in ankles.items():
+            geometry = nao_joints.measure_leg(self.robot, side)
+            (at, *rates), (hip_at, *hip_rates) = ankle, hip
+            moving = (a - b for a, b in zip(rates, hip_rates, strict=True))
+            hip_to_ankle = Motion(at - hip_at - DM(geometry.hip_m), *moving)
+            leg = leg_angles(hip_to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
+            rows = (Motion(*(part[i] for part in leg.joints)) for i in range(len(nao_joints.LEG_JOINTS)))
+            joints |= {f"{side}HipYawPitch": constant_motion(0.0)}
+            joints |= {f"{side}{name}": row for name, row in zip(nao_joints.LEG_JOINTS, rows, strict=True)}
+            reach.append(leg.reach)
+        joints |= {name: constant_motion(angle) for name, angle in nao_joints.RESTING_ARM_ANGLES.items()}
+        places = {side: ankle.position for side, ankle in ankles.items()}
+        return Instant(joints={**joints, **angles}, hip=hip.position, ankles=places, reach=vertcat(*reach))
 
     def compute_cosines(self, q: MX) -> MX:
         return cos(q[[nao_joints.JOINTS.index(knee) for knee in nao_joints.KNEES], :])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.nao.body import load_nao, upright_plan
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joints import ARM_JOINTS
 from nlp_gait.gaits.nao.least_power.world_frame import leg_rates
 from nlp_gait.robots.tree import tree_from
@@ -31,13 +31,14 @@ def moving(name: str, size: int) -> Motion:
 @pytest.mark.parametrize("robot", ["nao-v4", "nao-v6"])
 @pytest.mark.parametrize("share", [1.0, 0.3])
 def test_torques_and_wrench_are_the_recursions(robot: str, share: float) -> None:
-    model = load_nao(robot)
+    body = make_nao(robot)
+    model = body.robot
     hip, swing = moving("hip", 3), moving("swing", 3)
     stance = Motion(SX.sym("stance", 3), SX(3, 1), SX(3, 1))
     arms = {f"{side}{name}": moving(f"{side}{name}", 1) for side in "LR" for name in ARM_JOINTS}
     ankles = {"L": stance, "R": swing}
     tree, shares = tree_from(model, model.feet["left"].link), {model.root: SX(share)}
-    plan = upright_plan(model, hip, ankles, arms, SX(0.01), Exact())
+    plan = body.plan(hip, arms, ankles, SX(0.01), Exact())
     q, qd, qdd = ({name: joint[order] for name, joint in plan.joints.items()} for order in range(3))
     expected = newton_euler(tree, q, qd, qdd, GRAVITY, shares)
     found = world_frame_dynamics(tree, upright_frames(model, hip, ankles, arms), qdd, GRAVITY, shares)

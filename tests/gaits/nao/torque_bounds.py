@@ -18,7 +18,7 @@ from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.gaits.biped.curves import HIP_CURVES, hip_on_spline
 from nlp_gait.gaits.biped.support_phases import place_stance, swing_foot
-from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, find_upright_links, make_nao, upright_plan
+from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, find_upright_links, make_nao
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
 from nlp_gait.proofs.affine import AffineFunction
@@ -47,7 +47,7 @@ def upright_frames(
     arms: Mapping[str, Motion],
     largest_cosine: float = 1.0,
 ) -> dict[str, Frame]:
-    """Return the frames of all links in the motion of ``upright_plan``; see ``leg_frames``."""
+    """Return the frames of all links in the motion that ``NaoBody`` plans; see ``leg_frames``."""
     frames = {robot.root: upright(hip)}
     for side, ankle in ankles.items():
         geometry, pelvis = measure_leg(robot, side), robot.joint(f"{side}HipYawPitch")
@@ -174,7 +174,7 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
         frames = upright_frames(robot, hip, ankles, arms, 1 - REACH_MARGIN)
         torques, wrench = world_frame_dynamics(tree, frames, {}, GRAVITY)
     else:
-        joints = upright_plan(robot, hip, ankles, arms, SX(REACH_MARGIN), Exact()).joints
+        joints = body.plan(hip, arms, ankles, SX(REACH_MARGIN), Exact()).joints
         q, qd, qdd = ({name: joint[order] for name, joint in joints.items()} for order in range(3))
         torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=find_upright_links(robot))
     zmp = zmp_of_wrench(wrench, foot.ankle_height_m, robot.mass_kg * GRAVITY)
