@@ -4,8 +4,6 @@ The logged value is the relative gap to the best known objective, positive if wo
 feasible point. Evaluations are equivalent ones, in which derivatives count as forward differences would.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

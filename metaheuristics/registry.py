@@ -1,7 +1,5 @@
 """Algorithms by name, for command lines and study files."""
 
-from __future__ import annotations
-
 import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping

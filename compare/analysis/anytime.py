@@ -3,8 +3,6 @@
 A problem's budget is the largest number of evaluations that a run with a history took; gradient methods have their end alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

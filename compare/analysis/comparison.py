@@ -1,7 +1,5 @@
 """The runs of all solvers on one problem on a common scale: the basis of tables, figures and verdicts."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Solvers over many problems: mean ranks with Friedman's test and the critical difference, wins against others, the verdict."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A study next to known values: those that papers report, and points better than the shipped best ones, to be contributed."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Tests take costs to be minimised, infinite where a run found nothing feasible.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

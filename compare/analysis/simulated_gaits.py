@@ -1,7 +1,5 @@
 """Agreement of model and physics engine on the energies of gaits: ranks, correlation and errors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The table of solvers: claims, verdicts of the judge, costs, failed runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

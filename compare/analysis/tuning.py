@@ -4,8 +4,6 @@ Each trial runs a search on every training problem, with settings that Optuna's 
 first trial has the search's own. What counts is the area under the convergence curve, see ``compare.analysis.anytime``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tests of all pairs of solvers, and the verdict in three sentences: best known value, median gaps, costs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ A verdict never looks at signs alone: rules such as ``compare_levels`` compare s
 check that decides by other means names them in the claim's ``criterion``.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Runs of a reproduction, stored in its folder, and what its tables need to know about several records."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial

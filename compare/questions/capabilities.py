@@ -1,7 +1,5 @@
 """What a robot can do: its highest walking speed, longest step and highest lift of a foot, and the limits that stop it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar, NamedTuple

@@ -1,7 +1,5 @@
 """Evidence that the best known optimum is the global one: what is proven, and what is only supported."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

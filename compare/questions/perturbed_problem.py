@@ -1,7 +1,5 @@
 """A problem with a perturbed robot or other options: masses, leg lengths and soles are never exactly those of the data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from compare.study.task import ProblemSpec

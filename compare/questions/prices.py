@@ -1,7 +1,5 @@
 """What each limit costs the optimum, and which error of the robot data would change it most, verified by solving again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What the real motors change: the optimum of a NAO phase with one set of their features after another."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass

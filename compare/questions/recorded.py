@@ -1,7 +1,5 @@
 """A gait from elsewhere: its indexes and violations, its simulation, and the optimum of the same step and durations."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass
 from typing import Any

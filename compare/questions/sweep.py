@@ -1,7 +1,5 @@
 """A problem solved over a grid of parameter values or fixed variables."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence

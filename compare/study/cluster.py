@@ -1,7 +1,5 @@
 """Runs on the workers of a Dask scheduler, to which the files of user code are sent."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Settings of a solver with defaults, meaning and source, from its docstring and the ``#:`` comments of its fields."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Results from elsewhere as records of a study: judged like all others; unknown values stay unknown."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict

@@ -3,8 +3,6 @@
 A record that belongs to another definition keeps its content under ``<solver>-<run>.<key>.json``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path

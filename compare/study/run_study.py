@@ -1,7 +1,5 @@
 """A study: solvers x problems x runs, one record for each finished run, in this process, in workers, or on a Dask cluster."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress

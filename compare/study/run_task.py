@@ -1,7 +1,5 @@
 """One run of a solver on a problem: from a task to its record."""
 
-from __future__ import annotations
-
 import json
 import math
 import multiprocessing

@@ -1,7 +1,5 @@
 """Simulations of a study's gaits in the physics engine, stored next to the records."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass

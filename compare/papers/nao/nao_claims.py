@@ -4,8 +4,6 @@ Claims about PSO are checked twice: with the constant inertia weight that the pa
 code that it cites (the id with ``-damped``). Other checks are in ``nao_gait_claims.py``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal

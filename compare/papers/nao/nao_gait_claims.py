@@ -1,7 +1,5 @@
 """Checks of the NAO paper's claims about gaits: values of its solutions, stability, arms, joints, and the simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product

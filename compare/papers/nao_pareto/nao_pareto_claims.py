@@ -1,7 +1,5 @@
 """Runs measured against the true front, and checks of the abstract's claims, by id in ``nao_pareto_claims.toml``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Runs of four searches on the true front of each phase."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

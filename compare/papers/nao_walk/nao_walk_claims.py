@@ -1,7 +1,5 @@
 """Findings about NAO's walk, and checks of the claims of others against them: ``nao_walk_claims.toml`` names them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

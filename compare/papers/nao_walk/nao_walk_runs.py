@@ -1,7 +1,5 @@
 """Runs for the claims: gaits, the energy of each joint in them, softer drives, other heights and heat constants."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

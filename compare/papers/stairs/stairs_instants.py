@@ -1,7 +1,5 @@
 """Algorithm 4 of the stairs paper: an ant colony at every instant, for the gains or the torques that make (53) least there."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass

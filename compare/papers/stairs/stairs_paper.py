@@ -4,8 +4,6 @@ How plans and the tracked step may be read (``stairs_plan_choices.toml``, ``stai
 equations miss.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

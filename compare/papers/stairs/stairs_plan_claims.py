@@ -1,7 +1,5 @@
 """Claims of the stairs paper about plans, and the effects of what it leaves open or is not as printed, from our numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Plans of the stairs paper: its choices one by one, the first step, the reverse double support, and what they cost."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial

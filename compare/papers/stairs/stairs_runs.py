@@ -1,7 +1,5 @@
 """Runs and other computations of the stairs reproduction."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence

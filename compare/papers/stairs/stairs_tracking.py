@@ -1,7 +1,5 @@
 """The tracked step as printed and as ours: each choice by itself, and a search at every instant (Algorithm 4)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

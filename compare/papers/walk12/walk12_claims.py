@@ -1,7 +1,5 @@
 """Checks of the claims of the 12-joint walk's paper: ``walk12_claims.toml`` names them with their arguments."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

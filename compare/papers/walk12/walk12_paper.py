@@ -1,7 +1,5 @@
 """Tables III and IV of Goswami, Vadakkepat, Phung (2008), as printed (``walk12_paper.toml``)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Goswami, Vadakkepat, Phung (2008), reproduced: Tables III and IV, Figs. 8 to 10 and 12 to 17, the trade-off, a circle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources

@@ -1,7 +1,5 @@
 """Runs of the reproduction of the 12-joint walk, and two paths of neighbouring optima."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial

@@ -1,7 +1,5 @@
 """Gaits of the 12-joint walk in MuJoCo: two step times, seven drives, and starts whose joints are slightly off."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec

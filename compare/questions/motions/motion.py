@@ -1,7 +1,5 @@
 """Least power over motions of rising order, with free joints, on a coarse grid, and for other objectives."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

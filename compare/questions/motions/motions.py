@@ -1,7 +1,5 @@
 """What the papers' cubics cost: optima of richer and richer motions, compared in tables, sentences and figures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property

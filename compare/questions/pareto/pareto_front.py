@@ -1,7 +1,5 @@
 """Power against a balance margin or speed: the true front, its knees, and how near evolutionary searches come to it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property

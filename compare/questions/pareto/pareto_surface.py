@@ -1,7 +1,5 @@
 """Three objectives: least power over a grid of demands on two criteria, each point solved from its neighbours."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """Fronts that evolutionary searches find, how near they come to the true front, and whether any of their points betters it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

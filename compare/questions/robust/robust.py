@@ -1,7 +1,5 @@
 """The price of robustness: least power of a gait that keeps its limits for all masses and soles within their tolerances."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import ClassVar, NamedTuple

@@ -9,8 +9,6 @@ Source:
     that is not convex: the corners are evaluated exactly, but it is not proven that the box contains no worse point.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Cheapest walking cycles along an axis, and their simulation in the engine."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """A library of cheapest cycles over a grid, and how good the gaits between its points are."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass

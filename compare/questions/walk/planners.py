@@ -1,7 +1,5 @@
 """Other planners on the footsteps of the cheapest gaits: the textbook's cart-table, and the least squared torques."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """What walking costs: cheapest cycles over the speed or another axis, their simulation, and other planners."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
