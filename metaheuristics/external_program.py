@@ -1,7 +1,5 @@
 """A program in any language as an algorithm: it proposes points and receives their values as lines of JSON."""
 
-from __future__ import annotations
-
 import json
 import math
 import queue
@@ -50,7 +48,7 @@ class ExternalProgram:
     def __post_init__(self) -> None:
         check_number(self, "answer_s", above=0.0)
 
-    def start(self, start: Start) -> _ProgramSearch:
+    def start(self, start: Start) -> "_ProgramSearch":
         """Begin a run; see `Algorithm.start`."""
         return _ProgramSearch(self, start)
 

@@ -5,8 +5,6 @@ marking of failed evaluations, the constraint handling and the record. An algori
 learns from them (`tell`), so an adapter to another package is a small class with these two methods.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -206,7 +204,7 @@ class Algorithm(Protocol):
     def population(self) -> int:
         """Number of starting points."""
 
-    def start(self, start: Start, /) -> Search | CallingSearch:
+    def start(self, start: Start, /) -> "Search | CallingSearch":
         """Begin a run with bounds, starting points, budget and generator."""
 
 

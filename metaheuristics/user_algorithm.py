@@ -1,7 +1,5 @@
 """User code as an algorithm: settings, a class or function that makes them, or a plain function."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
@@ -91,7 +89,7 @@ class PlainFunction:
         """What a tuner may choose, see ``metaheuristics.settings.list_ranges``: the function's own attribute."""
         return getattr(self.function, "ranges", {})
 
-    def start(self, start: Start) -> _FunctionSearch:
+    def start(self, start: Start) -> "_FunctionSearch":
         """Begin a run; see `Algorithm.start`."""
         return _FunctionSearch(self, start)
 

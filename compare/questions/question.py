@@ -3,8 +3,6 @@
 A new question is one file with a subclass of ``Question``, and a command that declares its options.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -84,14 +82,14 @@ class Question(ABC, Generic[F]):
         """
 
     @abstractmethod
-    def report(self, findings: F) -> Answer:
+    def report(self, findings: F) -> "Answer":
         """Return the answer."""
 
     def get_optimum(self, findings: F) -> float | None:
         """Return the objective of the best point found for the problem itself; None if only changed problems are solved."""
         return None
 
-    def add_best_known(self, findings: F) -> Answer:
+    def add_best_known(self, findings: F) -> "Answer":
         """Return the answer with the shipped best known value of the problem and its distance from the optimum found."""
         answer, known = self.report(findings), find_reference(identify_problem(self.problem))
         sentence = describe_value(known, self.get_optimum(findings), self.problem.objective, "the optimum found here")

@@ -3,8 +3,6 @@
 Every point is evaluated again by the exact functions, all points of a problem at once.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter
@@ -125,7 +123,7 @@ def name_record(record: RunRecord) -> str:
     return f"{record.problem}, {record.solver}, run {record.run}"
 
 
-def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: Reasons) -> None:
+def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: "Reasons") -> None:
     """Compare objective, violation, feasibility and indexes with the exact functions at x."""
     identity, described, here = identify_problem(problem), asdict(problem.objective), Origin.make()
     points: dict[int, Array] = {}
@@ -178,7 +176,7 @@ def _check_failed(record: RunRecord) -> Iterator[str]:
         yield "it has a verdict, but no point"
 
 
-def _check_bound(objective: Objective, records: Sequence[RunRecord], reasons: Reasons) -> None:
+def _check_bound(objective: Objective, records: Sequence[RunRecord], reasons: "Reasons") -> None:
     """Find feasible objectives that no feasible point can have."""
     bound = find_reference(records[0].definition["problem"]).bound
     if bound is None:
@@ -190,7 +188,9 @@ def _check_bound(objective: Objective, records: Sequence[RunRecord], reasons: Re
             why.append(f"its objective {verdict.objective:.9g} is better than the proven bound {bound:.9g}")
 
 
-def _check_between_samples(problem: GaitProblem, records: Sequence[RunRecord], reasons: Reasons, scope: Scope) -> None:
+def _check_between_samples(
+    problem: GaitProblem, records: Sequence[RunRecord], reasons: "Reasons", scope: Scope
+) -> None:
     """Judge points again as a run does, with the dense grid and the guarantee: all, or the best one of every solver."""
     chosen = list(range(len(records))) if scope == "all" else []
     if scope == "best":

@@ -1,7 +1,5 @@
 """A study as plain settings (command line, TOML file), and its manifest ``study.json``: settings, commands, machine, versions."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tomllib
@@ -200,7 +198,7 @@ class Session:
     jobs: str  #: worker processes, or the address of the scheduler
 
     @classmethod
-    def begin(cls, command: str, jobs: str) -> Session:
+    def begin(cls, command: str, jobs: str) -> "Session":
         """Return a session that begins now, in this process."""
         return cls(
             command=command,

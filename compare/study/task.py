@@ -1,7 +1,5 @@
 """What to run, as plain data for files and other processes."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import re
@@ -81,7 +79,7 @@ class ProblemSpec:
         """Name in a study."""
         return self.label or (self.address if self.address in PROBLEMS else shorten_name(self.address))
 
-    def with_options(self, **options: str | int | float | bool) -> ProblemSpec:
+    def with_options(self, **options: str | int | float | bool) -> "ProblemSpec":
         """Return a copy with further options."""
         return replace(self, options={**self.options, **options})
 
@@ -137,7 +135,7 @@ class Task:
     run: int = 0  #: number of the run; its seed is ``seed + run``, so that equal runs of all solvers start alike
     label: str = ""  #: of the solver in the study; empty for its name
     polishes: str = ""  #: label of the search whose run of this number gives the start point; empty for a random start
-    polished: Task | None = None  #: that run, if it is known
+    polished: "Task | None" = None  #: that run, if it is known
     #: Values of all variables by name at which an NLP solver starts; empty for a random point
     start: Mapping[str, float] = field(default_factory=dict)
 

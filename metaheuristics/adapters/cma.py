@@ -1,7 +1,5 @@
 """CMA-ES of the package cma (pycma), restarted with a growing population; also with an augmented Lagrangian."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -37,7 +35,7 @@ class CmaEs:
         check_number(self, "sigma", above=0.0)
         check_number(self, "growth", at_least=1.0)
 
-    def start(self, start: Start) -> CmaEsSearch:
+    def start(self, start: Start) -> "CmaEsSearch":
         return CmaEsSearch(self, start)
 
 
@@ -108,7 +106,7 @@ class CmaLagrangian(CmaEs):
 
     name: ClassVar[str] = "cma-al"
 
-    def start(self, start: Start) -> _CmaLagrangianSearch:
+    def start(self, start: Start) -> "_CmaLagrangianSearch":
         return _CmaLagrangianSearch(self, start)
 
 

@@ -1,7 +1,5 @@
 """Bayesian optimisation by the package egobox, for budgets of a few hundred evaluations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -35,7 +33,7 @@ class BayesianOptimisation:
         check_count(self, "population", at_least=3, at_most=MOST)
         check_installed(self.name, "egobox")
 
-    def start(self, start: Start) -> BayesianSearch:
+    def start(self, start: Start) -> "BayesianSearch":
         return BayesianSearch(self, start)
 
 

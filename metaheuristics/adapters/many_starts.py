@@ -1,7 +1,5 @@
 """Local solvers of SciPy, restarted from random points until the budget ends."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -34,7 +32,7 @@ class ScipyStarts:
         check_number(self, "margin", at_least=0.0)
         check_count(self, "iterations", at_least=1)
 
-    def start(self, start: Start) -> _ScipyStartsSearch:
+    def start(self, start: Start) -> "_ScipyStartsSearch":
         return _ScipyStartsSearch(self, start)
 
 

@@ -1,7 +1,5 @@
 """Any population-based algorithm of the package pymoo, and NSGA-II and CMOPSO for several objectives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -85,7 +83,7 @@ class Pymoo(PymooSettings):
         """For example ``"pymoo:GA"``."""
         return f"pymoo:{self.algorithm}"
 
-    def start(self, start: Start) -> PymooSearch:
+    def start(self, start: Start) -> "PymooSearch":
         return PymooSearch(self, start)
 
 
@@ -139,7 +137,7 @@ class MultiObjective(PymooSettings):
         """The algorithm's."""
         return self.algorithm
 
-    def start(self, start: Start, objectives: int) -> _PymooFrontSearch:
+    def start(self, start: Start, objectives: int) -> "_PymooFrontSearch":
         search = self.begin(start, objectives)
         if self.algorithm == "CMOPSO":
             _seed_elites(search)

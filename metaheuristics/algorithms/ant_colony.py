@@ -1,7 +1,5 @@
 """Ant colony optimisation: on continuous variables, with an archive of good points as pheromone, and on a grid of levels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -41,7 +39,7 @@ class AntColony:
         check_count(self, "archive", at_least=2)
         check_number(self, "locality", "spread", above=0.0)
 
-    def start(self, start: Start) -> _AntColonySearch:
+    def start(self, start: Start) -> "_AntColonySearch":
         return _AntColonySearch(self, start)
 
 
@@ -118,7 +116,7 @@ class AntColonyGrid:
         check_count(self, "depositors", at_least=1, at_most=self.population + 1)
         check_number(self, "exploration", at_least=0.0, at_most=1.0)
 
-    def start(self, start: Start) -> _AntColonyGridSearch:
+    def start(self, start: Start) -> "_AntColonyGridSearch":
         return _AntColonyGridSearch(self, start)
 
 

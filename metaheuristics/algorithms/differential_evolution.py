@@ -1,7 +1,5 @@
 """Differential evolution: the classic one, and L-SHADE, which learns its parameters from successes and shrinks its population."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -56,7 +54,7 @@ class DifferentialEvolution:
         check_number(self, "mutation_high", above=0.0, at_most=1.99)
         check_number(self, "recombination", at_least=0.0, at_most=1.0)
 
-    def start(self, start: Start) -> _DifferentialEvolutionSearch:
+    def start(self, start: Start) -> "_DifferentialEvolutionSearch":
         return _DifferentialEvolutionSearch(self, start)
 
 
@@ -150,7 +148,7 @@ class LShade:
         check_number(self, "best", above=0.0, at_most=1.0)
         check_count(self, "memory", at_least=1)
 
-    def start(self, start: Start) -> _LShadeSearch:
+    def start(self, start: Start) -> "_LShadeSearch":
         return _LShadeSearch(self, start)
 
 

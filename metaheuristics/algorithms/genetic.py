@@ -3,8 +3,6 @@
 An operator is a frozen dataclass of settings that draws random numbers; its formula is a pure function of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -172,7 +170,7 @@ class GeneticAlgorithm:
                 raise bad_setting(self, name, "an operator of metaheuristics.algorithms.genetic or alike")
 
     @classmethod
-    def goswami2008(cls) -> GeneticAlgorithm:
+    def goswami2008(cls) -> "GeneticAlgorithm":
         """Give the settings of the 12-link walking paper; 30 epochs after the first population are 930 evaluations.
 
         The paper names neither the size of a tournament nor survival nor elites; 2, generational and 1 are our choice.
@@ -183,7 +181,7 @@ class GeneticAlgorithm:
         crossover, mutation = SinglePoint(probability=0.8), Flip(probability=0.1)
         return cls(population=30, crossover=crossover, mutation=mutation, survival="generational")
 
-    def start(self, start: Start) -> _GeneticSearch:
+    def start(self, start: Start) -> "_GeneticSearch":
         return _GeneticSearch(self, start)
 
 

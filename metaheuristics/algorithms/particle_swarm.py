@@ -1,7 +1,5 @@
 """Particle swarm optimisation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -44,7 +42,7 @@ class ParticleSwarm:
         check_number(self, "inertia", "cognitive", "social", at_least=0.0)
         check_number(self, "inertia_damping", "velocity_limit", above=0.0, at_most=1.0)
 
-    def start(self, start: Start) -> _ParticleSwarmSearch:
+    def start(self, start: Start) -> "_ParticleSwarmSearch":
         return _ParticleSwarmSearch(self, start)
 
 

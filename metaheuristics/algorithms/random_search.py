@@ -1,7 +1,5 @@
 """Random search and Sobol points: the baselines that every other algorithm has to beat."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -22,7 +20,7 @@ class RandomSearch:
     def __post_init__(self) -> None:
         check_count(self, "population", at_least=1)
 
-    def start(self, start: Start) -> _RandomSearchRun:
+    def start(self, start: Start) -> "_RandomSearchRun":
         return _RandomSearchRun(self, start)
 
 
@@ -50,7 +48,7 @@ class SobolPoints:
         check_count(self, "population", at_least=1)
         check_count(self, "batch", at_least=1)
 
-    def start(self, start: Start) -> _SobolRun:
+    def start(self, start: Start) -> "_SobolRun":
         return _SobolRun(self, start)
 
 

@@ -1,7 +1,5 @@
 """C-MOEA/D: decomposition into scalar problems, with constraints."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -51,7 +49,7 @@ class ConstrainedMoead:
         check_number(self, "crossover_index", "mutation_index", at_least=3.0, at_most=30.0)
         check_installed(self.name, "pymoo")
 
-    def start(self, start: Start, objectives: int) -> ConstrainedMoeadSearch:
+    def start(self, start: Start, objectives: int) -> "ConstrainedMoeadSearch":
         return ConstrainedMoeadSearch(self, start, objectives)
 
 

@@ -1,7 +1,5 @@
 """DCNSGA-III: NSGA-III whose constraints tighten as the run proceeds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -43,7 +41,7 @@ class DynamicConstrainedNsga3:
         check_number(self, "crossover_index", "mutation_index", at_least=3.0, at_most=30.0)
         check_installed(self.name, "pymoo")
 
-    def start(self, start: Start, objectives: int) -> _DynamicNsga3Search:
+    def start(self, start: Start, objectives: int) -> "_DynamicNsga3Search":
         return _DynamicNsga3Search(self, start, objectives)
 
 

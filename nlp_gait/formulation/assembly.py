@@ -1,7 +1,5 @@
 """Parts of a problem's mathematics: variables, parameters, symbols of both, constraints, and rows as functions of time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -215,7 +213,7 @@ class PointOf(Generic[Expression]):
     @classmethod
     def of(
         cls, x: Expression, p: Expression, variables: Sequence[str], parameters: Sequence[str]
-    ) -> PointOf[Expression]:
+    ) -> "PointOf[Expression]":
         """Return a point whose entries have these names, in this order."""
         positions: dict[str, tuple[Literal["x", "p"], int]] = {name: ("p", i) for i, name in enumerate(parameters)}
         return cls(x=x, p=p, positions=positions | {name: ("x", i) for i, name in enumerate(variables)})
@@ -227,7 +225,7 @@ class PointOf(Generic[Expression]):
         kind, index = self.positions[name]
         return self.x[index] if kind == "x" else self.p[index]
 
-    def select(self, variables: Sequence[str]) -> PointOf[Expression]:
+    def select(self, variables: Sequence[str]) -> "PointOf[Expression]":
         """Return the point with only these variables in x, in this order; parameters may become variables."""
         own = tuple(name for name, (kind, _) in self.positions.items() if kind == "x")
         if tuple(variables) == own:
@@ -236,7 +234,7 @@ class PointOf(Generic[Expression]):
         taken: dict[str, tuple[Literal["x", "p"], int]] = {name: ("x", i) for i, name in enumerate(variables)}
         return PointOf(x=ca.vertcat(*(self[name] for name in variables)), p=self.p, positions=parameters | taken)
 
-    def extend(self, name: str, value: Expression) -> PointOf[Expression]:
+    def extend(self, name: str, value: Expression) -> "PointOf[Expression]":
         """Return the point with one more variable at the end."""
         positions = {**self.positions, name: ("x", int(self.x.shape[0]))}
         return PointOf(x=ca.vertcat(self.x, value), p=self.p, positions=positions)

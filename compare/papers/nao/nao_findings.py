@@ -1,7 +1,5 @@
 """Findings of the reproduction of the NAO paper: all results, and what tables, figures and claims read from them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -186,7 +184,7 @@ class NaoFindings:
     dsp: PhaseFindings  # double support
     swing: Sequence[FixedOptimum]  # IPOPT's optima of single support over the paper's swing heights
     durations: Sequence[FixedOptimum]  # likewise over durations
-    others: Mapping[str, NaoFindings] = field(default_factory=dict)  # with other choices, by choice
+    others: Mapping[str, "NaoFindings"] = field(default_factory=dict)  # with other choices, by choice
 
     @property
     def phases(self) -> tuple[PhaseFindings, PhaseFindings]:

@@ -3,8 +3,6 @@
 These are Tables 6 to 9, section 5.3 and numbers in the text.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -147,7 +145,7 @@ class NaoEffort(Effort):
         """Phases that the choice changes; both without one."""
         return tuple(p for p in PHASES if not self.choice or p.problem in PAPER.choices[self.choice].phases)
 
-    def choose_other(self, choice: str) -> NaoEffort:
+    def choose_other(self, choice: str) -> "NaoEffort":
         """Return the effort with another choice: all searches, fewer starts of IPOPT and points of its sweeps."""
         fewer = replace(self, variant_runs=min(3, self.variant_runs), starts=min(8, self.starts), sweep_points=(5, 4))
         return replace(fewer, choice=choice, others=(), choices=("v6",), choice_starts=1)

@@ -1,7 +1,5 @@
 """Findings of the reproduced 12-joint walk, and errata: the effect of each misprint or simplification, as a number."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -56,7 +54,7 @@ class Walk12Findings:
         return walk12_runs.find_f1max(self.runs, title_table_3(PAPER, 1.0))
 
     @cached_property
-    def stable(self) -> Sequence[StableShare]:
+    def stable(self) -> Sequence["StableShare"]:
         """When each gait of Table III satisfies (8)."""
         return [compute_stable_share(row.x) for row in TABLE_3]
 

@@ -1,7 +1,5 @@
 """CasADi functions compiled to SIMD code, CasADi's C over lanes, that evaluates batches of rows with threads."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import re
@@ -177,7 +175,7 @@ class CompiledFunction:
         return found[0] if len(found) == 1 else tuple(found)
 
     @lock_casadi
-    def jacobian(self, result: int | str = 0, argument: int | str = 0) -> CompiledFunction:
+    def jacobian(self, result: int | str = 0, argument: int | str = 0) -> "CompiledFunction":
         """Return the compiled derivative of a result by an argument, as a function of the same arguments.
 
         It is (P, m, n) for a vector (m,) by a vector (n,), and (P, n), the gradient, for a scalar. Matrices count column by
@@ -190,7 +188,7 @@ class CompiledFunction:
         derivative = ca.Function(name, symbols, [slope], list(self.argument_names), [name])
         return _compile(derivative, *self._parallelism)
 
-    def __reduce__(self) -> tuple[Callable[..., CompiledFunction], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[Callable[..., "CompiledFunction"], tuple[Any, ...]]:
         return _compile, (self.function, *self._parallelism)
 
     def _check(self, name: str, shape: tuple[int, ...], values: Any) -> tuple[Array, bool]:

@@ -3,8 +3,6 @@
 Rows of a batch are divided among threads where that is worth it; without a compiler CasADi's virtual machine evaluates them.
 """
 
-from __future__ import annotations
-
 import ctypes
 import logging
 import os
@@ -162,7 +160,7 @@ class CompiledObjective:
         problem: GaitProblem,
         evaluator: NativeKernel | InterpretedKernel,
         threads: int,
-        rebuild: Callable[..., CompiledObjective],
+        rebuild: Callable[..., "CompiledObjective"],
     ) -> None:
         """Use ``compile_objective`` instead; ``rebuild`` makes this objective from its problem."""
         kernel = build_kernel(problem)
@@ -210,7 +208,7 @@ class CompiledObjective:
         signed: Array = np.maximum(self._lower - g, g - self._upper) * self._weights
         return signed[:, : len(self.groups)]
 
-    def __reduce__(self) -> tuple[Callable[..., CompiledObjective], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[Callable[..., "CompiledObjective"], tuple[Any, ...]]:
         return self._rebuild, (self.problem,)
 
     def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:

@@ -1,7 +1,5 @@
 """Solve a problem again after its parameters changed, within milliseconds, by sequential quadratic programming."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -59,7 +57,7 @@ def replanner(
     starts: int | None = None,
     seed: int = 0,
     predict: bool = False,
-) -> Replanner:
+) -> "Replanner":
     """Return a solver for one problem with changing parameters; it is built once, and continues from its last optimum.
 
     Args:

@@ -1,7 +1,5 @@
 """IPOPT on a problem's NLP."""
 
-from __future__ import annotations
-
 import logging
 import math
 import re
@@ -99,14 +97,14 @@ class IpoptSettings(Solver):
         if self.linear_solver not in (None, *LINEAR_SOLVERS):
             raise InputError(f"linear_solver must be one of {', '.join(LINEAR_SOLVERS)}, got {self.linear_solver!r}")
 
-    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> IpoptSettings:
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> "IpoptSettings":
         # Whatever is cached: compiled and interpreted functions differ in the last bits, and the same call gives the same result.
         pays = solves * build_nlp(problem).nlp["x"].shape[0] >= WORTHWHILE_SIZE
         compiled = pays if self.compiled is None else self.compiled
         few_rows = compiled if self.few_rows is None else self.few_rows
         return replace(self, hessian=self.hessian or problem.hints.hessian, compiled=compiled, few_rows=few_rows)
 
-    def prepare(self, problem: GaitProblem, solves: int = 1) -> Ipopt:
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> "Ipopt":
         """Return IPOPT for a problem, built once for all its copies; CompilerError if compiled functions are required and fail.
 
         ``solves``, the planned number of solves, decides whether compilation pays if the settings do not.

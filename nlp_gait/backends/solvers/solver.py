@@ -1,7 +1,5 @@
 """The interface of an NLP solver: one run of a problem from one start point; and a callback that ends runs."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time
@@ -43,11 +41,11 @@ class Solver(Protocol):
         """Run warm from the outcome of a neighbouring problem; None if the solver only starts cold."""
         return None
 
-    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> Solver:
+    def choose_settings(self, problem: GaitProblem, solves: int = 1) -> "Solver":
         """Return this solver with all settings that ``prepare`` would choose by the problem and the number of runs."""
         return self
 
-    def prepare(self, problem: GaitProblem, solves: int = 1) -> Solver:
+    def prepare(self, problem: GaitProblem, solves: int = 1) -> "Solver":
         """Return this solver, checked and prepared for a number of runs of a problem and its copies."""
         self.check(problem)
         return self
@@ -94,7 +92,7 @@ def count_evaluations(stats: Mapping[str, Any]) -> Evaluations:
 class IterationWatch(ca.Callback):
     """CasADi's ``iteration_callback``; it does not alter the iterations, and must live as long as its solver."""
 
-    def __init__(self, nlp: Mapping[str, MX], shared: IterationWatch | None = None) -> None:
+    def __init__(self, nlp: Mapping[str, MX], shared: "IterationWatch | None" = None) -> None:
         """Make a watch for an NLP, to which ``begin`` of another watch applies if it is shared."""
         ca.Callback.__init__(self)
         n, m, k = (nlp[name].shape[0] for name in ("x", "g", "p"))

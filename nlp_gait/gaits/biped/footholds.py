@@ -1,7 +1,5 @@
 """Places of both feet along a walk: read from a file or along an arc, seen from the standing foot, and their soles."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -28,7 +26,7 @@ class Foothold(NamedTuple):
     y: float
     yaw: float
 
-    def seen_from(self, stance: Foothold, left: bool, stance_y: float) -> Foothold:
+    def seen_from(self, stance: "Foothold", left: bool, stance_y: float) -> "Foothold":
         """Return it from a standing foot at (0, ``stance_y``) that points forward; mirrored unless that is the left one."""
         x, y = stance._replace(yaw=-stance.yaw).turn(self.x - stance.x, self.y - stance.y)
         sign = 1.0 if left else -1.0

@@ -4,8 +4,6 @@ At a given phase the upper body's pose consists of numbers, so that its wrench i
 summed link by link in the world. The torques equal those of the recursion up to rounding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -30,7 +28,7 @@ ONE, FORWARD = SX(1), DM([1, 0, 0])
 class PowerPhase(NamedTuple):
     """A phase."""
 
-    instant: Callable[[SX, float], PowerInstant]  # makes the sample of z at a phase
+    instant: Callable[[SX, float], "PowerInstant"]  # makes the sample of z at a phase
     # Of the rectangle that must contain the ZMP, in x and in y [m]
     sides: tuple[tuple[float, float], tuple[float, float]]
     margins: Mapping[str, Callable[[SX], SX]]  # balance margins from the ZMP, by axis [m]
