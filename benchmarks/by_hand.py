@@ -13,7 +13,7 @@ from benchmarks.rows import Array
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import TreeBody, tree_from
+from nlp_gait.robots.tree import TreeBody, make_tree
 
 # Gupta, Pratihar, Deb (2023), section 4.1 and Table 3 [m, rad].
 SUPPORT_XY, SWING_X, SWING_Y = (0.06, 0.05), (0.0, 0.12), -0.05
@@ -30,7 +30,7 @@ def pinocchio_model(robot: Robot) -> tuple[pin.Model, list[int]]:
     """Robot on its left foot, and for each of JOINTS its place among the model's coordinates."""
     model, indexes = pin.Model(), {0: 0}
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-    tree = tree_from(robot, robot.feet["left"].link)
+    tree = make_tree(robot, robot.feet["left"].link)
     for i, body in enumerate(tree[1:], start=1):
         axis = body.direction * np.array(body.joint.axis)
         placement = pin.SE3(np.eye(3), np.array(body.offset_m))
@@ -59,7 +59,7 @@ class ByHand:
         self.data = self.model.createData()
         self.phase = np.linspace(0.0, 1.0, 11)
         self.foot = self.robot.feet["left"]
-        self.foot_body = tree_from(self.robot, self.foot.link)[0]
+        self.foot_body = make_tree(self.robot, self.foot.link)[0]
         limits = [self.robot.joint(name).planning_limits_rad for name in JOINTS]
         self.joint_lower, self.joint_upper = np.array(limits).T[:, :, None]
         self.legs = [JOINTS.index(name) for name in PLANNED_JOINTS]

@@ -21,7 +21,7 @@ from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links, load_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.tape import simplify
 
@@ -133,7 +133,7 @@ def _torques(rounds: int, robot: Robot, moving: Sequence[str], upright: Collecti
     parts = [dict(zip(moving, part.elements(), strict=True)) for part in vertsplit(state, n)]
     held = {name: SX(HELD_ARM_ANGLES.get(name, 0.0)) for name in JOINTS}
     still = dict.fromkeys(JOINTS, SX(0))
-    tree = tree_from(robot, robot.feet["left"].link)
+    tree = make_tree(robot, robot.feet["left"].link)
     torque, _ = newton_euler(tree, held | parts[0], still | parts[1], still | parts[2], GRAVITY, upright=upright)
     outputs = simplify([vertcat(*(torque[name] for name in JOINTS))])
     empty = SX.sym("p", 0)

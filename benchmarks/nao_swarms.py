@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 import nlp_gait
-from compare.analysis.record_statistics import rank_sum_normal
+from compare.analysis.record_statistics import approximate_rank_sum
 from metaheuristics import ParticleSwarm, minimize
 from metaheuristics.algorithms import particle_swarm
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
@@ -119,7 +119,7 @@ def main() -> None:
                 with patch.object(particle_swarm, "reflect", keep_velocities):
                     found["velocities kept at a bound"] = run(problem, algorithm)
             for rules, powers in found.items():
-                p = [rank_sum_normal(powers, other).p_two_sided for other in (ours, ga.get(rules, ga["ours"]))]
+                p = [approximate_rank_sum(powers, other).p_two_sided for other in (ours, ga.get(rules, ga["ours"]))]
                 print(f"| {phase} | {rules} | {name} | {np.median(powers):.5f} | {p[0]:.2g} | {p[1]:.2g} |", flush=True)
 
 

@@ -12,7 +12,7 @@ from compare.analysis.comparison import compare_problems
 from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
-from nlp_gait.backends.solve import available_workers
+from nlp_gait.backends.solve import count_workers
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.formulation.solution import Outcome
 
@@ -107,7 +107,7 @@ def expected_times(runs: int) -> list[Row]:
 
 def starts_at_once(rounds: int) -> list[Row]:
     """Twenty starts in one process and in as many as there are processors."""
-    problem, solver, workers = nlp_gait.load("nao-ssp"), IpoptSettings(compiled=True), available_workers()
+    problem, solver, workers = nlp_gait.load("nao-ssp"), IpoptSettings(compiled=True), count_workers()
     times = side_by_side(
         {
             str(count): lambda count=count: nlp_gait.solve(problem, starts=20, solver=solver, workers=count)

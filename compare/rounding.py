@@ -91,7 +91,7 @@ def evaluate_rounded(problem: GaitProblem, printed: Sequence[str]) -> Rounded:
     box, outside = _make_box(problem, printed)
     judged = _Judge(problem, box, outside)
     judged.search()
-    best, worst = min(judged.points, key=_largest), max(judged.points, key=_largest)
+    best, worst = min(judged.points, key=_find_largest), max(judged.points, key=_find_largest)
     costs = [point.values.cost for point in judged.points if math.isfinite(point.values.cost)] or [math.nan]
     sign, enclosed = problem.objective.sign, judged.enclose()
     feasible, how = judged.decide(enclosed)
@@ -169,7 +169,9 @@ class _Judge:
                 for share in SHARES:
                     self.evaluate(origin.x + share * (self.centre + self.half * corner - origin.x))
             known = [point for point in self.points if math.isfinite(point.values.cost)] or self.points
-            found = [choose(known, key=key) for key in (lambda p: p.values.cost, _largest) for choose in (min, max)]
+            found = [
+                choose(known, key=key) for key in (lambda p: p.values.cost, _find_largest) for choose in (min, max)
+            ]
             if all(a is b for a, b in zip(found, starts, strict=True)):
                 return
             starts = found
@@ -236,7 +238,7 @@ def _build_enclosure(problem: GaitProblem) -> AffineFunction:
     return AffineFunction(build_kernel(problem).function)
 
 
-def _largest(point: _Point) -> float:
+def _find_largest(point: _Point) -> float:
     return float(point.excess.max(initial=-np.inf))
 
 

@@ -26,8 +26,8 @@ from nlp_gait.formulation import (
     Point,
     Signals,
     Variable,
+    make_vector_columns,
     maker,
-    vector_columns,
 )
 
 LENGTH, MASS, GRAVITY = 0.4, 1.5, 9.81  # of each link [m], at its end [kg]; [m/s^2]
@@ -83,7 +83,7 @@ def two_link(*, intervals: int = 20, lift_m: float = 0.05) -> GaitProblem:
         both = q.sum(axis=1)
         foot = LENGTH * np.column_stack([np.sin(q[:, 0]) + np.sin(both), -np.cos(q[:, 0]) - np.cos(both)])
         arrays = {"t": t, "q": q, "qd": qd, "tau": tau, "foot": foot}
-        return Signals(joints=JOINTS, arrays=arrays, columns={"foot": vector_columns("m", "xz")})
+        return Signals(joints=JOINTS, arrays=arrays, columns={"foot": make_vector_columns("m", "xz")})
 
     return GaitProblem(
         name="two-link",

@@ -14,8 +14,8 @@ import numpy as np
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import HEADER, format_cells, summarise
 from compare.drawing.comparison_figures import plot_convergence
-from compare.report.document import Document, text_table
-from compare.report.writing import markdown_page
+from compare.report.document import Document, make_text_table
+from compare.report.writing import render_markdown
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Task
 
@@ -65,8 +65,8 @@ class ShrinkingBoxSearch:
 problem, runs = ProblemSpec(name="nao-ssp"), {"shrinking-box": ShrinkingBox(), "pso": "pso", "ipopt": "ipopt"}
 tasks = [Task(problem=problem, solver=algorithm, run=k) for algorithm in runs.values() for k in range(5)]
 (comparison,) = compare_problems(run_study(Study(tasks=tuple(tasks))))
-table = text_table(HEADER, [format_cells(summary, comparison) for summary in summarise(comparison)])
-print(markdown_page(Document(title="A shrinking box", parts=[table])))
+table = make_text_table(HEADER, [format_cells(summary, comparison) for summary in summarise(comparison)])
+print(render_markdown(Document(title="A shrinking box", parts=[table])))
 
 # %%
 # The best gap so far over evaluations and seconds.

@@ -25,7 +25,7 @@ from metaheuristics.interface import (
 )
 from metaheuristics.minimize import minimize
 from metaheuristics.preparation import check_limits
-from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, installed_algorithms
+from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, list_installed_algorithms
 from metaheuristics.settings import tunable
 from metaheuristics.user_algorithm import PlainFunction, as_algorithm
 
@@ -60,7 +60,7 @@ __all__ = [
     "as_algorithm",
     "check_limits",
     "handling",
-    "installed_algorithms",
+    "list_installed_algorithms",
     "minimize",
     "tunable",
 ]

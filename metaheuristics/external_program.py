@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 
 from metaheuristics.errors import SearchError, abbreviate
-from metaheuristics.interface import Array, CallingSearch, Ended, Evaluate, Start, real_array
+from metaheuristics.interface import Array, CallingSearch, Ended, Evaluate, Start, to_real_array
 from metaheuristics.preparation import check_points
 from metaheuristics.settings import check_number
 from metaheuristics.user_algorithm import combine
@@ -137,7 +137,7 @@ class _ProgramSearch(CallingSearch):
         """Return the points (P, n) of a proposal; digits may be rounded beyond a bound."""
         lower, upper = self._start.lower, self._start.upper
         try:
-            points = np.array(real_array(proposal["x"]), ndmin=2)
+            points = np.array(to_real_array(proposal["x"]), ndmin=2)
         except (TypeError, ValueError, OverflowError) as error:
             raise SearchError(f'"x" must be points of {len(lower)} numbers: {error}') from error
         if points.ndim == 2 and points.shape[1] == len(lower):

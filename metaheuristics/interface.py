@@ -17,7 +17,7 @@ Array: TypeAlias = NDArray[np.float64]
 Settings = TypeVar("Settings")
 
 
-def real_array(values: object) -> Array:
+def to_real_array(values: object) -> Array:
     """Return values as doubles, copied only if they are not that already.
 
     Raises:

@@ -112,7 +112,7 @@ def _read_answer(answer: object, count: int) -> tuple[Array, Array]:
     if not isinstance(answer, tuple) or len(answer) != 2:
         raise SearchError(f"{wanted}; it returned {type(answer).__name__}: return a tuple of two arrays")
     try:
-        f, violation = interface.real_array(answer[0]), interface.real_array(answer[1])
+        f, violation = interface.to_real_array(answer[0]), interface.to_real_array(answer[1])
     except (TypeError, ValueError) as error:
         raise SearchError(f"{wanted}; it returned something other than real numbers: {error}") from error
     if f.shape != (count,) or violation.shape != (count,):
@@ -216,7 +216,7 @@ def minimize(
             objective_time_s=record.objective_time_s,
             algorithm=algorithm,
             handling=handling,
-            seed_entropy=preparation.plain_entropy(sequence),
+            seed_entropy=preparation.encode_entropy(sequence),
             seed_spawn_key=tuple(sequence.spawn_key),
         )
 

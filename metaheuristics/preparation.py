@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from metaheuristics.errors import SearchError, abbreviate
-from metaheuristics.interface import Algorithm, Array, Bounded, Constraints, Start, real_array
+from metaheuristics.interface import Algorithm, Array, Bounded, Constraints, Start, to_real_array
 from metaheuristics.settings import is_number
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
@@ -31,7 +31,7 @@ def prepare_start(
     return Start(
         lower=lower,
         upper=upper,
-        initial=starting_points(lower, upper, population, initial, first),
+        initial=draw_starting_points(lower, upper, population, initial, first),
         evaluations=evaluations,
         rng=np.random.default_rng(second),
         constraints=Constraints(inequalities=values, groups=tuple(groups)) if callable(values) and groups else None,
@@ -48,7 +48,7 @@ def read_bounds(objective: Bounded) -> tuple[Array, Array]:
     except TypeError:
         raise SearchError(f"names must be one for each variable, got {abbreviate(objective.names)}") from None
     try:
-        lower, upper = np.array(real_array(objective.lower)), np.array(real_array(objective.upper))
+        lower, upper = np.array(to_real_array(objective.lower)), np.array(to_real_array(objective.upper))
     except (TypeError, ValueError) as error:
         raise SearchError(f"bounds must be numbers: {error}") from error
     if not names or lower.shape != (len(names),) or upper.shape != (len(names),):
@@ -158,7 +158,7 @@ def name_of(algorithm: Algorithm) -> str:
 def check_points(asked: object, lower: Array, upper: Array, source: str = "ask") -> Array:
     """Return the points (P, n) of a source; SearchError for another shape, no point, NaN, or a point outside the bounds."""
     try:
-        points = real_array(asked)
+        points = to_real_array(asked)
     except (TypeError, ValueError) as error:
         raise SearchError(
             f"{source} must return points (P, {len(lower)}); it returned something other than numbers: {error}"
@@ -191,13 +191,13 @@ def seed_sequence(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
     return np.random.SeedSequence(int(seed))
 
 
-def plain_entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
+def encode_entropy(sequence: np.random.SeedSequence) -> int | tuple[int, ...]:
     """Return the entropy of a seed as plain data."""
     parts: list[int] | int = np.asarray(sequence.entropy, dtype=object).tolist()
     return tuple(map(int, parts)) if isinstance(parts, list) else int(parts)
 
 
-def starting_points(
+def draw_starting_points(
     lower: Array, upper: Array, population: int, given: ArrayLike | None, seed: np.random.SeedSequence
 ) -> Array:
     """Return uniform points (P, n), read-only, of which given ones (R, n) replace the first R.
@@ -211,7 +211,7 @@ def starting_points(
     points = np.clip(lower + draws * (upper - lower), lower, upper)
     if given is not None:
         try:
-            rows = np.array(real_array(given))
+            rows = np.array(to_real_array(given))
         except (TypeError, ValueError, OverflowError) as error:
             raise SearchError(f"initial must be rows of numbers, got {abbreviate(given)}: {error}") from error
         if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:

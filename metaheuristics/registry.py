@@ -67,16 +67,16 @@ def algorithm(name: str, /, **settings: object) -> Algorithm:
             package that it comes from is not installed.
     """
     if isinstance(name, str) and name in ADAPTERS:
-        check_installed(name, _package(name))
+        check_installed(name, _find_package(name))
     return make_by_name("algorithm", name, {**ALGORITHMS, **ADAPTERS}, settings)
 
 
-def installed_algorithms() -> tuple[str, ...]:
+def list_installed_algorithms() -> tuple[str, ...]:
     """Names of the algorithms that can run here: this package's own, and those whose package is installed."""
-    return (*ALGORITHMS, *(name for name in ADAPTERS if is_installed(_package(name))))
+    return (*ALGORITHMS, *(name for name in ADAPTERS if is_installed(_find_package(name))))
 
 
-def _package(name: str) -> str:
+def _find_package(name: str) -> str:
     return PACKAGES.get(name, name.partition(":")[0])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import Algorithm, Array, CallingSearch, Evaluate, Rule, Start, real_array
+from metaheuristics.interface import Algorithm, Array, CallingSearch, Evaluate, Rule, Start, to_real_array
 from metaheuristics.preparation import check_population
 
 ARGUMENTS = ("f", "lower", "upper", "evaluations", "seed")
@@ -119,7 +119,7 @@ class _FunctionSearch(CallingSearch):
 
         def f(x: Any) -> Any:
             try:
-                points = real_array(x)
+                points = to_real_array(x)
             except (TypeError, ValueError) as error:
                 raise SearchError(f"f was called with something other than numbers: {error}") from error
             if points.ndim not in (1, 2) or points.shape[-1] != n or not points.size:

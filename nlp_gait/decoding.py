@@ -38,7 +38,7 @@ def decode(
     if not isinstance(raw, Mapping):
         raise ValueError(f"{where or 'it'} must be an object, got {format_value(raw)}")
     values = dict(given or {})
-    known = {name: field for name, field in _fields(cls).items() if name not in values}
+    known = {name: field for name, field in _list_fields(cls).items() if name not in values}
     for name, (kind, needed) in known.items():
         place = f"{where}.{name}" if where else name
         if name in raw:
@@ -60,7 +60,7 @@ def read_dataclass(cls: Callable[..., T], path: Path, what: str, *, error: type[
 
 
 @cache
-def _fields(cls: Any) -> dict[str, tuple[Any, bool]]:
+def _list_fields(cls: Any) -> dict[str, tuple[Any, bool]]:
     hints = get_type_hints(cls)
     return {f.name: (hints[f.name], f.default is MISSING and f.default_factory is MISSING) for f in fields(cls)}
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.budgets.opponents import LARGEST, OPPONENTS, TARGETS
-from compare.analysis.record_statistics import Curve, Weighting, expected_running_time, make_curve
-from compare.drawing.figures import assign_looks, new_figure, save, style, use_log_axes
+from compare.analysis.record_statistics import Curve, Weighting, compute_running_time, make_curve
+from compare.drawing.figures import assign_looks, make_figure, save, use_log_axes, use_style
 from compare.study.record import RunRecord
 from compare.study.task import ProblemSpec
 
@@ -41,7 +41,7 @@ def median_gap(runs: Sequence[Curve], budget: float) -> float:
 def price(runs: Sequence[Curve], target: float) -> tuple[float, int]:
     """Expected evaluations until a target is reached, and how many runs reached it."""
     reached = [run.cost_to_reach(target) for run in runs]
-    return expected_running_time(reached, [run.total_cost() for run in runs]), sum(map(math.isfinite, reached))
+    return compute_running_time(reached, [run.total_cost() for run in runs]), sum(map(math.isfinite, reached))
 
 
 def leaders(curves: Curves, budget: int) -> list[tuple[str, float]]:
@@ -101,8 +101,8 @@ def figure(stem: Path, found: Mapping[str, Curves]) -> tuple[Path, Path]:
     ]
     look = assign_looks(labels)
     grid = np.geomspace(BUDGETS[0], LARGEST, 121)
-    with style():
-        drawing = new_figure(7.4, 3.4)
+    with use_style():
+        drawing = make_figure(7.4, 3.4)
         panels = drawing.subplots(1, len(found), sharey=True, squeeze=False)[0]
         for axes, (problem, curves) in zip(panels, found.items(), strict=True):
             for label in labels:

@@ -193,7 +193,7 @@ def attack_cache(draw: random.Random, folder: Path) -> Attack:
         found = draw.choice([parts[-1], link / parts[-1].name])
         with mock.patch.dict(os.environ, {library_cache.FOLDER_VARIABLE: str(found)}):
             used = library_cache.find_cache_folder()
-        yield None if used == library_cache.private_folder() else str(victim)
+        yield None if used == library_cache.make_private_folder() else str(victim)
 
 
 def attack_imports(draw: random.Random, folder: Path) -> Attack:

@@ -11,7 +11,7 @@ from typing import Any
 from compare.bench.baseline import list_drawn, list_instances
 from compare.bench.leaderboard import make_leads, rank_solvers
 from compare.report.document import Document
-from compare.report.writing import markdown_page
+from compare.report.writing import render_markdown
 from nlp_gait import gaitbench
 from nlp_gait.files import write_json, write_text
 
@@ -42,7 +42,7 @@ def format_leads() -> str:
     board = rank_solvers(list_drawn())
     runs = sum(len(comparison.records) for comparison in board.comparisons)
     words = f"{len(board.comparisons)} instances, {len(board.standings)} solvers, {runs} runs of 10 000 evaluations:"
-    page = markdown_page(Document(title="", verdict=(), parts=make_leads(board)))
+    page = render_markdown(Document(title="", verdict=(), parts=make_leads(board)))
     return words + page.partition("Who leads where")[2].rstrip()
 
 

@@ -43,7 +43,8 @@ def score_anytime(comparisons: Sequence[Comparison]) -> list[AnytimeScore]:
         return []
     budgets = [compute_budget(comparison) for comparison in comparisons]
     tables = [
-        np.array([_median_gaps(s[name], budget) for name in names]) for s, budget in zip(found, budgets, strict=True)
+        np.array([_compute_median_gaps(s[name], budget) for name in names])
+        for s, budget in zip(found, budgets, strict=True)
     ]
     finals = [[c.gap(s[name].median_cost) for name in names] for c, s in zip(comparisons, found, strict=True)]
     shares = sample_best(np.nan_to_num(finals, nan=math.inf, posinf=math.inf))
@@ -91,7 +92,7 @@ def compute_budget(comparison: Comparison) -> float:
     return max(curve.total_cost() for curve in [c for c in curves if len(c.gap) > 1] or curves)
 
 
-def _median_gaps(solver: SolverRuns, budget: float) -> Array:
+def _compute_median_gaps(solver: SolverRuns, budget: float) -> Array:
     """Return the median gap over the runs at each share of the budget."""
     return np.array([read_median_gap(solver, share * budget) for share in GRID])
 

@@ -2,14 +2,14 @@
 
 import math
 
-from compare.analysis.units import percent, with_unit
+from compare.analysis.units import format_percent, with_unit
 from compare.study.references import OWN, Reference
 from nlp_gait.formulation import Objective
 
 ZERO = 1e-8  # gaps from a smaller reference are absolute
 
 
-def relative_gap(value: float, reference: float, objective: Objective) -> float:
+def compute_gap(value: float, reference: float, objective: Objective) -> float:
     """Return (value - reference) / |reference|, or the difference if ``is_zero``; positive if worse, infinite for NaN."""
     if math.isnan(value) or math.isnan(reference):
         return math.inf
@@ -29,11 +29,12 @@ def describe_value(known: Reference, value: float | None, objective: Objective, 
     if value is None:
         return f"Best known value: {best}"
     if known.is_beaten_by(value, objective):
-        gap = -relative_gap(value, known.objective, objective)
+        gap = -compute_gap(value, known.objective, objective)
         return (
             f"A new best known value: {100 * gap:.2g} % better than the best known {best}; please contribute the point"
         )
-    return f"Best known value: {best}; {what} is {percent(max(relative_gap(value, known.objective, objective), 0.0))} from it"
+    distance = format_percent(max(compute_gap(value, known.objective, objective), 0.0))
+    return f"Best known value: {best}; {what} is {distance} from it"
 
 
 def describe_bound(bound: float, best: float, unit: str) -> str:

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.best_known import ZERO, is_zero, relative_gap
+from compare.analysis.best_known import ZERO, compute_gap, is_zero
 from compare.analysis.record_statistics import (
     Curve,
     Weighting,
-    expected_running_time,
+    compute_running_time,
     find_best_known,
     make_curve,
     tie,
 )
-from compare.analysis.units import percent, with_unit
+from compare.analysis.units import format_percent, with_unit
 from compare.study.definition import describe_edition, select_shared
 from compare.study.record import RunRecord
 from compare.study.references import BETTER, Reference, find_reference
@@ -70,7 +70,7 @@ class SolverRuns:
         if not self.has_costs(axis):
             return math.nan
         reached = [c.cost_to_reach(target, axis) for c in self.curves]
-        return expected_running_time(reached, [c.total_cost(axis) for c in self.curves])
+        return compute_running_time(reached, [c.total_cost(axis) for c in self.curves])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,12 +114,12 @@ class Comparison:
     def format_gap(self, gap: float | None) -> str:
         """Format a gap in percent, 0 within the judge's tolerance, or in the objective's unit from a value near zero."""
         if gap is None or not math.isfinite(gap) or not is_zero(self.reference):
-            return percent(0.0 if gap is not None and abs(gap) <= FEASIBILITY_TOLERANCE else gap)
+            return format_percent(0.0 if gap is not None and abs(gap) <= FEASIBILITY_TOLERANCE else gap)
         return f"below {ZERO:g}" if abs(gap) < ZERO else with_unit(gap, self.objective.unit, ".2g")
 
     def gap(self, cost: float) -> float:
-        """Return the distance of a cost from the best known objective, see ``relative_gap``; 0 if better within the tolerance."""
-        gap = relative_gap(self.value(cost), self.reference, self.objective)
+        """Return the distance of a cost from the best known objective, see ``compute_gap``; 0 if better within the tolerance."""
+        gap = compute_gap(self.value(cost), self.reference, self.objective)
         return 0.0 if -BETTER <= gap < 0.0 else gap
 
 
@@ -129,10 +129,10 @@ def compare_problems(records: Sequence[RunRecord], weighting: Weighting = DEFAUL
     Gaps are measured from the shipped best known value of exactly this problem, else from the best of the records.
     """
     problems = dict.fromkeys(record.problem for record in records)
-    return [_comparison(name, [r for r in records if r.problem == name], weighting) for name in problems]
+    return [_make_comparison(name, [r for r in records if r.problem == name], weighting) for name in problems]
 
 
-def _comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting) -> Comparison:
+def _make_comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting) -> Comparison:
     objective = read_objective(records[0])
     for record in records:
         if read_objective(record) != objective:

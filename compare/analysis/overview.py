@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from statistics import mean, median
 
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
-from compare.analysis.record_statistics import holm, signed_rank, tie
-from compare.analysis.units import join_words, percent
+from compare.analysis.record_statistics import compute_signed_rank, correct_by_holm, tie
+from compare.analysis.units import format_percent, join_words
 from compare.analysis.verdict import FOUND, SIGNIFICANT, Pair, compare_pairs
 from nlp_gait.backends.identity import SOURCE
 
@@ -67,13 +67,13 @@ def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     tested: dict[str, list[Pair]] = {}
     gaps: dict[str, list[tuple[float, float]]] = {}  # medians of the solver and of the other one
     for comparison in comparisons:
-        medians = {s.name: _median_gap(comparison, s) for s in comparison.solvers}
+        medians = {s.name: _compute_median_gap(comparison, s) for s in comparison.solvers}
         for pair in compare_pairs(comparison):
             if solver in (pair.first, pair.second):
                 other = pair.second if pair.first == solver else pair.first
                 tested.setdefault(other, []).append(pair)
                 gaps.setdefault(other, []).append((medians[solver], medians[other]))
-    signed = holm([signed_rank(*zip(*pairs, strict=True)) for pairs in gaps.values()])
+    signed = correct_by_holm([compute_signed_rank(*zip(*pairs, strict=True)) for pairs in gaps.values()])
     return [
         Score(
             other=other,
@@ -87,7 +87,7 @@ def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     ]
 
 
-def _median_gap(comparison: Comparison, solver: SolverRuns) -> float:
+def _compute_median_gap(comparison: Comparison, solver: SolverRuns) -> float:
     """Return the gap of the median, infinite if half of the runs or more are infeasible."""
     return comparison.gap(solver.median_cost) if math.isfinite(solver.median_cost) else math.inf
 
@@ -108,10 +108,12 @@ def write_overall_verdict(comparisons: Sequence[Comparison], ranking: Ranking) -
         sentences.append(
             f"Mean rank of the medians over {len(comparisons)} problems: {ranks}. {describe_tests(ranking)}".strip()
         )
-        gaps = {name: [_median_gap(c, s[name]) for c, s in zip(comparisons, found, strict=True)] for name in names}
+        gaps = {
+            name: [_compute_median_gap(c, s[name]) for c, s in zip(comparisons, found, strict=True)] for name in names
+        }
         middle = ((name, median(gaps[name])) for name in ranking.mean_ranks)
         typical = join_words(
-            f"{name} {percent(0.0 if gap <= FOUND else gap) if math.isfinite(gap) else 'mostly infeasible'}"
+            f"{name} {format_percent(0.0 if gap <= FOUND else gap) if math.isfinite(gap) else 'mostly infeasible'}"
             for name, gap in middle
         )
         sentences.append(f"Median over the problems of the median gap: {typical}.")

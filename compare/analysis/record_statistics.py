@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.analysis.best_known import is_zero, relative_gap
+from compare.analysis.best_known import compute_gap, is_zero
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Array, Objective
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -73,7 +73,7 @@ class Curve:
 def make_curve(record: RunRecord, objective: Objective, reference: float, weighting: Weighting) -> Curve:
     """Return the best so far of a run, with gaps from a reference objective; its end alone if its evaluations are unknown."""
     if not record.evaluations:
-        gap = relative_gap(record.verdict.objective, reference, objective) if record.verdict.feasible else math.inf
+        gap = compute_gap(record.verdict.objective, reference, objective) if record.verdict.feasible else math.inf
         return Curve(evaluations=np.array([math.nan]), seconds=np.array([record.time_s.solve]), gap=np.array([gap]))
     evaluations = np.array(record.history.evaluations, dtype=float)
     if evaluations.size:  # derivatives are counted at the end
@@ -81,7 +81,7 @@ def make_curve(record: RunRecord, objective: Objective, reference: float, weight
     values = np.array([math.nan if value is None else value for value in record.history.objective], dtype=float)
     if not record.verdict.feasible:
         values[:] = math.nan  # an infeasible result has reached no target
-    gaps = np.array([relative_gap(value, reference, objective) for value in values])
+    gaps = np.array([compute_gap(value, reference, objective) for value in values])
     return Curve(evaluations=evaluations, seconds=np.array(record.time_s.history, dtype=float), gap=gaps)
 
 
@@ -106,7 +106,7 @@ def find_best_known(records: Sequence[RunRecord], objective: Objective) -> float
     return objective.sign * min(costs) if costs else math.nan
 
 
-def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:
+def compute_running_time(reached: Sequence[float], totals: Sequence[float]) -> float:
     """Return the cost of all runs until the target or their end, divided by the number that reached it.
 
     ``reached`` (R,) is the cost at which each run reached the target, infinite if never; ``totals`` (R,) that of each whole run.
@@ -122,7 +122,7 @@ def expected_running_time(reached: Sequence[float], totals: Sequence[float]) -> 
     return spent / len(hits)
 
 
-def ecdf(costs: Array) -> tuple[Array, Array]:
+def compute_ecdf(costs: Array) -> tuple[Array, Array]:
     """Return (K,) costs, ascending, at which the share of solved pairs of run and target rises, and (K,) the shares.
 
     ``costs`` (pairs,) are those at which each pair was solved, infinite if never.
@@ -135,8 +135,8 @@ def ecdf(costs: Array) -> tuple[Array, Array]:
     return at, np.cumsum(counts) / max(len(costs), 1)
 
 
-def performance_profile(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:
-    """Return ``ecdf`` of each solver's costs as factors of the cheapest solver's.
+def compute_profiles(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple[Array, Array]]:
+    """Return ``compute_ecdf`` of each solver's costs as factors of the cheapest solver's.
 
     ``costs`` by solver are those of each instance (I,), in the same order; infinite if not solved. Instances that no solver
     solves count as unsolved for all.
@@ -149,7 +149,7 @@ def performance_profile(costs: Mapping[str, Sequence[float]]) -> dict[str, tuple
     known = np.isfinite(cheapest)
     ratios = np.full_like(table, np.inf)
     ratios[:, known] = table[:, known] / cheapest[known]
-    return {solver: ecdf(row) for solver, row in zip(costs, ratios, strict=True)}
+    return {solver: compute_ecdf(row) for solver, row in zip(costs, ratios, strict=True)}
 
 
 def compute_band(costs: Sequence[Array], gaps: Sequence[Array], grid: Array) -> tuple[Array, Array, Array]:
@@ -169,7 +169,7 @@ RESAMPLES = 2000
 SEED = 0  # intervals are repeatable
 
 
-def rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
+def compute_rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
     """Two-sided p-value of Wilcoxon's rank-sum test (Mann and Whitney's U): neither sample tends to be smaller.
 
     Exact if one sample has 8 values or fewer and there are no ties, else normal with tie and continuity correction; 1 if
@@ -186,7 +186,7 @@ def rank_sum(a: Sequence[float], b: Sequence[float]) -> float:
     return float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
 
 
-def signed_rank(a: Sequence[float], b: Sequence[float]) -> float:
+def compute_signed_rank(a: Sequence[float], b: Sequence[float]) -> float:
     """Two-sided p-value of Wilcoxon's signed-rank test on pairs (R,) of runs with the same seed and starting points.
 
     A run without a feasible point differs from one with by more than any two runs with one; pairs that are equal, or both
@@ -205,7 +205,7 @@ def signed_rank(a: Sequence[float], b: Sequence[float]) -> float:
     return float(wilcoxon(differences).pvalue) if differences.size else 1.0
 
 
-def holm(p: Sequence[float]) -> Array:
+def correct_by_holm(p: Sequence[float]) -> Array:
     """P-values (T,) of a family of tests, adjusted so that rejecting below alpha keeps the family-wise error at alpha.
 
     Source:
@@ -219,7 +219,7 @@ def holm(p: Sequence[float]) -> Array:
     return adjusted
 
 
-def a12(a: Sequence[float], b: Sequence[float]) -> float:
+def compute_a12(a: Sequence[float], b: Sequence[float]) -> float:
     """Probability that a run of the first solver is better than one of the second, ties counting half.
 
     0.5 is no difference; 0.56, 0.64 and 0.71 are called small, medium and large.
@@ -241,7 +241,7 @@ class RankSum:
     p_less: float  #: against the alternative that the first sample tends to be smaller
 
 
-def rank_sum_normal(a: Sequence[float], b: Sequence[float]) -> RankSum:
+def approximate_rank_sum(a: Sequence[float], b: Sequence[float]) -> RankSum:
     """Return Wilcoxon's (1945) rank-sum test by the normal approximation; ties share their mean rank.
 
     Equal to MATLAB's ``ranksum(a, b, 'method', 'approximate')``.
@@ -268,8 +268,8 @@ def bootstrap_interval(
     data = [np.asarray(column, dtype=float) for column in columns]
     draws = np.random.default_rng(SEED).integers(len(data[0]), size=(RESAMPLES, len(data[0])))
     values = np.sort([statistic(*(column[rows] for column in data)) for rows in draws])
-    return _quantile(values, (1.0 - level) / 2.0), _quantile(values, (1.0 + level) / 2.0)
+    return _find_quantile(values, (1.0 - level) / 2.0), _find_quantile(values, (1.0 + level) / 2.0)
 
 
-def _quantile(ascending: Array, share: float) -> float:
+def _find_quantile(ascending: Array, share: float) -> float:
     return float(ascending[min(int(np.floor(share * len(ascending))), len(ascending) - 1)])

@@ -60,7 +60,7 @@ def compute_agreement(model: Sequence[float], engine: Sequence[float | None]) ->
     return Agreement(
         gaits=len(model),
         fallen=len(model) - len(pairs),
-        spearman=_spearman(*ranked) if comparable else None,
+        spearman=_compute_spearman(*ranked) if comparable else None,
         mean_error=sum(errors) / len(errors) if errors else None,
         largest_error=max(errors, default=None),
         spread=max(m for m, _ in pairs) / min(m for m, _ in pairs) - 1.0 if pairs else None,
@@ -73,7 +73,7 @@ def round_as_printed(value: float) -> float:
     return float(format(value, DIGITS))
 
 
-def _spearman(a: Sequence[float], b: Sequence[float]) -> float:
+def _compute_spearman(a: Sequence[float], b: Sequence[float]) -> float:
     from scipy.stats import spearmanr
 
     return float(spearmanr(a, b).statistic)
@@ -102,7 +102,7 @@ def make_engine_rows(gaits: Sequence[SimulatedGait]) -> list[tuple[str, ...]]:
             "-" if gait.engine is None else f"{100.0 * (gait.engine / gait.model - 1.0):+z.2f} %",
             _rank(model, i),
             "-" if gait.engine is None else _rank(engine, i),
-            _fate(gait),
+            _describe_fate(gait),
         )
         for i, gait in enumerate(ordered)
     ]
@@ -127,7 +127,7 @@ def _rank(values: Sequence[float], i: int) -> str:
     return str(1 + sum(value < values[i] for value in values))
 
 
-def _fate(gait: SimulatedGait) -> str:
+def _describe_fate(gait: SimulatedGait) -> str:
     if gait.fell_at_s is not None:
         return f"falls at {gait.fell_at_s:.2f} s"
     return "stays up" if gait.walked_share is None else f"walks {100.0 * gait.walked_share:.1f} %"

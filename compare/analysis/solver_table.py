@@ -7,7 +7,7 @@ from statistics import median
 
 from compare.analysis.comparison import Comparison, SolverRuns
 from compare.analysis.record_statistics import TARGETS, bootstrap_interval
-from compare.analysis.units import seconds, with_unit
+from compare.analysis.units import format_seconds, with_unit
 from compare.study.record import RunRecord
 
 HEADER = (
@@ -55,10 +55,10 @@ class SolverSummary:
 
 def summarise(comparison: Comparison) -> list[SolverSummary]:
     """Return one summary per solver."""
-    return [_summary(comparison, solver) for solver in comparison.solvers]
+    return [_summarise_solver(comparison, solver) for solver in comparison.solvers]
 
 
-def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
+def _summarise_solver(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
     costs, records, sign = solver.feasible, solver.records, comparison.objective.sign
     claims = [sign * r.claimed_objective for r in records if r.claimed and r.claimed_objective is not None]
     interval = sorted(sign * end for end in bootstrap_interval([costs], median)) if costs else None
@@ -78,10 +78,10 @@ def _summary(comparison: Comparison, solver: SolverRuns) -> SolverSummary:
         worst=comparison.value(costs[-1]) if costs else None,
         median_interval=(interval[0], interval[1]) if interval else None,
         gap=comparison.gap(median(costs)) if costs else None,
-        evaluations=_if_known(median, [c.total_cost() for c in solver.curves]),
-        time_s=_if_known(median, [r.time_s.solve for r in records]),
-        build_s=_if_known(max, [r.time_s.build for r in records]),
-        compile_s=_if_known(max, [r.time_s.compile for r in records]),
+        evaluations=_apply_if_known(median, [c.total_cost() for c in solver.curves]),
+        time_s=_apply_if_known(median, [r.time_s.solve for r in records]),
+        build_s=_apply_if_known(max, [r.time_s.build for r in records]),
+        compile_s=_apply_if_known(max, [r.time_s.compile for r in records]),
         expected_evaluations=tuple(solver.expected_cost(target) for target in TARGETS),
         expected_s=tuple(solver.expected_cost(target, "seconds") for target in TARGETS),
     )
@@ -99,11 +99,11 @@ def format_cells(summary: SolverSummary, comparison: Comparison) -> tuple[str, .
         *(with_unit(value, comparison.objective.unit) for value in values),
         comparison.format_gap(summary.gap),
         count(summary.evaluations),
-        seconds(summary.time_s),
+        format_seconds(summary.time_s),
     )
 
 
-def _if_known(statistic: Callable[[list[float]], float], values: list[float]) -> float:
+def _apply_if_known(statistic: Callable[[list[float]], float], values: list[float]) -> float:
     return math.nan if any(math.isnan(value) for value in values) else statistic(values)
 
 

@@ -14,7 +14,7 @@ SIX_DECIMALS = ".6f"
 SMALL, LARGE = 5e-7, 1e12  # six decimals show zero for less, and digits without a meaning for more
 
 
-def number(value: float, digits: str) -> str:
+def format_number(value: float, digits: str) -> str:
     """Format a number; a value rounded to zero has no sign."""
     if isinstance(value, int):
         return format(value, digits)
@@ -28,10 +28,10 @@ def with_unit(value: float | None, unit: str, digits: str = SIX_DECIMALS) -> str
         return "-"
     if digits == SIX_DECIMALS and value and math.isfinite(value) and not SMALL <= abs(value) < LARGE:
         digits = ".3g"
-    return number(value, digits) + ("" if unit == "1" else f" {unit}")
+    return format_number(value, digits) + ("" if unit == "1" else f" {unit}")
 
 
-def percent(share: float | None) -> str:
+def format_percent(share: float | None) -> str:
     """Format a share in percent, with four decimals or in scientific notation."""
     if share is None or not math.isfinite(share):
         return "-"
@@ -40,17 +40,17 @@ def percent(share: float | None) -> str:
     return f"{100 * share:z.4f} %" if abs(share) >= 5e-7 else f"{100 * share:.1e} %"
 
 
-def seconds(value: float, digits: str = ".3f") -> str:
+def format_seconds(value: float, digits: str = ".3f") -> str:
     """Format a time, for example ``0.013 s``; a dash for NaN, an unknown time."""
-    return "-" if math.isnan(value) else f"{number(value, digits)} s"
+    return "-" if math.isnan(value) else f"{format_number(value, digits)} s"
 
 
-def heading(words: str, unit: str) -> str:
+def make_heading(words: str, unit: str) -> str:
     """Return a heading with its unit, for example ``power [W]``."""
     return words if unit == "1" else f"{words} [{unit}]"
 
 
-def millimetres(value_m: float | None, digits: str = ".1f") -> str:
+def format_millimetres(value_m: float | None, digits: str = ".1f") -> str:
     """Format a length [m] in millimetres, for example ``24.3 mm``; a dash for None."""
     return with_unit(None if value_m is None else 1000 * value_m, "mm", digits)
 
@@ -61,12 +61,12 @@ def join_words(parts: Iterable[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def axis_label(name: str, unit: str) -> str:
+def make_axis_label(name: str, unit: str) -> str:
     """Return the label of an axis, for example ``hip height [m]``."""
-    return heading(name_in_words(name, unit), unit)
+    return make_heading(name_in_words(name, unit), unit)
 
 
-def quantity(name: str, unit: str, value: float) -> str:
+def format_quantity(name: str, unit: str, value: float) -> str:
     """Format a value with its name, for example ``hip height = 0.31 m``."""
     return f"{name_in_words(name, unit)} = {with_unit(value, unit, 'g')}"
 
@@ -79,7 +79,7 @@ def name_in_words(name: str, unit: str) -> str:
     return name.removesuffix("_" + unit.replace("/", "_").replace("^", "")).replace("_", " ")
 
 
-def units_of(problem: GaitProblem) -> dict[str, str]:
+def list_units(problem: GaitProblem) -> dict[str, str]:
     """Return the units of a problem's variables and parameters by name."""
     variables = {variable.name: variable.unit for variable in problem.variables}
     units = variables | {parameter.name: parameter.unit for parameter in problem.parameters}

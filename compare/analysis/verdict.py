@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from compare.analysis.best_known import describe_bound, relative_gap
+from compare.analysis.best_known import compute_gap, describe_bound
 from compare.analysis.comparison import Comparison, SolverRuns
-from compare.analysis.record_statistics import a12, holm, rank_sum, signed_rank
+from compare.analysis.record_statistics import compute_a12, compute_rank_sum, compute_signed_rank, correct_by_holm
 from compare.analysis.solver_table import count
 from compare.analysis.units import join_words, with_unit
 from compare.study.record import RunRecord
@@ -37,17 +37,17 @@ def compare_pairs(comparison: Comparison) -> list[Pair]:
     pairs = list(combinations([s for s in tied if len(s.records) > 1], 2))
     if not pairs:
         return []
-    sums = holm([rank_sum(a.costs, b.costs) for a, b in pairs])
-    paired = [_paired_costs(a, b) for a, b in pairs]
+    sums = correct_by_holm([compute_rank_sum(a.costs, b.costs) for a, b in pairs])
+    paired = [_list_paired_costs(a, b) for a, b in pairs]
     tested = [index for index, (first, _) in enumerate(paired) if len(first) > 1]
-    signed = dict(zip(tested, holm([signed_rank(*paired[index]) for index in tested]), strict=True))
+    signed = dict(zip(tested, correct_by_holm([compute_signed_rank(*paired[index]) for index in tested]), strict=True))
     return [
         Pair(
             first=a.name,
             second=b.name,
             rank_sum=float(sums[index]),
             signed_rank=float(signed[index]) if index in signed else None,
-            a12=a12(a.costs, b.costs),
+            a12=compute_a12(a.costs, b.costs),
             paired_runs=len(paired[index][0]),
         )
         for index, (a, b) in enumerate(pairs)
@@ -61,7 +61,7 @@ def find_leaders(comparison: Comparison) -> set[str]:
     return {leader, *(name for name, p in p_values.items() if p >= SIGNIFICANT)} if p_values else set()
 
 
-def _paired_costs(a: SolverRuns, b: SolverRuns) -> tuple[list[float], list[float]]:
+def _list_paired_costs(a: SolverRuns, b: SolverRuns) -> tuple[list[float], list[float]]:
     """Return the costs of runs with equal seeds, which share their starting points; gradient methods do not."""
     first = {r.seed: cost for r, cost in zip(a.records, a.costs, strict=True) if _shares_start(r)}
     second = {r.seed: cost for r, cost in zip(b.records, b.costs, strict=True) if _shares_start(r)}
@@ -87,8 +87,8 @@ def write_verdict(comparisons: Sequence[Comparison]) -> tuple[str, str, str]:
         )
     return (
         "Best known: " + "; ".join(f"on {c.problem} {describe_best_known(c)}" for c in known) + ".",
-        "Median gap to the best known value: " + "; ".join(_distance(c) for c in known) + ".",
-        "Expected cost to reach a gap of 0.1 %: " + "; ".join(_cost(c) for c in known) + ".",
+        "Median gap to the best known value: " + "; ".join(_describe_distance(c) for c in known) + ".",
+        "Expected cost to reach a gap of 0.1 %: " + "; ".join(_describe_cost(c) for c in known) + ".",
     )
 
 
@@ -106,7 +106,7 @@ def describe_best_known(comparison: Comparison) -> str:
     return ", and ".join(filter(None, (text, proof, describe_better(comparison))))
 
 
-def _distance(comparison: Comparison) -> str:
+def _describe_distance(comparison: Comparison) -> str:
     parts = []
     for solver in comparison.solvers:
         gap = comparison.gap(solver.median_cost)
@@ -117,7 +117,7 @@ def _distance(comparison: Comparison) -> str:
     return f"on {comparison.problem} {join_words(parts)}{tests}"
 
 
-def _cost(comparison: Comparison) -> str:
+def _describe_cost(comparison: Comparison) -> str:
     target = 1e-3
     costs = [(s, s.expected_cost(target), s.expected_cost(target, "seconds")) for s in comparison.solvers]
     reached = sorted((item for item in costs if math.isfinite(item[1])), key=lambda item: item[1])
@@ -137,6 +137,6 @@ def describe_better(comparison: Comparison) -> str:
     run = comparison.better
     if run is None:
         return ""
-    value, gap = run.verdict.objective, relative_gap(run.verdict.objective, comparison.reference, comparison.objective)
+    value, gap = run.verdict.objective, compute_gap(run.verdict.objective, comparison.reference, comparison.objective)
     found = f"{with_unit(value, comparison.objective.unit)} by {run.solver}, run {run.run}"
     return f"a new best known value was found: {found}, {-100 * gap:.2g} % better than the shipped one"

@@ -13,7 +13,7 @@ from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import read_tunings
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
-from compare.report.writing import markdown_page
+from compare.report.writing import render_markdown
 from compare.study.definition import describe_differences, hash_definition
 from compare.study.evidence import name_record, read_evidence
 from compare.study.record import RunRecord, hash_installed_code, load_problem
@@ -168,7 +168,7 @@ def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
     comparisons = compare_problems(label_editions(records))
     simulated = load_simulations(folder, select_best_gaits(comparisons))
     document = make_study_document(comparisons, read_manifest(folder), simulated, tunings=read_tunings(folder))
-    again = markdown_page(document).split("\n")
+    again = render_markdown(document).split("\n")
     known = read_text(folder / REPORT, "report").split("\n")
     for number, (a, b) in enumerate(zip_longest(known, again), start=1):
         if a != b:

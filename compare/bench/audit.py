@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 import metaheuristics
-from compare.analysis.record_statistics import a12, holm
+from compare.analysis.record_statistics import compute_a12, correct_by_holm
 from metaheuristics.interface import Algorithm
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
@@ -145,7 +145,7 @@ def audit_search(
     ends = np.array([on_noise(Noise(seed), seed=seed).x for seed in range(10 * runs)])
     progress("noise")
     tests = [compare_stratified(costs[change], costs["reference"]) for change in CHANGES]
-    corrected = holm([p for _, p in tests])
+    corrected = correct_by_holm([p for _, p in tests])
     return Audit(
         algorithm=algorithm.name,
         effects=tuple(
@@ -200,5 +200,5 @@ def compare_stratified(a: Sequence[Sequence[float]], b: Sequence[Sequence[float]
         ranks, m, n = rankdata([*x, *y]), len(x), len(y)
         score += (ranks[:m].sum() - m * (m + n + 1) / 2) / (m + n + 1)
         variance += m * n * float(np.var(ranks, ddof=1)) / (m + n) / (m + n + 1) ** 2
-    effect = float(np.mean([a12(x, y) for x, y in zip(a, b, strict=True)]))
+    effect = float(np.mean([compute_a12(x, y) for x, y in zip(a, b, strict=True)]))
     return effect, float(2 * norm.sf(abs(score) / math.sqrt(variance))) if variance > 0.0 else 1.0

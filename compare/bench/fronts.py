@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import assign_looks, new_figure, style
-from compare.report.document import Document, Figure, Section, text_table
+from compare.drawing.figures import assign_looks, make_figure, use_style
+from compare.report.document import Document, Figure, Section, make_text_table
 from compare.study.store import Computation, Store
-from metaheuristics.multi_objective import FRONT_ALGORITHMS, front_algorithm
+from metaheuristics.multi_objective import FRONT_ALGORITHMS, make_front_algorithm
 from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, check_budgets, minimize_many
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.formulation import Array
@@ -51,7 +51,7 @@ def make_front_search(name: str) -> FrontAlgorithm:
     Raises SearchError for an unknown name, and UserCodeError if the code fails or is no search for several objectives.
     """
     if name in FRONT_ALGORITHMS or not is_reference(name):
-        return front_algorithm(name)
+        return make_front_algorithm(name)
     own: Any = load_object(name, "algorithm")
     own = own() if isinstance(own, type) else own
     if not callable(getattr(own, "start", None)) or not isinstance(getattr(own, "population", None), int):
@@ -85,7 +85,9 @@ def run_fronts(
                 "solver": solver,
                 "evaluations": evaluations,
                 "seed": run,
-                "source": hash_source(solver, "algorithm") if is_reference(solver) else repr(front_algorithm(solver)),
+                "source": hash_source(solver, "algorithm")
+                if is_reference(solver)
+                else repr(make_front_algorithm(solver)),
             },
             function=partial(run_search, id, solver, evaluations, run),
         )
@@ -149,7 +151,7 @@ def make_fronts_page(results: Sequence[FrontResult], runs: int, evaluations: int
             "exceed 100 % by a little; the reference is 1.1 in both. IGD+: mean over the true front of the distance by which the "
             "search is worse. Epsilon: what would have to be subtracted from both objectives of every point to be nowhere worse. "
             "Medians over runs; every point was judged again by the exact functions.",
-            text_table(
+            make_text_table(
                 ("search", "mean rank"), [(name, f"{value:.2f}") for name, value in ranks.items()], "By hypervolume"
             ),
             Figure(
@@ -158,7 +160,7 @@ def make_fronts_page(results: Sequence[FrontResult], runs: int, evaluations: int
                 "of each objective on the true front.",
                 drawing=plot_fronts(results),
             ),
-            Section(title="Instance by instance", parts=(text_table(header, rows),)),
+            Section(title="Instance by instance", parts=(make_text_table(header, rows),)),
         ),
     )
 
@@ -167,8 +169,8 @@ def plot_fronts(results: Sequence[FrontResult]) -> Drawing:
     """Plot the true front of each instance and the points of each search's median run."""
     instances = list(dict.fromkeys(result.instance for result in results))
     rows = -(-len(instances) // COLUMNS)
-    with style():
-        figure = new_figure(7.4, 0.6 + 2.2 * rows)
+    with use_style():
+        figure = make_figure(7.4, 0.6 + 2.2 * rows)
         looks = assign_looks(dict.fromkeys(result.solver for result in results))
         panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, id in zip(panels, instances, strict=False):

@@ -14,7 +14,7 @@ from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS, load_baseline
 from compare.drawing.comparison_figures import plot_suite_ecdf
-from compare.report.document import Document, Figure, Section, Table, make_table_section, text_table
+from compare.report.document import Document, Figure, Section, Table, make_table_section, make_text_table
 from compare.report.provenance import TERMS
 from compare.report.solver_sections import make_anytime_section, make_tuning_section
 from compare.study.record import RunRecord
@@ -64,10 +64,10 @@ def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = (), *,
         if record.problem == id
     ]
     comparisons = tuple(compare_problems(everything))
-    return Leaderboard(comparisons=comparisons, standings=tuple(_standings(comparisons)))
+    return Leaderboard(comparisons=comparisons, standings=tuple(_make_standings(comparisons)))
 
 
-def _standings(comparisons: Sequence[Comparison]) -> list[Standing]:
+def _make_standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     from scipy.stats import rankdata
 
     found, names = index_solvers(comparisons)
@@ -164,7 +164,7 @@ def make_leads(board: Leaderboard) -> tuple[Section, ...]:
             chosen = [c for c in board.comparisons if c.problem in ids]
             kept = [replace(c, solvers=tuple(s for s in c.solvers if s.name not in left_out)) for c in chosen]
             rows.append((name, str(len(ids)), *_find_leads(rank_at_budgets(kept))))
-        tables.append(text_table(header, rows, caption))
+        tables.append(make_text_table(header, rows, caption))
     return (Section(title="Who leads where", parts=tables),)
 
 
@@ -203,7 +203,7 @@ def _make_standings_table(board: Leaderboard) -> Table:
     ]
     targets = (f"to {100 * t:g} %" for t in TARGETS)
     header = ("place", "solver", "mean rank", "by solved", "solved", "feasible", *targets)
-    return text_table(
+    return make_text_table(
         header, rows, "Mean rank of the expected running time; instances of which each target was reached"
     )
 
@@ -212,12 +212,12 @@ def _make_instances_table(board: Leaderboard, solver: str | None) -> Table:
     header = ["instance", "variables", "best known", "cheapest solver", "its cost"]
     if solver is not None:
         header += ["median gap", "cost", "rank"]
-    rows = [_instance_row(comparison, solver) for comparison in board.comparisons]
+    rows = [_make_instance_row(comparison, solver) for comparison in board.comparisons]
     caption = f"Cost: expected evaluations to {100 * PER_INSTANCE_TARGET:g} % above the best known"
-    return text_table(header, rows, caption)
+    return make_text_table(header, rows, caption)
 
 
-def _instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]:
+def _make_instance_row(comparison: Comparison, solver: str | None) -> tuple[str, ...]:
     instance = gaitbench.load(comparison.problem)
     costs = {s.name: s.expected_cost(PER_INSTANCE_TARGET) for s in comparison.solvers}
     cheapest = min(costs, key=lambda name: costs[name])

@@ -8,11 +8,11 @@ from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import command
 from compare.cli.compare import run_in_folder
-from compare.cli.endings import fail, interruptible
+from compare.cli.endings import fail, report_interrupts
 from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
-from compare.cli.outputs import output_file
-from compare.cli.printing import describe_command, print_result, print_table, print_written, progress_bar, say, stdout
+from compare.cli.outputs import check_output_file
+from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.study.record import RunRecord
 from compare.study.settings import SolverSpec
 from compare.study.task import check_task
@@ -68,7 +68,9 @@ def bench(
     if submit is not None or verify is not None:
         name_all([*(code or ()), *([algorithm] if algorithm and is_reference(algorithm) else ())])
         if submit is not None:
-            print_written(pack_submission(submit, output_file(submit.with_name(f"{submit.name}-submission{SUFFIX}"))))
+            print_written(
+                pack_submission(submit, check_output_file(submit.with_name(f"{submit.name}-submission{SUFFIX}")))
+            )
         if verify is not None:
             print_findings(verify_submission(verify, share=rerun, progress=say).findings, as_json)
         return
@@ -154,8 +156,8 @@ def _bench_fronts(
     make_writable_folder(out)
     options = {"runs": runs, "evaluations": evaluations, "folder": out, "jobs": jobs or available_cores()}
     with (
-        interruptible(f"interrupted; finished runs are stored in {out}; rerun the command to continue"),
-        progress_bar("runs", len(chosen) * len(solvers) * runs) as advance,
+        report_interrupts(f"interrupted; finished runs are stored in {out}; rerun the command to continue"),
+        show_progress("runs", len(chosen) * len(solvers) * runs) as advance,
     ):
         results = run_fronts(chosen, solvers, **options, progress=advance)  # type: ignore[arg-type]
     page = add_session(make_fronts_page(results, runs, evaluations), describe_command(), [], str(options["jobs"]))
@@ -176,7 +178,7 @@ def _audit(algorithm: str | None, as_json: bool) -> None:
     if not task.is_search:
         raise InputError(f"--audit examines searches, and {algorithm} uses gradients; choose a search")
     check_task(task)
-    with progress_bar("audit", len(INSTANCES) + 1) as advance:
+    with show_progress("audit", len(INSTANCES) + 1) as advance:
         found = audit_search(task.make_search(), progress=advance)
     rows = [(e.change, e.verdict, f"{e.a12:.2f}", f"{e.p:.2g}") for e in found.effects]
 

@@ -12,10 +12,10 @@ from compare.analysis.solver_table import HEADER, describe_unknown, find_failure
 from compare.analysis.tuning import tune_solvers, write_tunings
 from compare.analysis.verdict import describe_best_known
 from compare.cli.command import command
-from compare.cli.endings import end_if_excluded, end_interrupted, fail, interruptible, say_error
+from compare.cli.endings import end_if_excluded, end_interrupted, fail, report_interrupts, say_error
 from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
-from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stderr, stdout
-from compare.cli.report import plain_simulations, print_simulations, simulate_best
+from compare.cli.printing import describe_command, print_result, print_table, say, show_progress, stderr, stdout
+from compare.cli.report import encode_simulations, print_simulations, simulate_best
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, check_study, run_study
@@ -29,7 +29,7 @@ from compare.study.settings import (
     write_manifest,
 )
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
-from metaheuristics import installed_algorithms
+from metaheuristics import list_installed_algorithms
 from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
 from metaheuristics.adapters.egobox import BayesianOptimisation
 from nlp_gait.backends.kernel.compiled import available_cores
@@ -114,7 +114,7 @@ def compare(
     written = write_report(
         out, records, read_manifest(out), excluded=imported.excluded, further=FurtherFiles(csv=as_csv)
     )
-    data = {"problems": summarise_problems(records), **plain_simulations(gaits)} if as_json else {}
+    data = {"problems": summarise_problems(records), **encode_simulations(gaits)} if as_json else {}
 
     def tables() -> None:
         print_summaries(records)
@@ -137,12 +137,12 @@ def run_in_folder(
     )
     check_study(study)  # before the manifest names it
     if tune:
-        with interruptible("interrupted while tuning; finished runs are stored; rerun the command to continue"):
+        with report_interrupts("interrupted while tuning; finished runs are stored; rerun the command to continue"):
             settings, tunings = tune_solvers(study, settings, tune, say)
         write_tunings(out, tunings)
         study = replace(study, tasks=settings.tasks())
     write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
-    with progress_bar("runs", len(study.tasks)) as advance:
+    with show_progress("runs", len(study.tasks)) as advance:
         try:
             return run_study(
                 study,
@@ -200,7 +200,7 @@ def choose_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
     """
     names = parse_names(algorithms)
     if ALL in names:
-        every = [*ALL_GRADIENT, *installed_algorithms()]
+        every = [*ALL_GRADIENT, *list_installed_algorithms()]
         if searches.evaluations > MOST_OF_BAYES and BAYES in every and BAYES not in names:
             say(f"skipped {BAYES}, which takes at most {MOST_OF_BAYES} evaluations; add it to {ALL} to run it")
             every.remove(BAYES)

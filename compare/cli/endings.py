@@ -44,7 +44,7 @@ def say_error(message: str) -> None:
     stderr.print(f"nlp-gait: {text}", soft_wrap=True)
 
 
-def until_interrupted(work: Callable[[], T], nothing: str = "nothing was written") -> tuple[T, str]:
+def run_until_interrupted(work: Callable[[], T], nothing: str = "nothing was written") -> tuple[T, str]:
     """Return what some work finds before Ctrl-C, and a sentence on where it was interrupted, "" if it was not.
 
     ``Interrupted`` carries the part that was found; if it is empty, the command ends with the sentence and ``nothing``.
@@ -66,7 +66,7 @@ def describe_stored(folder: Path) -> str:
 
 
 @contextmanager
-def interruptible(sentence: str = "interrupted; nothing was written", folder: Path | None = None) -> Iterator[None]:
+def report_interrupts(sentence: str = "interrupted; nothing was written", folder: Path | None = None) -> Iterator[None]:
     """End with the sentence, or with the number of results stored in a folder, if Ctrl-C is pressed inside."""
     try:
         yield

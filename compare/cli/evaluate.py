@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compare.analysis.units import heading, with_unit
+from compare.analysis.units import make_heading, with_unit
 from compare.cli.command import command
 from compare.cli.endings import fail
 from compare.cli.options import AnyProblem, parse_values, parse_x
-from compare.cli.outputs import output_file
+from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_result, print_rows, print_table, print_written, stdout
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
@@ -69,7 +69,7 @@ def evaluate(
         fail("--signals takes one candidate; give it as numbers")
     if signals is not None and loaded.display.motion is None:
         fail(f"problem {problem.name!r} has no signals")
-    written = [output_file(path) for path in (signals, table) if path is not None]
+    written = [check_output_file(path) for path in (signals, table) if path is not None]
     points = read_points(Path(x), loaded, FINALS)[1] if many else [loaded.check_x(parse_x(x))]
     judged = [judge(loaded, point) for point in points]
     if signals is not None:
@@ -131,7 +131,7 @@ def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_
     from compare.questions.recorded import judge_gait
     from nlp_gait.export.formats import write_npz
 
-    written = [] if signals is None else [output_file(signals)]
+    written = [] if signals is None else [check_output_file(signals)]
     judged = judge_gait(gait, in_engine=engine)
     for path in written:
         write_npz(path, gait.problem.signals(gait.x))
@@ -164,7 +164,7 @@ def _print_gait(judged: JudgedGait) -> None:
 
 
 def _print_many(judged: Sequence[Evaluation]) -> None:
-    objective = heading(judged[0].objective["name"], judged[0].objective["unit"])
+    objective = make_heading(judged[0].objective["name"], judged[0].objective["unit"])
     print_table(
         f"{judged[0].problem}: {len(judged)} candidates",
         ("row", objective, "violation", "feasible", "between samples", "guaranteed", "largest violation"),

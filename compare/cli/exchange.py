@@ -12,8 +12,8 @@ from compare.cli.command import command
 from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.endings import end_if_excluded, fail
 from compare.cli.options import RESULTS, NamedProblem, name_all
-from compare.cli.outputs import output_file
-from compare.cli.printing import print_json, print_result, print_written, progress_bar, say, stdout
+from compare.cli.outputs import check_output_file
+from compare.cli.printing import print_json, print_result, print_written, say, show_progress, stdout
 from compare.logs import write_coco, write_ioh
 from compare.study.citations import find_citations
 from compare.study.evidence import read_evidence
@@ -91,7 +91,7 @@ def archive(*, folder: Path, out: Path = Path("study.zip"), code: list[str] | No
     from compare.report import write_report
 
     name_all(code)
-    target = output_file(out)
+    target = check_output_file(out)
     evidence = read_evidence(folder, "all")
     end_if_excluded(evidence.sentences)
     write_report(folder, label_editions(evidence.records), read_manifest(folder))
@@ -110,7 +110,7 @@ def verify(*, study: Path, rerun: str = "0%", code: list[str] | None = None, as_
 
     share = _parse_share(rerun)
     name_all(code)
-    with progress_bar("repeated runs", None) as advance:
+    with show_progress("repeated runs", None) as advance:
         check = verify_folder if study.is_dir() else verify_archive
         findings = check(study, share=share, progress=advance).findings
     print_findings(findings, as_json)

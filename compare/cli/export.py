@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from compare.cli.command import command
-from compare.cli.endings import interruptible
+from compare.cli.endings import report_interrupts
 from compare.cli.options import NamedProblem, StoredGait
-from compare.cli.outputs import output_file
+from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_result, print_written
 from compare.study.references import find_reference
 from nlp_gait import gaitbench
@@ -31,7 +31,7 @@ def export(stored: StoredGait, format_: str, out: Path | None = None, period_ms:
     from nlp_gait.export.formats import FORMATS, write_as
 
     loaded = stored.load()
-    target = output_file(out or stored.result.with_name(stored.result.stem + FORMATS.get(format_, "")))
+    target = check_output_file(out or stored.result.with_name(stored.result.stem + FORMATS.get(format_, "")))
     write_as(format_, target, loaded, period_ms)
     print_written(target)
 
@@ -91,7 +91,7 @@ def animate(
     from compare.report.interactive import animate_gait
 
     loaded = stored.load()
-    target = output_file(stored.result.with_suffix(".gif") if out is None else out)
+    target = check_output_file(stored.result.with_suffix(".gif") if out is None else out)
     if target.suffix.lower() == ".html":
         animate_gait(loaded.problem, loaded.x, loaded.problem.name).write(target)
         print_written(target)
@@ -99,7 +99,7 @@ def animate(
     if target.suffix.lower() != SHEET:
         check_video_path(target)
     skeleton = make_skeleton(loaded, frames_per_s / speed)
-    with interruptible():
+    with report_interrupts():
         if target.suffix.lower() == SHEET:
             write_contact_sheet(skeleton, target, poses)
         else:

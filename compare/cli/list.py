@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.cli.command import command
-from compare.cli.outputs import output_file
+from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, stdout
 from compare.study.description import describe_solver, list_described_names
 from compare.study.task import list_solvers
@@ -32,7 +32,7 @@ def list_problems(
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
     if robot is not None and name is None:
-        _robot(robot, out, as_json)
+        _describe_robot(robot, out, as_json)
         return
     if out is not None:
         raise InputError("--out is the figure of a robot; give --robot FILE, and no problem")
@@ -42,9 +42,9 @@ def list_problems(
     if algorithms or name in known:
         _print_algorithms(known if name is None else [name], as_json)
     elif name is None:
-        _overview(as_json)
+        _print_overview(as_json)
     else:
-        _details(name, {} if robot is None else {"robot": robot}, as_json)
+        _print_details(name, {} if robot is None else {"robot": robot}, as_json)
 
 
 def _print_algorithms(names: Sequence[str], as_json: bool) -> None:
@@ -65,10 +65,10 @@ def _belongs_here(record: logging.LogRecord) -> bool:
     return "see nlp-gait list --robot" not in record.getMessage()
 
 
-def _robot(name: str, out: Path | None, as_json: bool) -> None:
+def _describe_robot(name: str, out: Path | None, as_json: bool) -> None:
     from nlp_gait.gaits.humanoid.body import describe_humanoid, make_humanoid
 
-    target = None if out is None else output_file(out)
+    target = None if out is None else check_output_file(out)
     log = logging.getLogger("nlp_gait")
     log.addFilter(_belongs_here)  # what it refers to is printed below
     try:
@@ -92,7 +92,7 @@ def _robot(name: str, out: Path | None, as_json: bool) -> None:
         print_written(*plot_robot(body.biped, target.with_suffix("")))
 
 
-def _overview(as_json: bool) -> None:
+def _print_overview(as_json: bool) -> None:
     problems = {name: load(name) for name in problem_names()}
     installed = {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")}
     if as_json:
@@ -117,15 +117,15 @@ def _overview(as_json: bool) -> None:
     )
 
 
-def _details(name: str, given: Mapping[str, Any], as_json: bool) -> None:
+def _print_details(name: str, given: Mapping[str, Any], as_json: bool) -> None:
     problem = load(name, **given)
     if as_json:
         print_json(
             {
                 "problem": name,
                 "options": dict(problem.options),
-                "variables": _chosen(problem.variables, "name", "unit", "lower", "upper", "description"),
-                "parameters": _chosen(problem.own_parameters, "name", "unit", "default", "description"),
+                "variables": _select_attributes(problem.variables, "name", "unit", "lower", "upper", "description"),
+                "parameters": _select_attributes(problem.own_parameters, "name", "unit", "default", "description"),
             }
         )
         return
@@ -138,5 +138,5 @@ def _details(name: str, given: Mapping[str, Any], as_json: bool) -> None:
     stdout.print(f"options: {options}\nbounds of variables are parameters: --set {problem.names[0]}.lower=...")
 
 
-def _chosen(items: Iterable[object], *attributes: str) -> list[dict[str, Any]]:
+def _select_attributes(items: Iterable[object], *attributes: str) -> list[dict[str, Any]]:
     return [{name: getattr(item, name) for name in attributes} for item in items]

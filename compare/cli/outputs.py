@@ -16,7 +16,7 @@ REGISTER = "written"  # folder in the cache folder
 _named: dict[Path, str] = {}  # outputs of the running command, and their hashes before
 
 
-def output_file(path: Path) -> Path:
+def check_output_file(path: Path) -> Path:
     """Check before the work that a file can be written and may be replaced, and return its path; raises OutputError."""
     check_output_name(path)
     check_output(path)

@@ -138,7 +138,7 @@ def print_written(*paths: Path) -> None:
 
 
 @contextmanager
-def progress_bar(description: str, total: int | None) -> Iterator[Callable[..., None]]:
+def show_progress(description: str, total: int | None) -> Iterator[Callable[..., None]]:
     """Show progress on stderr, of unknown length if total is None; the yielded function takes a note, and steps other than 1."""
     if not stderr.is_terminal:
         yield _ProgressLog(description, total)

@@ -13,9 +13,9 @@ import typer
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.record_statistics import Weighting
 from compare.cli.command import command
-from compare.cli.endings import end_if_excluded, interruptible
+from compare.cli.endings import end_if_excluded, report_interrupts
 from compare.cli.options import name_all
-from compare.cli.printing import describe_command, print_result, print_table, print_written, progress_bar, say, stdout
+from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.cli.simulate import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.study.evidence import read_evidence
@@ -83,7 +83,7 @@ def report(
     simulated = simulate_best(folder, records, drive_options.make()) if engine else []
     further = FurtherFiles(csv=as_csv, parquet=parquet, latex=latex, pdf=pdf, style=style)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
-    data = {**plain_simulations(simulated), "excluded": evidence.sentences}
+    data = {**encode_simulations(simulated), "excluded": evidence.sentences}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
     end_if_excluded(evidence.sentences)
 
@@ -109,7 +109,7 @@ def reproduce(
     chosen = reproduction.quick if quick else reproduction.full
     if effort:
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
-    with interruptible(folder=out), progress_bar(paper, chosen.steps) as advance:
+    with report_interrupts(folder=out), show_progress(paper, chosen.steps) as advance:
         reproduction.reproduce(out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler)
     print_written(out / "report.md")
 
@@ -122,8 +122,8 @@ def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> l
     gaits = select_best_gaits(compare_problems(records))
     remedy = f"continue with `nlp-gait report --engine {folder}`"
     with (
-        interruptible(f"interrupted while simulating; finished simulations are stored; {remedy}"),
-        progress_bar("gaits", len(gaits)) as advance,
+        report_interrupts(f"interrupted while simulating; finished simulations are stored; {remedy}"),
+        show_progress("gaits", len(gaits)) as advance,
     ):
         simulated = simulate_records(folder, gaits, drive, advance)
     if gaits and not simulated:
@@ -132,7 +132,7 @@ def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> l
     return simulated
 
 
-def plain_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
+def encode_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
     """Return simulated gaits by problem, and their agreement with the model, as plain data; empty without any."""
     from compare.analysis.simulated_gaits import group_by_problem, measure_agreement
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.analysis.units import millimetres, with_unit
+from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import command
-from compare.cli.endings import fail, interruptible
+from compare.cli.endings import fail, report_interrupts
 from compare.cli.options import StoredGait, parse_number
-from compare.cli.outputs import output_file
-from compare.cli.printing import print_json, print_table, print_written, progress_bar, stdout
+from compare.cli.outputs import check_output_file
+from compare.cli.printing import print_json, print_table, print_written, show_progress, stdout
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
 from nlp_gait.formulation.result import load_result
@@ -156,7 +156,7 @@ def simulate(
     if film.beside is not None and film.video is None:
         fail("--beside adds a second gait to a film; name the film with --video FILE.mp4 or FILE.gif")
     size = parse_picture_size(film.size)
-    target = None if film.video is None else output_file(check_video_path(film.video))
+    target = None if film.video is None else check_output_file(check_video_path(film.video))
     folder = None if out is None else make_writable_folder(out)
     drive, conditions = drive_options.make(), world.make()
     gaits = [(stored.result, stored.load())]
@@ -175,9 +175,9 @@ def simulate(
         traces = [show_in_window(players[0]) if viewer else players[0]()]
     measured = [_measure(plan, trace, drive) for plan, trace in zip(plans, traces, strict=True)]
     survival = None
-    data = {"schema": 1, **_plain(*measured[0])}
+    data = {"schema": 1, **_encode_walk(*measured[0])}
     if film.beside is not None:
-        data["beside"] = _plain(*measured[1])
+        data["beside"] = _encode_walk(*measured[1])
     written = [] if target is None else [target]
     if folder is not None:
         written += [folder / name for name in ("report.json", "model.xml", "simulation.npz")]
@@ -188,7 +188,7 @@ def simulate(
     if robustness:
         lost = "nothing was written; name a folder with --out"
         where = lost if folder is None else f"the simulation is stored in {folder}"
-        with interruptible(f"interrupted in the tests of robustness; {where}"):
+        with report_interrupts(f"interrupted in the tests of robustness; {where}"):
             survival = measure_robustness(plan, drive)
         data["robustness"] = asdict(survival)
         if folder is not None:
@@ -218,7 +218,7 @@ def _write_film(
     recordings = [record_film(title, plan, player, interval_s) for title, plan, player in gaits]
 
     def with_progress() -> Iterator[Frame]:
-        with progress_bar("frames", max(len(recording.t) for recording in recordings)) as advance:
+        with show_progress("frames", max(len(recording.t) for recording in recordings)) as advance:
             for picture in draw_pictures(recordings, size, note):
                 yield picture
                 advance("")
@@ -236,7 +236,7 @@ def _measure(plan: Plan, trace: Simulation, drive: Drive) -> tuple[Measurements,
     return walk.measurements, walk
 
 
-def _plain(report: Measurements, walk: Walk | None) -> dict[str, Any]:
+def _encode_walk(report: Measurements, walk: Walk | None) -> dict[str, Any]:
     if walk is None:
         return asdict(report)
     whole = {"walked_m": walk.walked_m, "planned_m": walk.planned_m, "energy_J": walk.engine_J}
@@ -260,7 +260,7 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
         "slip of a supporting foot": report.slip_m,
         **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
     }
-    rows = [(name, millimetres(value)) for name, value in lengths.items()]
+    rows = [(name, format_millimetres(value)) for name, value in lengths.items()]
     tracking = f"{report.tracking_rms_rad:.4f} rad RMS, {report.tracking_max_rad:.4f} rad largest"
     print_table("Compared with the plan", ("", "measured"), [*rows, ("tracking error of the joints", tracking)])
     if report.earliest_landing_s is not None and report.landing_speed_m_s is not None:
@@ -299,8 +299,8 @@ def _print_course(walk: Walk, *, open_loop: bool) -> None:
         stdout.print(f"{walk.steps_done} of {walk.steps} steps completed before the fall{remedy}")
         return
     stdout.print(
-        f"{walk.steps} steps: walked {millimetres(walk.walked_m, '.0f')} of {millimetres(walk.planned_m, '.0f')}, "
-        f"{millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:z.1f} degrees to the left "
+        f"{walk.steps} steps: walked {format_millimetres(walk.walked_m, '.0f')} of {format_millimetres(walk.planned_m, '.0f')}, "
+        f"{format_millimetres(walk.drift_m, '.0f')} to the left, heading {walk.heading_deg:z.1f} degrees to the left "
         f"(planned {walk.planned_heading_deg:z.1f}); "
         f"{with_unit(walk.engine_J_per_planned_m, 'J', '.1f')} per planned metre (model: {walk.model_J_per_m:.1f} J), "
         f"{with_unit(walk.engine_J_per_m, 'J', '.1f')} per walked metre"

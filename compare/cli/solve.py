@@ -9,10 +9,10 @@ from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
 from compare.cli.command import command
 from compare.cli.compare import print_summaries
-from compare.cli.endings import end_interrupted, fail, until_interrupted
+from compare.cli.endings import end_interrupted, fail, run_until_interrupted
 from compare.cli.options import NamedProblem, SearchOptions, parse_names, parse_number, parse_values, parse_x
-from compare.cli.outputs import output_file
-from compare.cli.printing import print_json, print_rows, print_table, print_written, progress_bar, say, stdout
+from compare.cli.outputs import check_output_file
+from compare.cli.printing import print_json, print_rows, print_table, print_written, say, show_progress, stdout
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.run_study import Study, run_study
@@ -42,13 +42,13 @@ def solve(
 
     Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
     """
-    target = None if out is None else output_file(out)
+    target = None if out is None else check_output_file(out)
     loaded = problem.spec().load()
     first = None if x0 is None else loaded.check_x(parse_x(x0))
     chosen = registry.make_solver(solver, **({} if linear_solver is None else {"linear_solver": linear_solver}))
     starts = loaded.hints.starts if starts is None else starts
-    with progress_bar(f"{solver} starts", starts) as advance:
-        solution, stopped = until_interrupted(
+    with show_progress(f"{solver} starts", starts) as advance:
+        solution, stopped = run_until_interrupted(
             lambda: nlp_gait.solve(
                 loaded,
                 starts=starts,
@@ -135,8 +135,8 @@ def search(
     spec = problem.spec()
     solver = SolverSpec(name=algorithm, runs=searches.runs, polish=searches.polish)
     tasks = searches.make_study([spec], [solver]).tasks()
-    with progress_bar(f"{algorithm} runs", len(tasks)) as advance:
-        records, stopped = until_interrupted(
+    with show_progress(f"{algorithm} runs", len(tasks)) as advance:
+        records, stopped = run_until_interrupted(
             lambda: run_study(
                 Study(tasks=tasks, folder=out, jobs=jobs or available_cores()),
                 progress=lambda _, record: advance(f"{record.verdict.objective:.6g}"),
@@ -212,7 +212,7 @@ def plan(
     Examples: `nlp-gait plan --robot nao-v5 --steps 10 --speed 0.05 --out walk.json`, then `nlp-gait simulate walk.json` and
     `nlp-gait export walk.json --format csv --period-ms 1`
     """
-    target = None if out is None else output_file(out)
+    target = None if out is None else check_output_file(out)
     found = nlp_gait.plan_walk(
         robot,
         steps,

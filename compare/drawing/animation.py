@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import new_figure, style
+from compare.drawing.figures import make_figure, use_style
 from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Skeleton, Sole
@@ -39,8 +39,8 @@ def draw_frames(skeleton: Skeleton) -> Iterator[Frame]:
     """Yield one frame per sample: in 3D, from the side, the front and above; a planar gait from the side only."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    with style():
-        figure = new_figure(*(PLANAR_FRAME if skeleton.planar else FRAME))
+    with use_style():
+        figure = make_figure(*(PLANAR_FRAME if skeleton.planar else FRAME))
         figure.set_layout_engine("none")  # fixed positions: computing a layout costs more than drawing
         figure.set_dpi(FRAME_DPI)
         canvas: Any = FigureCanvasAgg(figure)
@@ -55,7 +55,7 @@ def draw_frames(skeleton: Skeleton) -> Iterator[Frame]:
 def write_contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
     """Write some instants as one PNG, one row per view; raises OutputError."""
     times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
-    with style(), replace_file(path) as file, delay_interrupts():
+    with use_style(), replace_file(path) as file, delay_interrupts():
         figure = plot_poses(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
         figure.savefig(file, format="png", dpi=SHEET_DPI)
 
@@ -65,9 +65,9 @@ def plot_poses(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[str
     chosen = [int(np.abs(skeleton.t - time).argmin()) for time in times_s]
     low, high = skeleton.box()
     widths, heights = ([float((high - low)[VIEWS[view][i]] + 2 * MARGIN) for view in views] for i in (0, 1))
-    with style():
+    with use_style():
         rows_in = [0.35 + 1.45 * height / max(widths) for height in heights]
-        figure = new_figure(1.6 * len(chosen), 0.95 + sum(rows_in))
+        figure = make_figure(1.6 * len(chosen), 0.95 + sum(rows_in))
         axes = figure.subplots(len(views), len(chosen), squeeze=False, sharey="row", height_ratios=heights)
         for row, view in zip(axes, views, strict=True):
             for axis, k in zip(row, chosen, strict=True):

@@ -9,8 +9,16 @@ import numpy as np
 
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.overview import Ranking
-from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, ecdf, performance_profile
-from compare.drawing.figures import Look, add_legend_below, assign_looks, new_axes, new_figure, style, use_log_axes
+from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS, compute_band, compute_ecdf, compute_profiles
+from compare.drawing.figures import (
+    Look,
+    add_legend_below,
+    assign_looks,
+    make_axes,
+    make_figure,
+    use_log_axes,
+    use_style,
+)
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 
@@ -37,9 +45,9 @@ def plot_convergence(comparison: Comparison, *, column: bool = False) -> Figure:
 def plot_by_cost(comparison: Comparison, draw: Draw, words: str, both: bool = False, *, column: bool = False) -> Figure:
     """Plot over evaluations and over seconds; ``draw`` receives the axes, a solver, its look and the kind of cost."""
     look = assign_looks([solver.name for solver in comparison.solvers])
-    with style():
+    with use_style():
         shown = ["evaluations"] if column else list(AXES)
-        figure = new_figure(None if column else 7.4, 2.8)
+        figure = make_figure(None if column else 7.4, 2.8)
         for axes, axis in zip(figure.subplots(1, len(shown), sharey=True, squeeze=False)[0], shown, strict=True):
             for solver in comparison.solvers:
                 if solver.has_costs(axis):
@@ -90,7 +98,7 @@ def plot_ecdf(comparison: Comparison, *, column: bool = False) -> Figure:
     def draw(axes: Axes, solver: SolverRuns, look: Look, axis: str) -> None:
         last = max([c.total_cost(axis) for s in comparison.solvers if s.has_costs(axis) for c in s.curves] + [1e-3])
         costs = np.array([c.cost_to_reach(target, axis) for c in solver.curves for target in ECDF_TARGETS])
-        at, share = ecdf(costs)
+        at, share = compute_ecdf(costs)
         _draw_share(axes, at, share, solver.name, look, last)
 
     return plot_by_cost(comparison, draw, "share of runs and targets", column=column)
@@ -99,13 +107,13 @@ def plot_ecdf(comparison: Comparison, *, column: bool = False) -> Figure:
 def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
     """Plot the share of problems, runs and targets solved within evaluations per variable; solvers that ran on all."""
     solvers, shared = index_solvers(comparisons)
-    with style():
-        figure, axes = new_axes(7.4, 3.6)
+    with use_style():
+        figure, axes = make_axes(7.4, 3.6)
         drawn = {}
         for name in shared:
             runs = [(curve, len(s[name].records[0].x) or 1) for s in solvers for curve in s[name].curves]
             costs = np.array([curve.cost_to_reach(target) / n for curve, n in runs for target in ECDF_TARGETS])
-            drawn[name] = (*ecdf(costs), max([curve.total_cost() / n for curve, n in runs] + [1.0]))
+            drawn[name] = (*compute_ecdf(costs), max([curve.total_cost() / n for curve, n in runs] + [1.0]))
         last = max(end for _, _, end in drawn.values())
         best_first = sorted(drawn, key=lambda name: -drawn[name][1][-1] if drawn[name][1].size else 0.0)
         for name, look in assign_looks(best_first).items():
@@ -119,8 +127,8 @@ def plot_suite_ecdf(comparisons: Sequence[Comparison]) -> Figure:
 
 def plot_final_gaps(comparison: Comparison, *, column: bool = False) -> Figure:
     """Plot the final gap of each run, one row per solver; infeasible runs are counted at the right edge."""
-    with style():
-        figure, axes = new_axes(None if column else 7.4)
+    with use_style():
+        figure, axes = make_axes(None if column else 7.4)
         figure.set_figheight(0.8 + 0.28 * len(comparison.solvers))
         names = [solver.name for solver in comparison.solvers]
         for row, (solver, look) in enumerate(zip(comparison.solvers, assign_looks(names).values(), strict=True)):
@@ -145,10 +153,10 @@ def plot_final_gaps(comparison: Comparison, *, column: bool = False) -> Figure:
 
 def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
     """Plot the performance profile of expected running times over problems and targets; solvers that ran on all."""
-    with style():
+    with use_style():
         costs = list_expected_costs(comparisons)
-        figure, axes = new_axes(4.6, 2.8)
-        profile = performance_profile(costs)
+        figure, axes = make_axes(4.6, 2.8)
+        profile = compute_profiles(costs)
         last = max([factor[-1] for factor, _ in profile.values() if factor.size], default=1.0) * 2.0
         for name, look in assign_looks(profile).items():
             _draw_share(axes, *profile[name], name, look, last)
@@ -171,8 +179,8 @@ def plot_critical_difference(ranking: Ranking) -> Figure:
     ends = [int(np.searchsorted(ranks, rank + width, side="left")) - 1 for rank in ranks]
     bars = [(first, last) for first, last in enumerate(ends) if last > first and last not in ends[:first]]
     half = (len(names) + 1) // 2  # names to the left; the others are to the right, from below
-    with style():
-        figure, axes = new_axes(7.4, 0.9 + 0.14 * len(bars) + 0.2 * half)
+    with use_style():
+        figure, axes = make_axes(7.4, 0.9 + 0.14 * len(bars) + 0.2 * half)
         for height, (first, last) in enumerate(bars, start=1):
             axes.plot(ranks[[first, last]] + [-0.03, 0.03], [-0.5 * height] * 2, color="black", linewidth=3.0)
         for place, (name, look) in enumerate(assign_looks(names).items()):

@@ -63,12 +63,12 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     return {name: found[name] for name in names}
 
 
-# Style files that ``style`` uses after the project's own one.
+# Style files that ``use_style`` uses after the project's own one.
 _FURTHER: ContextVar[tuple[Path, ...]] = ContextVar("further styles", default=())
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def use_style() -> Iterator[None]:
     """Use the project's matplotlib style, and those of ``add_styles``, within the context."""
     import matplotlib
 
@@ -100,16 +100,16 @@ def check_style(file: Path) -> None:
         matplotlib.rc_params_from_file(file, fail_on_error=True, use_default_template=False)
 
 
-def new_figure(width_in: float | None = 6.3, height_in: float = 3.0) -> Figure:
+def make_figure(width_in: float | None = 6.3, height_in: float = 3.0) -> Figure:
     """Return an empty figure of a size [inch], of the style's size for a width of None; use inside ``style()``."""
     from compare.drawing.notebook_figure import NotebookFigure
 
     return NotebookFigure(figsize=None if width_in is None else (width_in, height_in))
 
 
-def new_axes(width_in: float | None = 6.3, height_in: float = 3.0) -> tuple[Figure, Axes]:
-    """Return an empty figure of a size [inch], see ``new_figure``, and its only axes."""
-    figure = new_figure(width_in, height_in)
+def make_axes(width_in: float | None = 6.3, height_in: float = 3.0) -> tuple[Figure, Axes]:
+    """Return an empty figure of a size [inch], see ``make_figure``, and its only axes."""
+    figure = make_figure(width_in, height_in)
     return figure, figure.subplots()
 
 
@@ -157,14 +157,14 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     write_text(paths[1], render_svg(figure))
     with matplotlib.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)  # the layout is final; with any engine Matplotlib draws twice
-    with style(), replace_file(paths[0]) as file, delay_interrupts():
+    with use_style(), replace_file(paths[0]) as file, delay_interrupts():
         figure.savefig(file, format="png")
     return paths
 
 
 def save_pdf(figure: Figure, path: Path) -> Path:
     """Write a figure as PDF in the current style and return the path; raises OutputError."""
-    with style(), replace_file(path) as file, delay_interrupts():
+    with use_style(), replace_file(path) as file, delay_interrupts():
         figure.savefig(file, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
     return path
 
@@ -172,7 +172,7 @@ def save_pdf(figure: Figure, path: Path) -> Path:
 def render_svg(figure: Figure) -> str:
     """Return a figure as an SVG file; equal figures give equal text."""
     text = io.StringIO()
-    with delay_interrupts(), style():  # Matplotlib's compiled code turns Ctrl-C into other errors
+    with delay_interrupts(), use_style():  # Matplotlib's compiled code turns Ctrl-C into other errors
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     return text.getvalue()
 

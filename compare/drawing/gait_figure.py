@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compare.drawing.animation import COLOURS, GROUND, MARGIN
-from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, new_figure, style
+from compare.drawing.figures import INK, Look, add_legend_below, assign_looks, make_figure, use_style
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result, sample_signals
 from nlp_gait.formulation.display import TRUNK, Skeleton
@@ -90,8 +90,8 @@ def plot_gaits(gaits: Mapping[str, GaitCurves]) -> Figure:
         raise InputError("these gaits have neither a skeleton nor torques: there is nothing to draw")
     columns = 2 if len(gaits) > 1 and count > 2 else count
     rows = -(-count // columns)
-    with style():
-        figure = new_figure(WIDTH_IN, ROW_IN * rows)
+    with use_style():
+        figure = make_figure(WIDTH_IN, ROW_IN * rows)
         axes = list(figure.subplots(rows, columns, squeeze=False).flat)
         if first.skeleton is not None:
             _draw_poses(axes[0], first.skeleton, name)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compare.drawing.figures import new_figure, save, style
+from compare.drawing.figures import make_figure, save, use_style
 from nlp_gait.robots.biped import Biped
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import average_pressure
@@ -20,8 +20,8 @@ ENGINE, MODEL = "#56B4E9", "#000000"
 def plot_robot(biped: Biped, stem: Path) -> tuple[Path, Path]:
     """Write ``<stem>.png`` and ``<stem>.svg`` and return both paths; raises OutputError."""
     robot = biped.full
-    with style():
-        canvas = new_figure(9.0, 4.4)
+    with use_style():
+        canvas = make_figure(9.0, 4.4)
         front, aside, above = canvas.subplots(1, 3)
         for joint in robot.joints.values():
             end = np.sum([part.origin_m for part in robot.path_to_root(joint.child)], axis=0)
@@ -58,8 +58,8 @@ def plot_simulation(plan: Plan, trace: Simulation, drive: Drive, stem: Path) -> 
     """Write ``<stem>.png`` and ``.svg``; raises OutputError."""
     planned, shown = plan.signals.arrays, slice(None, None, EVERY)
     t = trace.t[shown]
-    with style():
-        figure = new_figure(6.3, 6.0)
+    with use_style():
+        figure = make_figure(6.3, 6.0)
         axes = figure.subplots(4, 1, sharex=True)
         smooth, zmp = average_pressure(trace, drive.period_s)[shown], plan.at("zmp", t)
         for axis, name, k in ((axes[0], "x", 0), (axes[1], "y", 1)):

@@ -19,7 +19,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from compare.drawing.figures import style
+from compare.drawing.figures import use_style
 from compare.papers.claims import (
     Check,
     Claim,
@@ -33,7 +33,7 @@ from compare.papers.claims import (
     read_tables,
 )
 from compare.papers.paper_runs import Effort, Runner
-from compare.report.document import Document, Figure, Part, Prose, Rows, Section, Table, text_table
+from compare.report.document import Document, Figure, Part, Prose, Rows, Section, Table, make_text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section, write_document, write_parts
 from compare.study.settings import Session
@@ -138,13 +138,13 @@ class Reproduction(Generic[E, F]):
         records = runner.records
         claims = self.check_claims(findings, values)
         differences = fill_differences(self.printed.differences, values)
-        with style():
+        with use_style():
             figures = self.figures(findings)
         own = {"claims": make_claims_table(claims.values()), "differences": make_differences_table(differences)}
         document = fill_template(template, values=values, tables={**self.tables(findings), **own}, figures=figures)
         label = "full" if effort == self.full else "quick" if effort == self.quick else "reduced"
         settings = [(name, format_settings(value)) for name, value in asdict(effort).items()]
-        parts = (text_table(("effort", "value"), settings, prose=True), TERMS, make_reference_table(records))
+        parts = (make_text_table(("effort", "value"), settings, prose=True), TERMS, make_reference_table(records))
         calls = (make_session_section(k, session) for k, session in enumerate(sessions, start=1))
         title = "Versions, machine, seeds and settings"
         provenance = Section(title=title, parts=(*parts, make_solver_table(records), *calls))

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.best_known import relative_gap
-from compare.analysis.units import axis_label, with_unit
-from compare.drawing.figures import COLOURS, new_axes, style
+from compare.analysis.best_known import compute_gap
+from compare.analysis.units import make_axis_label, with_unit
+from compare.drawing.figures import COLOURS, make_axes, use_style
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Answer, Question, Work
-from compare.report.document import Figure, text_table
+from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.minimize import minimize
@@ -205,9 +205,11 @@ class Certainty(Question[FoundCertainty]):
             title=f"{problem.name}: certainty of the optimum",
             verdict=(f"Proven: {findings.proven}.", f"Supported: {findings.supported}."),
             parts=(
-                text_table((problem.objective.name, "starts", "share"), optima, listed),
-                text_table(("status", "starts"), statuses, "Status of the starts"),
-                text_table(("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"),
+                make_text_table((problem.objective.name, "starts", "share"), optima, listed),
+                make_text_table(("status", "starts"), statuses, "Status of the starts"),
+                make_text_table(
+                    ("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"
+                ),
                 Figure(name=stem, caption=shown, drawing=plot_evidence(findings)),
             ),
             results=certificates,
@@ -226,7 +228,7 @@ def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> L
     if result.violation > FEASIBILITY_TOLERANCE:
         return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
     value = problem.objective.sign * result.objective
-    return LongSearch(objective=value, evaluations=result.evaluations, gap=relative_gap(value, best, problem.objective))
+    return LongSearch(objective=value, evaluations=result.evaluations, gap=compute_gap(value, best, problem.objective))
 
 
 def plot_evidence(evidence: FoundCertainty) -> Drawing:
@@ -234,8 +236,8 @@ def plot_evidence(evidence: FoundCertainty) -> Drawing:
     objective, search, proof = evidence.problem.objective, evidence.search, evidence.certificate
     shown = evidence.optima[:DRAWN]
     values, shares = [o.objective for o in shown], [100 * o.share for o in shown]
-    with style():
-        figure, axes = new_axes(5.6, 3.6)
+    with use_style():
+        figure, axes = make_axes(5.6, 3.6)
         axes.vlines(values, 0.0, shares, color=COLOURS["ipopt"], linewidth=1)
         label = f"distinct optima of {evidence.starts:,} starts of IPOPT ({len(shown)} of {len(evidence.optima)} shown)"
         axes.plot(values, shares, "o", color=COLOURS["ipopt"], label=label)
@@ -248,7 +250,7 @@ def plot_evidence(evidence: FoundCertainty) -> Drawing:
         pad = 0.05 * max(np.ptp(values), 0.01 * abs(values[0]))
         axes.set_xlim(min(values) - pad, max(values) + pad)
         axes.set_ylim(0.0, 105.0)
-        axes.set_xlabel(axis_label(objective.name, objective.unit))
+        axes.set_xlabel(make_axis_label(objective.name, objective.unit))
         axes.set_ylabel("share of converged starts [%]")
         figure.legend(loc="outside lower center")
     return figure

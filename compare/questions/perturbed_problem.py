@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.robots.perturbation import MASS, perturbed_name, split_name
+from nlp_gait.robots.perturbation import MASS, name_perturbed, split_name
 
 
 def rebuild(problem: GaitProblem, **options: str | int | float | bool) -> GaitProblem:
@@ -26,7 +26,7 @@ def get_quantity(problem: GaitProblem, quantity: str) -> float:
 def name_robot(problem: GaitProblem, values: Mapping[str, float]) -> str:
     """Return the name of the problem's robot with other values of some quantities."""
     name, changes = split_name(str(problem.options["robot"]))
-    return perturbed_name(name, {**changes, **values})
+    return name_perturbed(name, {**changes, **values})
 
 
 def perturb_robot(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:

@@ -9,14 +9,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import LENGTH, MASS, NaturalStep, choose_natural_step, heading, name_in_words, with_unit
-from compare.drawing.figures import new_figure, style
+from compare.analysis.units import (
+    LENGTH,
+    MASS,
+    NaturalStep,
+    choose_natural_step,
+    make_heading,
+    name_in_words,
+    with_unit,
+)
+from compare.drawing.figures import make_figure, use_style
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from compare.questions.question import Answer, Question, Work, make_csv_table
-from compare.report.document import Figure, Part, Table, Value, text_table
+from compare.report.document import Figure, Part, Table, Value, make_text_table
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
-from nlp_gait.backends.optima.sensitivities import Sensitivities, model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.optima.sensitivities import Sensitivities, differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
@@ -25,7 +33,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome
 from nlp_gait.progress import Progress
-from nlp_gait.robots.perturbation import quantities
+from nlp_gait.robots.perturbation import list_quantities
 
 # A variable that moves by less than this share of its range over a natural step counts as constant.
 CONSTANT = 1e-9
@@ -87,7 +95,7 @@ def parse_price(raw: Mapping[str, Any]) -> Price:
 
 def price_parameters(optimum: Optimum) -> list[Price]:
     """Return the prices of all parameters; both bounds of a fixed variable are one, under the variable's name."""
-    derivatives, problem = parameter_sensitivities(optimum), optimum.problem
+    derivatives, problem = differentiate_by_parameters(optimum), optimum.problem
     sides = optimum.side[-len(problem.names) :]
     prices = []
     for i, (parameter, value) in enumerate(zip(problem.parameters, map(float, problem.p), strict=True)):
@@ -108,7 +116,7 @@ def price_parameters(optimum: Optimum) -> list[Price]:
 def price_robot(optimum: Optimum, progress: Progress) -> list[Price]:
     """Return the prices of the robot's masses, leg lengths and soles."""
     problem, robot = optimum.problem, optimum.problem.display.robot
-    names = quantities(robot)  # type: ignore[arg-type]
+    names = list_quantities(robot)  # type: ignore[arg-type]
     values = [get_quantity(problem, name) for name in names]
 
     def make_pairs() -> Iterator[tuple[GaitProblem, GaitProblem, float]]:
@@ -118,7 +126,7 @@ def price_robot(optimum: Optimum, progress: Progress) -> list[Price]:
             low, high = (perturb_robot(problem, {name: value + change}) for change in (-half, half))
             yield high, low, 2 * half
 
-    derivatives = model_sensitivities(optimum, make_pairs())
+    derivatives = differentiate_by_models(optimum, make_pairs())
     return [
         _make_price(problem, derivatives, i, name, *(("1", value, MASS) if is_mass(name) else ("m", value, LENGTH)))
         for i, (name, value) in enumerate(zip(names, values, strict=True))
@@ -282,11 +290,11 @@ class Prices(Question[FoundPrices]):
     def report(self, findings: FoundPrices) -> Answer:
         problem, stem = self.problem, f"{self.problem.name}-prices"
         objective, ranges = problem.objective, problem.by_name(problem.scale)
-        steps = (heading(words, objective.unit) for words in ("by the slope", "- step", "+ step"))
+        steps = (make_heading(words, objective.unit) for words in ("by the slope", "- step", "+ step"))
         header = ("quantity", "step", *steps, "error of slope, x*", "x* moves most in", "line [steps]")
 
         def make_table(prices: Sequence[Price], title: str) -> list[Part]:
-            return [text_table(header, [_make_row(price, ranges) for price in prices], title)] if prices else []
+            return [make_text_table(header, [_make_row(price, ranges) for price in prices], title)] if prices else []
 
         parts: list[Part] = [
             *make_table(
@@ -364,13 +372,13 @@ def plot_prices(findings: FoundPrices, problem: GaitProblem) -> Drawing:
     ]
     objective = problem.objective
     unit, scale = PREFIXED.get(objective.unit, (objective.unit, 1.0))
-    with style():
+    with use_style():
         height = 1.0 + 0.24 * max(min(SHOWN, len(prices)) for prices, _ in groups)
-        figure = new_figure(3.6 * len(groups), height)
+        figure = make_figure(3.6 * len(groups), height)
         for axes, (prices, title) in zip(figure.subplots(1, len(groups), squeeze=False)[0], groups, strict=True):
             _plot_bars(axes, prices[:SHOWN], scale)
             axes.set_title(title)
-            axes.set_xlabel(heading(f"change of {objective.name}", unit))
+            axes.set_xlabel(make_heading(f"change of {objective.name}", unit))
     return figure
 
 

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any, ClassVar, Generic, TypeVar
 
 from compare.analysis.best_known import describe_value
-from compare.report.document import Document, Table, Value, text_table
+from compare.report.document import Document, Table, Value, make_text_table
 from compare.report.writing import write_document
 from compare.study.references import find_reference
 from compare.study.store import Store, store_runs
@@ -127,7 +127,7 @@ class Answer(Document):
 
 def make_table(caption: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
     """Return a table of texts with a row for each item; each column maps an item to its cell."""
-    return text_table(tuple(columns), [[cell(item) for cell in columns.values()] for item in items], caption)
+    return make_text_table(tuple(columns), [[cell(item) for cell in columns.values()] for item in items], caption)
 
 
 def make_csv_table(name: str, header: Sequence[str], rows: Sequence[Sequence[Value]]) -> Table:
@@ -138,4 +138,4 @@ def make_csv_table(name: str, header: Sequence[str], rows: Sequence[Sequence[Val
 def make_optima_table(optima: Mapping[str, Mapping[str, float]]) -> Table:
     """Return a table of optima, given as x by variable name under their headings, with a row for each variable."""
     rows = [(name, *(f"{x[name]:.5g}" for x in optima.values())) for name in next(iter(optima.values()))]
-    return text_table(("variable", *optima), rows, "Optima")
+    return make_text_table(("variable", *optima), rows, "Optima")

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import axis_label, name_in_words, units_of
-from compare.drawing.figures import add_legend_below, new_figure, style
+from compare.analysis.units import list_units, make_axis_label, name_in_words
+from compare.drawing.figures import add_legend_below, make_figure, use_style
 from compare.questions.perturbed_problem import rebuild
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_optima_table, make_table
-from compare.report.document import Figure, Table, Value, text_table
+from compare.report.document import Figure, Table, Value, make_text_table
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
@@ -141,7 +141,7 @@ class RealMotors(Question[tuple[Variant, ...]]):
             title=f"{name} with real motors",
             parts=(
                 make_table("Effect of each feature", findings, columns),
-                text_table(
+                make_text_table(
                     ("motors", *kinds), uses, "Largest share of each limit that the optimum uses: joint, sample"
                 ),
                 make_optima_table({v.name: v.x for v in findings}),
@@ -189,8 +189,8 @@ def _make_csv(stem: str, variants: tuple[Variant, ...]) -> Table:
 def plot_motors(variants: tuple[Variant, ...], problem: GaitProblem) -> Drawing:
     """Plot the power at the optimum and at the published one (left), and the position of x* in its ranges (right)."""
     places = np.arange(len(variants))
-    with style():
-        figure = new_figure(7.6, 0.9 + 0.34 * len(variants))
+    with use_style():
+        figure = make_figure(7.6, 0.9 + 0.34 * len(variants))
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
         unchanged = [v.unchanged_power_W for v in variants]
         left.barh(places - 0.19, unchanged, 0.36, color="0.75", label="at the published x*")
@@ -198,11 +198,11 @@ def plot_motors(variants: tuple[Variant, ...], problem: GaitProblem) -> Drawing:
         left.set_yticks(places, [v.name for v in variants])
         left.invert_yaxis()
         left.grid(visible=False, axis="y")
-        left.set_xlabel(axis_label("power", "W"))
+        left.set_xlabel(make_axis_label("power", "W"))
         add_legend_below(figure)
         shares = np.array([(np.array(list(v.x.values())) - problem.lower) / problem.scale for v in variants])
         image = right.imshow(shares, aspect="auto", cmap="viridis", vmin=0.0, vmax=1.0)
-        units = units_of(problem)
+        units = list_units(problem)
         words = [name_in_words(name, units[name]) for name in problem.names]
         right.set_xticks(range(len(words)), words, rotation=40, ha="right")
         right.set_yticks([])

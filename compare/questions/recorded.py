@@ -62,7 +62,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> 
         notes.append(f"held, because they are not in the file: {', '.join(gait.motion.held)}")
     optimum = engine = None
     try:
-        optimum = _optimum(gait, seed)
+        optimum = _solve_optimum(gait, seed)
     except GaitError as error:
         notes.append(f"no optimum of {gait.gait} for this step and duration: {error}")
     if in_engine:
@@ -75,7 +75,7 @@ def judge_gait(gait: RecordedGait, *, in_engine: bool = True, seed: int = 0) -> 
     )
 
 
-def _optimum(gait: RecordedGait, seed: int) -> Evaluation:
+def _solve_optimum(gait: RecordedGait, seed: int) -> Evaluation:
     problem = gait.make_planned()
     solution = solve(problem, starts=STARTS, seed=seed)
     if not solution.converged:

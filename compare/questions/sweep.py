@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import axis_label, quantity, units_of, with_unit
-from compare.drawing.figures import COLOURS, new_axes, style
+from compare.analysis.units import format_quantity, list_units, make_axis_label, with_unit
+from compare.drawing.figures import COLOURS, make_axes, use_style
 from compare.questions.question import Answer, Question, Work, make_csv_table
-from compare.report.document import Figure, Table, Value, text_table
+from compare.report.document import Figure, Table, Value, make_text_table
 from compare.study.record import RunRecord, parse_record
 from compare.study.references import find_reference
 from compare.study.run_task import run_task, try_task
@@ -179,7 +179,7 @@ class Sweep(Question[list[SweepPoint]]):
             stem=stem,
             title=f"{problem.name} by {solver}",
             parts=(
-                text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
+                make_text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem, solver)),
                 _make_csv(stem, findings, problem),
             ),
@@ -261,20 +261,22 @@ def _make_csv(stem: str, points: Sequence[SweepPoint], problem: GaitProblem) -> 
 def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem, solver: str) -> Drawing:
     """Plot the optimum over the first axis, with a line for each combination of the others; infeasible points as crosses."""
     first, *others = points[0].at
-    units, objective = units_of(problem), problem.objective
+    units, objective = list_units(problem), problem.objective
     lines = dict.fromkeys(tuple(point.at[name] for name in others) for point in points)
-    with style():
+    with use_style():
         shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(lines)))
-        figure, axes = new_axes(4.2 if not others else 6.3, 3.0)
+        figure, axes = make_axes(4.2 if not others else 6.3, 3.0)
         for key, shade in zip(lines, shades, strict=True):
             line = [point for point in points if tuple(point.at[name] for name in others) == key]
-            label = ", ".join(quantity(name, units[name], value) for name, value in zip(others, key, strict=True))
+            label = ", ".join(
+                format_quantity(name, units[name], value) for name, value in zip(others, key, strict=True)
+            )
             values = [point.objective if point.feasible else np.nan for point in line]
             colour = shade if others else COLOURS.get(solver, shade)
             axes.plot([point.at[first] for point in line], values, "o-", color=colour, label=label or solver)
         mark_values(axes, sorted({point.at[first] for point in points if not point.feasible}), "infeasible")
-        axes.set_xlabel(axis_label(first, units[first]))
-        axes.set_ylabel("least " * (objective.sign > 0) + axis_label(objective.name, objective.unit))
+        axes.set_xlabel(make_axis_label(first, units[first]))
+        axes.set_ylabel("least " * (objective.sign > 0) + make_axis_label(objective.name, objective.unit))
         figure.legend(loc="outside right upper") if others else axes.legend()
     return figure
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from compare.analysis.units import number
+from compare.analysis.units import format_number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -42,7 +42,7 @@ class Table:
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """Rows as shown on a page."""
         return tuple(
-            tuple(_cell(value, form) for value, form in zip(row, self.columns.values(), strict=True))
+            tuple(_make_cell(value, form) for value, form in zip(row, self.columns.values(), strict=True))
             for row in self.rows
         )
 
@@ -95,7 +95,9 @@ class Document:
         return [part for part in self.parts if isinstance(part, Section)]
 
 
-def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", prose: bool = False) -> Table:
+def make_text_table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "", prose: bool = False
+) -> Table:
     """Return a table of texts, sortable by the number at the beginning of a cell."""
     return Table(columns=dict.fromkeys(header, ""), rows=rows, caption=caption, prose=prose)
 
@@ -104,7 +106,7 @@ def make_table_section(
     title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *words: str, prose: bool = False
 ) -> tuple[Section, ...]:
     """Return a section of sentences and a table of texts; none without rows."""
-    return (Section(title=title, parts=(*words, text_table(header, rows, prose=prose))),) if rows else ()
+    return (Section(title=title, parts=(*words, make_text_table(header, rows, prose=prose))),) if rows else ()
 
 
 def iterate_leaves(parts: Sequence[Part]) -> Iterator[str | Prose | Table | Figure]:
@@ -116,17 +118,17 @@ def iterate_leaves(parts: Sequence[Part]) -> Iterator[str | Prose | Table | Figu
             yield part
 
 
-def _cell(value: Value, form: str) -> Cell:
+def _make_cell(value: Value, form: str) -> Cell:
     if value is None:
         return Cell(text="-", key=math.inf)
     if isinstance(value, str):
-        return Cell(text=value, key=_leading_number(value))
+        return Cell(text=value, key=_read_leading_number(value))
     if isinstance(value, bool):
         return Cell(text="yes" if value else "no")
-    return Cell(text=number(value, form), key=value if math.isfinite(value) else math.inf)
+    return Cell(text=format_number(value, form), key=value if math.isfinite(value) else math.inf)
 
 
-def _leading_number(text: str) -> float | None:
+def _read_leading_number(text: str) -> float | None:
     """Return for example 10000 for "10 000 calls", with a thin space; infinity for a dash, so that missing values come last."""
     if text == "-":
         return math.inf

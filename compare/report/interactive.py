@@ -14,7 +14,7 @@ from compare.drawing.comparison_figures import SMALLEST_GAP
 from compare.drawing.figures import Look, assign_looks, render_svg
 from compare.drawing.gait_figure import GaitCurves, plot_gaits, prepare_gait
 from compare.report.document import Document, Figure
-from compare.report.writing import html
+from compare.report.writing import render_page
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_text
 from nlp_gait.formulation import Array, GaitProblem, Result
@@ -74,18 +74,18 @@ def _describe_gait(name: str, gait: GaitCurves, colour: str) -> dict[str, Any]:
         "colour": colour,
         "planar": skeleton.planar,
         "t": _round(1000.0 * gait.t[frames]),
-        "ground": _in_mm(skeleton.ground),
-        "limbs": [{"side": limb.side, "points": _in_mm(limb.points[frames])} for limb in skeleton.limbs],
+        "ground": _to_mm(skeleton.ground),
+        "limbs": [{"side": limb.side, "points": _to_mm(limb.points[frames])} for limb in skeleton.limbs],
         "soles": [
-            {"side": s.side, "points": _in_mm(s.corners[frames]), "supports": s.supports[frames].astype(int).tolist()}
+            {"side": s.side, "points": _to_mm(s.corners[frames]), "supports": s.supports[frames].astype(int).tolist()}
             for s in skeleton.soles
         ],
-        **{key: None if place is None else _in_mm(place[frames]) for key, place in points.items()},
+        **{key: None if place is None else _to_mm(place[frames]) for key, place in points.items()},
         **{key: None if curve is None else _round(curve[frames]) for key, curve in curves.items()},
     }
 
 
-def _in_mm(metres: Array) -> list[Any]:
+def _to_mm(metres: Array) -> list[Any]:
     """Return whole millimetres; a skeleton has no unknown coordinates."""
     rounded: list[Any] = np.round(1000.0 * metres).astype(int).tolist()
     return rounded
@@ -120,4 +120,4 @@ def animate_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str
         raise InputError(f"problem {problem.name!r} has no skeleton to draw")
     drawing = plot_gaits(gaits)
     figure = Figure(name="gait", caption=CAPTION, drawing=drawing, data=data)
-    return GaitPage(html(Document(title=problem.title, parts=[figure]), [render_svg(drawing)]))
+    return GaitPage(render_page(Document(title=problem.title, parts=[figure]), [render_svg(drawing)]))

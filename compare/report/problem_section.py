@@ -8,11 +8,11 @@ from compare.analysis.published import make_published_rows
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.analysis.solver_table import HEADER, SolverSummary, count, describe_unknown, format_cells, summarise
-from compare.analysis.units import BY_UNIT, heading, seconds
+from compare.analysis.units import BY_UNIT, format_seconds, make_heading
 from compare.analysis.verdict import compare_pairs, describe_best_known
 from compare.drawing.comparison_figures import SMALLEST_GAP, plot_convergence, plot_ecdf, plot_final_gaps
 from compare.drawing.gait_figure import plot_gaits, prepare_gait
-from compare.report.document import Figure, Part, Prose, Section, make_table_section, text_table
+from compare.report.document import Figure, Part, Prose, Section, make_table_section, make_text_table
 from compare.report.interactive import describe_gaits, describe_runs
 from compare.study.record import RunRecord, load_gait
 from compare.study.simulations import SimulatedGait
@@ -48,7 +48,7 @@ CAPTION = (
 )
 
 
-def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] = ()) -> Section:
+def make_problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] = ()) -> Section:
     """Return the section on one problem: tables, figures, lists, and its best gaits in the engine if simulated."""
     summaries = summarise(comparison)
     objective = comparison.objective
@@ -65,21 +65,21 @@ def problem_section(comparison: Comparison, simulated: Sequence[SimulatedGait] =
     gaits = make_gaits_part(comparison)
     published = make_published_rows(comparison)
     return Section(
-        title=f"{comparison.problem}: {heading(objective.name, objective.unit)}, to {objective.sense}",
+        title=f"{comparison.problem}: {make_heading(objective.name, objective.unit)}, to {objective.sense}",
         parts=(
             "Claimed is what the solvers report. Everything else is what the judge finds with the exact functions at "
             "the reported point and the problem's samples.",
             describe_reference(comparison),
-            text_table(HEADER, [format_cells(s, comparison) for s in summaries], "Solvers, best median first"),
+            make_text_table(HEADER, [format_cells(s, comparison) for s in summaries], "Solvers, best median first"),
             *(() if gaits is None else (gaits,)),
             *figures,
-            _costs(comparison, summaries),
-            *engine_section(simulated),
-            *_tests(comparison),
-            *_binding(comparison),
+            _make_costs(comparison, summaries),
+            *make_engine_section(simulated),
+            *_make_tests(comparison),
+            *_list_active(comparison),
             *(() if published is None else make_table_section("The paper's values and ours", *published)),
-            *_failures(comparison),
-            *_between(comparison),
+            *_list_failures(comparison),
+            *_list_violated_between(comparison),
         ),
     )
 
@@ -91,42 +91,42 @@ def describe_reference(comparison: Comparison) -> str:
     return f"Gaps are relative to the best known value: {describe_best_known(comparison)}.{offer}"
 
 
-def _costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
+def _make_costs(comparison: Comparison, summaries: list[SolverSummary]) -> Section:
     targets = [f"{100 * target:g} %" for target in TARGETS]
     unit = comparison.objective.unit
-    runtime = text_table(
+    runtime = make_text_table(
         ("solver", *(f"to {t}" for t in targets), *(f"seconds to {t}" for t in targets)),
         [
-            (s.solver, *(count(v) for v in s.expected_evaluations), *(_seconds(v) for v in s.expected_s))
+            (s.solver, *(count(v) for v in s.expected_evaluations), *(_format_cost(v) for v in s.expected_s))
             for s in summaries
         ],
         "Expected running time to targets: cost of all runs until then, divided by the number that reached it",
     )
-    times = text_table(
+    times = make_text_table(
         ("solver", "feasible between samples", "95 % interval of the median", "build", "compile", "solve, median"),
         [
             (
                 s.solver,
                 "-" if s.dense_feasible is None else f"{s.dense_feasible}/{s.runs}",
                 "-" if s.median_interval is None else f"{s.median_interval[0]:.6f} to {s.median_interval[1]:.6f}",
-                seconds(s.build_s, ".2f"),
-                seconds(s.compile_s, ".2f"),
-                seconds(s.time_s),
+                format_seconds(s.build_s, ".2f"),
+                format_seconds(s.compile_s, ".2f"),
+                format_seconds(s.time_s),
             )
             for s in summaries
         ],
         f"Uncertainty of the median [{unit}] (feasible runs, bootstrap), and times; build and compile are "
         "the longest, needed once per process",
     )
-    calls = text_table(
+    calls = make_text_table(
         ("solver", "f", "g", "gradient", "Jacobian", "Hessian", "failed"),
-        [(solver.name, *_mean_calls(solver.records)) for solver in comparison.solvers],
+        [(solver.name, *_average_calls(solver.records)) for solver in comparison.solvers],
         "Mean calls per run",
     )
     return Section(title="Costs", parts=(*describe_unknown(comparison), runtime, times, calls))
 
 
-def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
+def _average_calls(records: tuple[RunRecord, ...]) -> list[str]:
     if not all(r.evaluations for r in records):
         return ["-"] * 6
     means = [
@@ -137,12 +137,12 @@ def _mean_calls(records: tuple[RunRecord, ...]) -> list[str]:
     return [f"{value:.1f}" if value % 1 else f"{value:.0f}" for value in (*means, failed)]
 
 
-def _tests(comparison: Comparison) -> tuple[Section, ...]:
+def _make_tests(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
         (
             f"{pair.first} < {pair.second}",
-            _p(pair.rank_sum),
-            "-" if pair.signed_rank is None else _p(pair.signed_rank),
+            _format_p(pair.rank_sum),
+            "-" if pair.signed_rank is None else _format_p(pair.signed_rank),
             str(pair.paired_runs),
             f"{pair.a12:.3f}",
         )
@@ -158,7 +158,7 @@ def _tests(comparison: Comparison) -> tuple[Section, ...]:
     )
 
 
-def _binding(comparison: Comparison) -> tuple[Section, ...]:
+def _list_active(comparison: Comparison) -> tuple[Section, ...]:
     priced = [
         (cost, record)
         for solver in comparison.solvers
@@ -174,7 +174,7 @@ def _binding(comparison: Comparison) -> tuple[Section, ...]:
             a.side,
             f"{a.bound:g} {a.unit}",
             f"{a.price:.4g} {a.price_unit}",
-            _for_one_step(a, comparison.objective.unit),
+            _describe_step(a, comparison.objective.unit),
         )
         for a in record.active_constraints[:SHOWN_CONSTRAINTS]
     ]
@@ -189,7 +189,7 @@ def _binding(comparison: Comparison) -> tuple[Section, ...]:
     )
 
 
-def _for_one_step(active: ActiveConstraint, unit: str) -> str:
+def _describe_step(active: ActiveConstraint, unit: str) -> str:
     """Return for example ``+0.0237 W for 1 mm``."""
     step = BY_UNIT.get(active.unit)
     if step is None:
@@ -197,7 +197,7 @@ def _for_one_step(active: ActiveConstraint, unit: str) -> str:
     return f"{active.price * step.size:+z.4f}{'' if unit == '1' else f' {unit}'} for {step.words}"
 
 
-def _failures(comparison: Comparison) -> tuple[Section, ...]:
+def _list_failures(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
         (r.solver, str(r.run), str(r.seed), r.status, "; ".join(r.verdict.violated[:5]) or "-")
         for r in comparison.records
@@ -207,38 +207,38 @@ def _failures(comparison: Comparison) -> tuple[Section, ...]:
     return make_table_section("Runs that ended infeasible or failed", header, rows, prose=True)
 
 
-def _between(comparison: Comparison) -> tuple[Section, ...]:
+def _list_violated_between(comparison: Comparison) -> tuple[Section, ...]:
     rows = [
-        (r.solver, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _proven(r))
+        (r.solver, str(r.run), "; ".join(r.verdict.violated[:3]) or "-", _describe_proof(r))
         for r in comparison.records
-        if r.verdict.feasible and (r.verdict.dense_feasible is False or _proven(r) != "-")
+        if r.verdict.feasible and (r.verdict.dense_feasible is False or _describe_proof(r) != "-")
     ]
     header = ("solver", "run", "violated on a dense grid, worst first", "proven at all times")
     return make_table_section("Feasible at the samples, not at all times", header, rows, prose=True)
 
 
-def _proven(record: RunRecord) -> str:
+def _describe_proof(record: RunRecord) -> str:
     """Return what is violated between the samples, or not proven to be satisfied."""
     found = record.verdict.guaranteed
     return "-" if found is None or found.satisfied or found.reason else str(found)
 
 
-def _p(value: float) -> str:
+def _format_p(value: float) -> str:
     return f"{value:.4f}" if value >= 1e-4 else f"{value:.1e}"
 
 
-def _seconds(value: float) -> str:
+def _format_cost(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "-"
 
 
-def engine_section(simulated: Sequence[SimulatedGait]) -> tuple[Section, ...]:
+def make_engine_section(simulated: Sequence[SimulatedGait]) -> tuple[Section, ...]:
     """Return the section on every solver's best gait in the engine, for each drive; none without simulations."""
     if not simulated:
         return ()
     parts: list[Part] = []
     for drive in dict.fromkeys(gait.drive for gait in simulated):
         alike = [gait for gait in simulated if gait.drive == drive]
-        parts.append(text_table(GAIT_HEADER, make_engine_rows(alike), f"Best gaits; {describe_drive(drive)}"))
+        parts.append(make_text_table(GAIT_HEADER, make_engine_rows(alike), f"Best gaits; {describe_drive(drive)}"))
         parts.append(measure_agreement(alike).describe())
     steps = simulated[0].steps
     figure = (

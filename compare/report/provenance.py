@@ -5,11 +5,11 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from compare.analysis.best_known import relative_gap
+from compare.analysis.best_known import compute_gap
 from compare.analysis.comparison import read_objective
 from compare.analysis.record_statistics import find_best_known
-from compare.analysis.units import percent, with_unit
-from compare.report.document import Prose, Table, text_table
+from compare.analysis.units import format_percent, with_unit
+from compare.report.document import Prose, Table, make_text_table
 from compare.study.description import describe_solver, list_described_names
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
@@ -43,7 +43,7 @@ def make_solver_table(records: Iterable[RunRecord]) -> Table:
         title = describe_solver(solver).title if solver in list_described_names() else "-"
         counts = str(len(group)), str(len({r.problem for r in group}))
         rows.append((solver, *compare_with_defaults(run), seeds, *counts, title))
-    return text_table(("solver", *SETTINGS, "seeds", "runs", "problems", "what"), rows, prose=True)
+    return make_text_table(("solver", *SETTINGS, "seeds", "runs", "problems", "what"), rows, prose=True)
 
 
 def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
@@ -56,13 +56,13 @@ def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
         known, objective = find_reference(group[0].definition["problem"]), read_objective(group[0])
         best = find_best_known(group, objective)
         if known.objective is not None:
-            gap = percent(relative_gap(best, known.objective, objective))
+            gap = format_percent(compute_gap(best, known.objective, objective))
             values = (with_unit(value, objective.unit) for value in (best, known.objective))
             rows.append((group[0].problem, *values, gap, known.source))
     if not rows:
         return "No best known value is shipped for the settings of these runs; gaps are relative to the best of them."
     header = ("problem", "best of these runs", "best known", "gap", "source of the best known value")
-    return text_table(header, rows, "Best known values", prose=True)
+    return make_text_table(header, rows, "Best known values", prose=True)
 
 
 SETTINGS = ("evaluations allowed", "changed settings", "default settings")

@@ -9,10 +9,10 @@ from compare.analysis.overview import Ranking, count_wins, describe_tests, list_
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning, describe_choice
-from compare.analysis.units import join_words, percent
+from compare.analysis.units import format_percent, join_words
 from compare.analysis.verdict import find_leaders
 from compare.drawing.comparison_figures import list_expected_costs, plot_critical_difference, plot_performance_profile
-from compare.report.document import Figure, Part, Section, Table, text_table
+from compare.report.document import Figure, Part, Section, Table, make_text_table
 
 
 def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Section:
@@ -45,7 +45,7 @@ def _make_matrix(comparisons: Sequence[Comparison], ranks: Mapping[str, float]) 
         leaders, medians = find_leaders(comparison), {s.name: s.median_cost for s in comparison.solvers}
         rows.append((comparison.problem, *(_format_cell(comparison, name, medians, leaders) for name in names)))
     rows.append(("mean rank", *(f"{ranks[name]:.2f}" if name in ranks else "-" for name in names)))
-    return text_table(("problem", *names), rows, "Median gap of each solver on each problem")
+    return make_text_table(("problem", *names), rows, "Median gap of each solver on each problem")
 
 
 def _format_cell(comparison: Comparison, name: str, medians: dict[str, float], leaders: set[str]) -> str:
@@ -58,7 +58,7 @@ def _format_cell(comparison: Comparison, name: str, medians: dict[str, float], l
 def _make_wins(comparisons: Sequence[Comparison], solver: str) -> Table:
     rows = [(r.other, str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
     caption = f"Problems on which {solver} is significantly better, not different, or worse"
-    return text_table(("against", "wins", "ties", "losses"), rows, caption)
+    return make_text_table(("against", "wins", "ties", "losses"), rows, caption)
 
 
 def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
@@ -73,8 +73,8 @@ def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
         "evaluations of the gap's logarithm, 1 at 1e-6 and 0 from 100 % on. Dominates: "
         f"pairs of problem and other solver, of {pairs}, on which the median gap is nowhere higher over the whole budget and "
         "somewhere lower. A gradient method has no result before its end.",
-        text_table(header, [_format_score(score) for score in scores], "Solvers at all budgets"),
-        text_table(
+        make_text_table(header, [_format_score(score) for score in scores], "Solvers at all budgets"),
+        make_text_table(
             ("solver", *(f"after {100 * share:g} %" for share in SHARES), *(f"to {100 * t:g} %" for t in TARGETS)),
             [_format_fixed(score) for score in scores],
             "Medians over the problems: gap after a share of the budget, and expected evaluations to a gap",
@@ -98,7 +98,7 @@ def _format_score(score: AnytimeScore) -> tuple[str, ...]:
 
 
 def _format_fixed(score: AnytimeScore) -> tuple[str, ...]:
-    gaps = (percent(gap) if math.isfinite(gap) else "infeasible" for gap in score.gaps)
+    gaps = (format_percent(gap) if math.isfinite(gap) else "infeasible" for gap in score.gaps)
     return score.solver, *gaps, *(count(cost) for cost in score.costs)
 
 
@@ -123,5 +123,5 @@ def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:
         "(AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before the judged runs, and are not counted "
         "there."
     )
-    table = text_table(header, rows, "Settings before and after tuning", prose=True)
+    table = make_text_table(header, rows, "Settings before and after tuning", prose=True)
     return (Section(title="Tuning", parts=(words, table)),)

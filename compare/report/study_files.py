@@ -9,7 +9,7 @@ from statistics import mean, stdev
 from compare.analysis.comparison import Comparison
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import summarise
-from compare.analysis.units import heading, join_words, with_unit
+from compare.analysis.units import join_words, make_heading, with_unit
 from compare.analysis.verdict import SIGNIFICANT, compare_pairs, find_leaders
 from compare.drawing import PAPER_STYLE
 from compare.drawing.figures import add_styles, check_style, save_pdf
@@ -187,7 +187,7 @@ def _write_caption(comparison: Comparison) -> str:
         best_known = with_unit(comparison.reference, objective.unit)
         gap = f"Gap: distance of the median from the best known value, {best_known} ({comparison.known.source})"
     sentences = [
-        f"{heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
+        f"{make_heading(objective.name, objective.unit)} on {comparison.problem}, to be {objective.sense}d: "
         f"{describe_run_counts(comparison)}",
         "Best to gap are over the feasible runs",
         gap,

@@ -11,8 +11,8 @@ from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
 from compare.analysis.tuning import Tuning, read_tunings
 from compare.analysis.verdict import write_verdict
-from compare.report.document import Document, Section, make_table_section, text_table
-from compare.report.problem_section import HOW, problem_section
+from compare.report.document import Document, Section, make_table_section, make_text_table
+from compare.report.problem_section import HOW, make_problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
 from compare.report.solver_sections import make_overview, make_tuning_section
 from compare.report.study_files import FurtherFiles
@@ -81,7 +81,7 @@ def make_study_document(
     tunings: Sequence[Tuning] = (),
 ) -> Document:
     """Return the document of a study, of its best gaits simulated in the engine, of excluded records, and of tuned searches."""
-    sections = [problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
+    sections = [make_problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
     sessions = [make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)]
     ranking = rank_over_problems(comparisons) if len(comparisons) > 1 else None
     return Document(
@@ -135,5 +135,5 @@ def _list_settings(comparisons: Sequence[Comparison]) -> Section:
     solvers = make_solver_table(record for comparison in comparisons for record in comparison.records)
     return Section(
         title="Settings and seeds",
-        parts=(solvers, text_table(("problem", "changed values", "options"), rows, prose=True)),
+        parts=(solvers, make_text_table(("problem", "changed values", "options"), rows, prose=True)),
     )

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from compare.drawing.figures import inline_svg, save
-from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, text_table
+from compare.report.document import Document, Figure, Part, Prose, Section, Table, iterate_leaves, make_text_table
 from compare.study.citations import cite_problems
 from compare.study.settings import Session
 from nlp_gait.files import format_csv, write_text
@@ -26,8 +26,8 @@ def write_document(folder: Path, document: Document, page: str = "report") -> li
     files = write_parts(folder, document.parts)
     drawings = [path.read_text(encoding="utf-8") for path in files if path.suffix == ".svg"]
     pages = [folder / f"{page}.html", folder / f"{page}.md"]
-    write_text(pages[0], html(document, drawings))
-    write_text(pages[1], markdown_page(document))
+    write_text(pages[0], render_page(document, drawings))
+    write_text(pages[1], render_markdown(document))
     return [*pages, *files]
 
 
@@ -43,7 +43,7 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[Path]:
     return files
 
 
-def html(document: Document, drawings: Sequence[str]) -> str:
+def render_page(document: Document, drawings: Sequence[str]) -> str:
     """Return one page without any other file, with the figures' drawings as SVG in their order; all text in it is escaped."""
     figures = [part for part in iterate_leaves(document.parts) if isinstance(part, Figure)]
     svg = {
@@ -53,7 +53,7 @@ def html(document: Document, drawings: Sequence[str]) -> str:
     return _load_templates(page=True).get_template("report.html.j2").render(document=document, svg=svg)
 
 
-def markdown_page(document: Document) -> str:
+def render_markdown(document: Document) -> str:
     """Return Markdown that shows the figures' PNG files."""
     text = _load_templates(page=False).get_template("report.md.j2").render(document=document)
     return re.sub(r"\n{3,}", "\n\n", text).strip() + "\n"
@@ -69,7 +69,7 @@ def _load_templates(*, page: bool) -> Environment:
         trim_blocks=not page,
         lstrip_blocks=not page,
     )
-    environment.filters |= {"kind": _name_kind, "html": _render_html, "anchor": _make_anchor, "md": _literal}
+    environment.filters |= {"kind": _name_kind, "html": _render_html, "anchor": _make_anchor, "md": _escape_markdown}
     return environment
 
 
@@ -87,7 +87,7 @@ def _render_html(markdown: str) -> Markup:
     return Markup(MARKDOWN.render(markdown))
 
 
-def _literal(text: str) -> str:
+def _escape_markdown(text: str) -> str:
     """Text as Markdown shows it literally, on one line."""
     escaped = MARKDOWN_SPECIAL.sub(r"\\\1", " ".join(text.split()))
     return escaped.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
@@ -106,7 +106,7 @@ def make_session_section(number: int, session: Session) -> Section:
         ("compiled objective", session.kernel),
         ("versions", ", ".join(f"{name} {version}" for name, version in session.versions.items())),
     ]
-    return Section(title=f"Session {number}", parts=(text_table(("what", "value"), rows, prose=True),))
+    return Section(title=f"Session {number}", parts=(make_text_table(("what", "value"), rows, prose=True),))
 
 
 def make_citation_section(problems: Iterable[Mapping[str, Any]]) -> Section:

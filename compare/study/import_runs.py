@@ -11,7 +11,7 @@ from compare.judge import evaluate
 from compare.study.evidence import CheckedRecords, check_records
 from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.record_files import RECORDS, read_records
-from compare.study.store import as_json
+from compare.study.store import pass_through_json
 from compare.study.task import LABEL, ProblemSpec
 from nlp_gait.backends.identity import hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
@@ -71,7 +71,7 @@ def import_runs(
     runs = [table.count("run", k, v) for k, v in enumerate(given["run"] or range(len(points)))]
     if len(set(runs)) < len(runs):
         raise InputError(f"{table.owner}: a run is duplicated")
-    known = {} if histories is None else _histories(histories, runs)
+    known = {} if histories is None else _read_histories(histories, runs)
     shared = {
         "problem": identify_problem(problem),
         "objective": asdict(problem.objective),
@@ -100,7 +100,7 @@ def import_runs(
                 solver=label,
                 run=run,
                 seed=seed,
-                definition=as_json({**shared, "seed": seed, "imported": {"sha256": hash_json(content)}}),
+                definition=pass_through_json({**shared, "seed": seed, "imported": {"sha256": hash_json(content)}}),
                 settings={"kind": "imported", "file": finals.name},
                 status=f"imported from {finals.name}",
                 claimed=claim is not None and not row["violation"] > 0.0,
@@ -119,7 +119,7 @@ def import_runs(
     return records
 
 
-def _histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
+def _read_histories(path: Path, runs: Sequence[int]) -> dict[int, tuple[History, tuple[float, ...]]]:
     table = read_table(path, "history")
     table.check_header(HISTORY, ("time_s",))
     columns = [table.column(name) or () for name in HISTORY]

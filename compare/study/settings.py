@@ -208,8 +208,8 @@ class Session:
                 "system": describe_system(),
                 "processors": str(available_cores()),
             },
-            versions={"python": sys.version.split()[0], **_versions(), "code": hash_installed_code()[:8]},
-            kernel=_kernel(),
+            versions={"python": sys.version.split()[0], **_list_versions(), "code": hash_installed_code()[:8]},
+            kernel=_describe_kernel(),
             jobs=jobs,
         )
 
@@ -249,7 +249,7 @@ def read_manifest(folder: Path) -> Manifest:
     )
 
 
-def _versions() -> dict[str, str]:
+def _list_versions() -> dict[str, str]:
     found = {}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):
@@ -257,7 +257,7 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _kernel() -> str:
+def _describe_kernel() -> str:
     lanes = native_lanes()
     try:
         return " ".join([find_compiler().summary, *BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}"])

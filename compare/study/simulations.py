@@ -62,7 +62,7 @@ def simulate_records(
         if (model := result.problem.display.simulation_model) is not None:
             steps = STEPS if model.repeats else None
             plan = make_plan(result, steps)
-            inputs = {**_gait(record), "drive": asdict(drive), "model": f"{_digest(plan, drive)}, {version}"}
+            inputs = {**_load_gait(record), "drive": asdict(drive), "model": f"{_hash_plan(plan, drive)}, {version}"}
             value = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
             found.append(decode(SimulatedGait, value))
         if progress is not None:
@@ -77,7 +77,7 @@ def load_simulations(folder: Path, records: Sequence[RunRecord]) -> list[Simulat
     store, found = Store(folder), []
     for record in records:
         stored = store.load(_name(record))
-        if stored is not None and _gait(record).items() <= stored.inputs.items():
+        if stored is not None and _load_gait(record).items() <= stored.inputs.items():
             with convert_errors(f"simulation {_name(record)!r} in {str(folder)!r} is damaged", InputError, REMEDY):
                 found.append(decode(SimulatedGait, stored.value))
     return found
@@ -112,11 +112,11 @@ def _name(record: RunRecord) -> str:
     return locate_run(Path("simulations"), record.problem, record.solver, record.run).with_suffix("").as_posix()
 
 
-def _gait(record: RunRecord) -> dict[str, Any]:
+def _load_gait(record: RunRecord) -> dict[str, Any]:
     return {"problem": record.definition["problem"], "x": dict(record.x)}
 
 
-def _digest(plan: Plan, drive: Drive) -> str:
+def _hash_plan(plan: Plan, drive: Drive) -> str:
     """Hash of the simulated model and motion; the set-points follow from these and the drive."""
     digest = hashlib.sha256(make_plan_model(plan, drive).encode())
     for name in ("t", "q", "tau"):

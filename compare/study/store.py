@@ -155,7 +155,7 @@ class Store:
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
         """Store a result, and return it as ``load`` does; raises as ``compute_all``."""
-        value, inputs = as_json(value), as_json(inputs)
+        value, inputs = pass_through_json(value), pass_through_json(inputs)
         hashes = {"sha256": hash_json(inputs), "result_sha256": hash_json([value, inputs])}
         with self._writing(name, inputs, ".json") as path:
             if path is not None:
@@ -203,7 +203,7 @@ class Store:
         outdated = self.load(name) if result is None and KEY not in name else None
         if outdated is None:
             return result, name
-        message = f"{name}: recomputed: {describe_input_differences(outdated.inputs, as_json(inputs))}"
+        message = f"{name}: recomputed: {describe_input_differences(outdated.inputs, pass_through_json(inputs))}"
         if self._report is None:
             return None, message
         self._report(message)
@@ -239,7 +239,7 @@ def _identify_arrays(inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> 
     return json.dumps({"inputs": inputs, "arrays": sorted(arrays)}, sort_keys=True)
 
 
-def as_json(data: Any) -> Any:
+def pass_through_json(data: Any) -> Any:
     """Return plain data as JSON gives it back."""
     return json.loads(json.dumps(data, allow_nan=False))
 
@@ -283,14 +283,14 @@ class _StoredSolver(Solver):
         return self._solver.to_dict()
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
-        found = self._load_or_run(problem, {"x0": _numbers(x0)}, stop, lambda ready: ready.run(problem, x0, stop))
+        found = self._load_or_run(problem, {"x0": _encode_array(x0)}, stop, lambda ready: ready.run(problem, x0, stop))
         assert found is not None
         return found
 
     def run_from(self, problem: GaitProblem, near: Outcome, stop: Callable[[], bool] = never) -> Outcome | None:
         start = {
-            "x0": _numbers(near.x),
-            "guess_sha256": None if near.guess is None else hash_json(plain_outcome(near.guess)),
+            "x0": _encode_array(near.x),
+            "guess_sha256": None if near.guess is None else hash_json(encode_outcome(near.guess)),
         }
         return self._load_or_run(problem, start, stop, lambda ready: ready.run_from(problem, near, stop))
 
@@ -308,7 +308,7 @@ class _StoredSolver(Solver):
             outcome = run(self._solver.prepare(problem, self._solves))
             if stop():
                 raise _Interrupted(outcome)
-            return None if outcome is None else plain_outcome(outcome)
+            return None if outcome is None else encode_outcome(outcome)
 
         try:
             stored = self._store.compute("solve-{key}", inputs, compute, code=[ipopt])
@@ -317,18 +317,18 @@ class _StoredSolver(Solver):
         return None if stored is None else parse_outcome(stored)
 
 
-def plain_outcome(value: Any) -> Any:
+def encode_outcome(value: Any) -> Any:
     """Return an outcome or guess as plain data that preserves every bit."""
     if isinstance(value, (Outcome, Guess, Evaluations)):
-        return {field.name: plain_outcome(getattr(value, field.name)) for field in fields(value)}
+        return {field.name: encode_outcome(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, np.ndarray):
-        return _numbers(value)
+        return _encode_array(value)
     if isinstance(value, float):
         return _number(value)
-    return [plain_outcome(item) for item in value] if isinstance(value, tuple) else value
+    return [encode_outcome(item) for item in value] if isinstance(value, tuple) else value
 
 
-def _numbers(array: Array) -> list[float | str]:
+def _encode_array(array: Array) -> list[float | str]:
     return [_number(value) for value in array.tolist()]
 
 
@@ -337,17 +337,17 @@ def _number(value: float) -> float | str:
 
 
 def parse_outcome(raw: Mapping[str, Any]) -> Outcome:
-    """Return the outcome of which ``plain_outcome`` made plain data."""
+    """Return the outcome of which ``encode_outcome`` made plain data."""
     guess = raw["guess"]
     found: dict[str, Any] = {name: float(value) if name in FLOATS else value for name, value in raw.items()}
-    found |= {name: _array(raw[name]) for name in ("x0", "x")}
+    found |= {name: _decode_array(raw[name]) for name in ("x0", "x")}
     found["evaluations"] = Evaluations(**raw["evaluations"])
     found["history"] = tuple(Best(calls, None if f is None else float(f), float(t)) for calls, f, t in raw["history"])
     if guess is not None:
-        multipliers = {name: _array(guess[name]) for name in ("primal", "bounds", "rows")}
+        multipliers = {name: _decode_array(guess[name]) for name in ("primal", "bounds", "rows")}
         found["guess"] = Guess(**multipliers, width=float(guess["width"]))
     return Outcome(**found)
 
 
-def _array(numbers: list[float | str]) -> Array:
+def _decode_array(numbers: list[float | str]) -> Array:
     return np.array([float(number) for number in numbers])

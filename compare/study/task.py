@@ -261,15 +261,15 @@ def describe_settings(settings: Any) -> dict[str, Any]:
     kind = type(settings).__name__
     known = is_dataclass(settings) and not isinstance(settings, type)
     values = asdict(settings) if known else {k: v for k, v in getattr(settings, "__dict__", {}).items() if k[0] != "_"}
-    return {"kind": kind, **{name: _plain(value) for name, value in values.items()}}
+    return {"kind": kind, **{name: _encode_setting(value) for name, value in values.items()}}
 
 
-def _plain(value: Any) -> Any:
+def _encode_setting(value: Any) -> Any:
     """Return a value as JSON has it, or the name of its type."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
+        return {str(key): _encode_setting(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(inner) for inner in value]
+        return [_encode_setting(inner) for inner in value]
     if isinstance(value, np.generic):
         value = value.item()
     return value if value is None or isinstance(value, (str, int, float)) else f"<{type(value).__name__}>"

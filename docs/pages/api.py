@@ -40,8 +40,8 @@ DOORS = {
     "compare.analysis.comparison": ("Comparison", "SolverRuns", "compare_problems"),
     "compare.analysis.solver_table": ("SolverSummary", "format_cells", "summarise", "HEADER"),
     "compare.report": (),
-    "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "text_table"),
-    "compare.report.writing": ("markdown_page", "write_document"),
+    "compare.report.document": ("Cell", "Document", "Figure", "Prose", "Section", "Table", "make_text_table"),
+    "compare.report.writing": ("render_markdown", "write_document"),
     "compare.archive": (),
     "compare.logs": (),
 }

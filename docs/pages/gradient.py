@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 
-from compare.analysis.units import heading, name_in_words
-from compare.drawing.figures import COLOURS, INK, new_figure, render_svg, style
+from compare.analysis.units import make_heading, name_in_words
+from compare.drawing.figures import COLOURS, INK, make_figure, render_svg, use_style
 from docs.pages.markdown import page, table, write_all
 
 MEASURED = Path(__file__).parents[1] / "landscape.json"
@@ -78,8 +78,8 @@ def draw_landscape(data: dict[str, Any]) -> Any:
     plane, (first, second) = data["plane"], data["pair"]
     x, y = (1000 * np.array(side) for side in plane["sides"])
     power, violation = np.array(plane["power_W"]), np.array(plane["violation"])
-    with style(), rc_context({"hatch.color": "#a0a0a0", "hatch.linewidth": 0.5}):
-        figure = new_figure(6.6, 4.6)
+    with use_style(), rc_context({"hatch.color": "#a0a0a0", "hatch.linewidth": 0.5}):
+        figure = make_figure(6.6, 4.6)
         axes = figure.subplots()
         box = (x[0], x[-1], y[0], y[-1])
         image = axes.imshow(power, origin="lower", extent=box, cmap="Greys", aspect="auto", alpha=0.75)
@@ -93,7 +93,8 @@ def draw_landscape(data: dict[str, Any]) -> Any:
         axes.plot(*(1000 * np.array(plane["optimum"])), "*", color="#D00000", ms=13, label="optimum")
         axes.set(xlim=box[:2], ylim=box[2:])
         axes.set(
-            xlabel=heading(name_in_words(first, "m/s"), "mm/s"), ylabel=heading(name_in_words(second, "m/s"), "mm/s")
+            xlabel=make_heading(name_in_words(first, "m/s"), "mm/s"),
+            ylabel=make_heading(name_in_words(second, "m/s"), "mm/s"),
         )
         axes.grid(visible=False)
         figure.legend(loc="outside upper center", ncols=5)
@@ -105,14 +106,14 @@ def draw_ridge(data: dict[str, Any]) -> Any:
     cut, second = data["plane"]["cut"], data["pair"][1]
     at, centre = 1000 * np.array(cut["at"]), 1000 * data["plane"]["optimum"][1]
     power, violation = np.array(cut["power_W"]), np.array(cut["violation"])
-    with style():
-        figure = new_figure(6.3, 3.4)
+    with use_style():
+        figure = make_figure(6.3, 3.4)
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(at, power, color=COLOURS["pso"])
         upper.plot(centre, data["power_W"], "*", color="#D00000", ms=12)
         upper.set_ylabel("power [W]")
         lower.plot(at, violation, color=COLOURS["ga"])
-        lower.set(xlabel=heading(name_in_words(second, "m/s"), "mm/s"), ylabel="violation")
+        lower.set(xlabel=make_heading(name_in_words(second, "m/s"), "mm/s"), ylabel="violation")
         for axes in (upper, lower):
             axes.axvspan(centre, at[-1], color=INK, alpha=0.12, lw=0)
     return figure
@@ -120,8 +121,8 @@ def draw_ridge(data: dict[str, Any]) -> Any:
 
 def draw_moves(data: dict[str, Any]) -> Any:
     """Draw how far the candidates move from one generation to the next."""
-    with style():
-        figure = new_figure(6.3, 2.8)
+    with use_style():
+        figure = make_figure(6.3, 2.8)
         axes = figure.subplots()
         for name in SEARCHES:
             moves = np.array(data["searches"][name]["moves"])
@@ -134,8 +135,8 @@ def draw_moves(data: dict[str, Any]) -> Any:
 
 def draw_dimensions(data: dict[str, Any]) -> Any:
     """Draw the median gap of every instance of GaitBench over its number of variables."""
-    with style():
-        figure = new_figure(6.3, 3.4)
+    with use_style():
+        figure = make_figure(6.3, 3.4)
         axes = figure.subplots()
         for name in BESIDE:
             found = [(row["n"], row[name]) for row in data["dimensions"] if row.get(name) is not None]

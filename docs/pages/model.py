@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.drawing.figures import INK, new_figure, render_svg, style
+from compare.drawing.figures import INK, make_figure, render_svg, use_style
 from docs.pages.markdown import code, page, table, write_all
 from docs.pages.problems import names
 from nlp_gait.backends.nlp import WIDTHS
@@ -73,8 +73,8 @@ def draw_sole() -> Any:
     """Draw a sole from above with the margins of two points."""
     foot = load_robot(ROBOT).feet["left"]
     back, front, left, right = (1000 * v for v in (foot.back_m, foot.front_m, foot.left_m, foot.right_m))
-    with style():
-        figure = new_figure(6.3, 3.6)
+    with use_style():
+        figure = make_figure(6.3, 3.6)
         axes = figure.subplots()
         axes.plot([-back, front, front, -back, -back], [-right, -right, left, left, -right], color=INK)
         axes.plot(0, 0, "o", color=INK)
@@ -99,8 +99,8 @@ def draw_smoothed_margin() -> Any:
     """Draw the margin in x over the ZMP, exact and at both widths of the solver."""
     foot = load_robot(ROBOT).feet["left"]
     z = np.linspace(-foot.back_m, foot.front_m, 1501)
-    with style():
-        figure = new_figure(6.3, 3.0)
+    with use_style():
+        figure = make_figure(6.3, 3.0)
         axes = figure.subplots()
         jump = foot.front_m - foot.back_m - 2 * z
         for width, colour in zip(WIDTHS, (ORANGE, BLUE), strict=True):

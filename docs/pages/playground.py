@@ -33,7 +33,7 @@ from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.biped.skeleton import ON_GROUND, make_level_sole, place_links
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import connect_joints, make_nao
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact
 from nlp_gait.symbolic.tape import simplify
@@ -168,7 +168,7 @@ def write_frames(phase: Phase) -> Frames:
         for letter, side in BOTH_FEET.items()
     }
     lines = connect_joints(body.full, place_links(body.full, angles, now.ankles["L"]), soles)
-    tree = tree_from(body.robot, body.robot.feet["left"].link)
+    tree = make_tree(body.robot, body.robot.feet["left"].link)
     com = centre_of_mass(tree, forward_kinematics(tree, angles, now.ankles["L"]))
     power = sum((ca.fabs(now.joints[name].velocity * now.torques[name]) for name in body.joints), SX(0))
     points = [point for _, line in lines for point in line]

@@ -43,7 +43,7 @@ class AntColony:
         return _AntColonySearch(self, start)
 
 
-def kernel_probabilities(count: int, locality: float) -> Array:
+def compute_probabilities(count: int, locality: float) -> Array:
     """Return the probabilities (k,) that an ant picks each point of an archive sorted best first.
 
     They fall as a half Gaussian of deviation q k over the rank, with k the count and q the locality.
@@ -57,7 +57,7 @@ def kernel_probabilities(count: int, locality: float) -> Array:
     return probabilities
 
 
-def deviations(archive: Array, picked: Array, spread: float) -> Array:
+def compute_deviations(archive: Array, picked: Array, spread: float) -> Array:
     """Return standard deviations (m, n): mean distance of the archive (k, n) from picked members (m, n), times the spread.
 
     Source:
@@ -76,10 +76,10 @@ class _AntColonySearch(PopulationSearch[AntColony]):
         settings, start = self._settings, self._start
         self._archive = self._archive.join(Points(X, f, violation)).best(settings.archive, rule)
         known = self._archive.X
-        cumulative = np.cumsum(kernel_probabilities(len(known), settings.locality))
+        cumulative = np.cumsum(compute_probabilities(len(known), settings.locality))
         draws = start.rng.random(settings.population) * cumulative[-1]
         picked = known[np.searchsorted(cumulative, draws, side="right")]
-        step = deviations(known, picked, settings.spread) * start.rng.standard_normal(picked.shape)
+        step = compute_deviations(known, picked, settings.spread) * start.rng.standard_normal(picked.shape)
         self._X = np.clip(picked + step, start.lower, start.upper)
 
     def stop(self) -> tuple[str, ...]:

@@ -152,7 +152,7 @@ class LShade:
         return _LShadeSearch(self, start)
 
 
-def lehmer_mean(values: Array, weights: Array) -> float:
+def compute_lehmer_mean(values: Array, weights: Array) -> float:
     """Weighted Lehmer mean, which prefers large values; 0 where all are.
 
     Source:
@@ -162,7 +162,7 @@ def lehmer_mean(values: Array, weights: Array) -> float:
     return float(np.sum(weights * values**2)) / total if total > 0.0 else 0.0
 
 
-def gains(before: tuple[Array, Array], after: tuple[Array, Array]) -> Array:
+def compute_gains(before: tuple[Array, Array], after: tuple[Array, Array]) -> Array:
     """Return by how much points (k,) are better after than before, as weights in 0..1, from violations and objectives (k,).
 
     That is the fall of the violation, or where it is equal of the objective, each kind in units of its greatest one.
@@ -203,15 +203,15 @@ class _LShadeSearch(PopulationSearch[LShade]):
         if improved.any():
             keys = (rule.keys(points.f[improved], points.violation[improved]) for points in (members, trials))
             before, after = keys
-            self._learn(self._F[improved], self._CR[improved], gains(before, after))
+            self._learn(self._F[improved], self._CR[improved], compute_gains(before, after))
             self._archive = self._cut(np.concatenate([self._archive, members.X[improved]]))
         return members.replace_rows(~worse, trials)
 
     def _learn(self, F: Array, CR: Array, weights: Array) -> None:
         # Algorithm 1 of the source.
-        self._weights[self._place] = lehmer_mean(F, weights)
+        self._weights[self._place] = compute_lehmer_mean(F, weights)
         if self._rates[self._place] is not None:
-            self._rates[self._place] = lehmer_mean(CR, weights) if CR.max() > 0.0 else None
+            self._rates[self._place] = compute_lehmer_mean(CR, weights) if CR.max() > 0.0 else None
         self._place = (self._place + 1) % self._settings.memory
 
     def _shrink(self, rule: Rule) -> None:
@@ -236,7 +236,7 @@ class _LShadeSearch(PopulationSearch[LShade]):
         self._F = _draw_weights(self._weights[entry], rng)
         best = rule.order(self._members.f, self._members.violation)[: max(2, round(self._settings.best * count))]
         towards = X[best[rng.integers(len(best), size=count)]]
-        first, second = _two_others(count, count + len(self._archive), rng)
+        first, second = _draw_two_others(count, count + len(self._archive), rng)
         others = np.concatenate([X, self._archive])
         F = self._F[:, None]
         mutants = X + F * (towards - X) + F * (X[first] - others[second])
@@ -255,7 +255,7 @@ def _draw_weights(centres: Array, rng: np.random.Generator) -> Array:
     return np.minimum(drawn, 1.0)
 
 
-def _two_others(count: int, all: int, rng: np.random.Generator) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _draw_two_others(count: int, all: int, rng: np.random.Generator) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """For each of some members another one, and one more of all that are known; the three differ."""
     own = np.arange(count)
     first = (own + 1 + rng.integers(count - 1, size=count)) % count

@@ -23,7 +23,9 @@ Mutation = Callable[[Array, Array, Array, np.random.Generator], Array]
 """Changes points (P, n) at random, within the bounds (n,); returns a new array."""
 
 
-def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array) -> tuple[Array, Array]:
+def cross_simulated_binary(
+    A: Array, B: Array, lower: Array, upper: Array, index: float, u: Array
+) -> tuple[Array, Array]:
     """Return the lower and the upper child (M, n) in each variable of parents A and B (M, n), within the bounds (n,).
 
     Where the parents are equal, so are the children. A larger distribution index keeps children nearer to the parents. Random
@@ -48,7 +50,7 @@ def simulated_binary(A: Array, B: Array, lower: Array, upper: Array, index: floa
     return np.where(apart, first, low), np.where(apart, second, high)
 
 
-def polynomial(X: Array, lower: Array, upper: Array, index: float, u: Array) -> Array:
+def mutate_polynomially(X: Array, lower: Array, upper: Array, index: float, u: Array) -> Array:
     """Return points X (P, n) shifted by polynomially distributed steps within the bounds (n,).
 
     A larger distribution index makes smaller steps. Random numbers u (P, n) are in [0, 1); 0.5 makes no step.
@@ -80,7 +82,7 @@ class SimulatedBinary:
 
     def __call__(self, A: Array, B: Array, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         u, choice, side = rng.random((3, *A.shape))
-        low, high = simulated_binary(A, B, lower, upper, self.index, u)
+        low, high = cross_simulated_binary(A, B, lower, upper, self.index, u)
         crossed = (rng.random((len(A), 1)) < self.probability) & (choice < self.variable_probability)
         swap = side < 0.5
         return np.where(crossed, np.where(swap, low, high), A), np.where(crossed, np.where(swap, high, low), B)
@@ -117,7 +119,7 @@ class Polynomial:
     def __call__(self, X: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
         u, choice = rng.random((2, *X.shape))
         probability = 1.0 / X.shape[1] if self.probability is None else self.probability
-        return np.where(choice < probability, polynomial(X, lower, upper, self.index, u), X)
+        return np.where(choice < probability, mutate_polynomially(X, lower, upper, self.index, u), X)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -185,7 +187,7 @@ class GeneticAlgorithm:
         return _GeneticSearch(self, start)
 
 
-def tournaments(places: int, population: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def hold_tournaments(places: int, population: int, size: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Return the winners (places,) of tournaments among parents sorted best first, so that the lowest index wins.
 
     Competitors, `size` in each, are drawn by shuffling all parents repeatedly: each competes equally often, except for a
@@ -217,7 +219,7 @@ class _GeneticSearch(PopulationSearch[GeneticAlgorithm]):
         """Make as many children as there are parents."""
         settings, start = self._settings, self._start
         pairs = -(-settings.population // 2)
-        winners = tournaments(2 * pairs, len(self._parents.f), settings.tournament, start.rng)
+        winners = hold_tournaments(2 * pairs, len(self._parents.f), settings.tournament, start.rng)
         mating = self._parents.X[winners]
         crossed = settings.crossover(mating[0::2], mating[1::2], start.lower, start.upper, start.rng)
         children = np.concatenate(crossed)[: settings.population]

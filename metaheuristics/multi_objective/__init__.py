@@ -1,6 +1,6 @@
 """Minimisation of several objectives at once, with operators of the package pymoo.
 
-snapshots = minimize_many(objectives, front_algorithm("NSGA2"), evaluations=(1_000, 10_000), seed=1)
+snapshots = minimize_many(objectives, make_front_algorithm("NSGA2"), evaluations=(1_000, 10_000), seed=1)
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = {
 """Algorithms by name; all use operators of pymoo, which `pip install 'nlp-gait[algorithms]'` installs."""
 
 
-def front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
+def make_front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
     """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `algorithm` does."""
     return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
@@ -37,6 +37,6 @@ __all__ = [
     "ManyObjectives",
     "Snapshot",
     "check_budgets",
-    "front_algorithm",
+    "make_front_algorithm",
     "minimize_many",
 ]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metaheuristics.interface import Array, Start
-from metaheuristics.multi_objective.variation import Variation, directions, feasible_front
+from metaheuristics.multi_objective.variation import Variation, make_directions, select_feasible_front
 from metaheuristics.settings import check_count, check_installed, check_number
 
 
@@ -53,7 +53,7 @@ class ConstrainedMoead:
         return ConstrainedMoeadSearch(self, start, objectives)
 
 
-def places_to_take(
+def find_places_to_take(
     old: Array, new: Array, violation: Array, child_violation: float, places: NDArray[np.intp], most: int
 ) -> NDArray[np.intp]:
     """Return the places that a child takes, at most so many, in the order in which they are offered (P,).
@@ -74,7 +74,7 @@ class ConstrainedMoeadSearch:
         from pymoo.decomposition.pbi import PBI
 
         self._settings, self._start = settings, start
-        self._weights = directions(settings.population, objectives)
+        self._weights = make_directions(settings.population, objectives)
         distance = np.linalg.norm(self._weights[:, None] - self._weights, axis=2)
         near = max(2, -(-settings.population // 10)) if settings.neighbours is None else settings.neighbours
         self._neighbours = np.argsort(distance, axis=1, kind="stable")[:, :near]
@@ -105,9 +105,9 @@ class ConstrainedMoeadSearch:
         weights, places = self._weights[self._places], self._places
         old = self._values.do(self._F[places], weights=weights, ideal_point=self._ideal, _type="one_to_one")
         new = self._values.do(F[0], weights=weights, ideal_point=self._ideal, _type="one_to_many")
-        won = places_to_take(old, new, self._violation[places], float(violation[0]), places, self._most)
+        won = find_places_to_take(old, new, self._violation[places], float(violation[0]), places, self._most)
         self._X[won], self._F[won], self._violation[won] = X[0], F[0], violation[0]
         self._turn = (self._turn + 1) % len(self._X)
 
     def front(self) -> tuple[Array, Array]:
-        return feasible_front(self._X, self._F, self._violation)
+        return select_feasible_front(self._X, self._F, self._violation)

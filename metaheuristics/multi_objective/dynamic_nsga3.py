@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metaheuristics.interface import UNKNOWN, Array, Start
-from metaheuristics.multi_objective.variation import Variation, directions, feasible_front
+from metaheuristics.multi_objective.variation import Variation, make_directions, select_feasible_front
 from metaheuristics.settings import check_count, check_installed, check_number
 
 LEAST = 1e-8  # boundary at which the last generation arrives, z
@@ -60,7 +60,7 @@ def compute_boundary(first: Array, generation: int, generations: int, decrease: 
 class _DynamicNsga3Search:
     def __init__(self, settings: DynamicConstrainedNsga3, start: Start, objectives: int) -> None:
         self._settings, self._start = settings, start
-        self._directions = directions(settings.population, objectives)
+        self._directions = make_directions(settings.population, objectives)
         self._vary = Variation(start, settings.crossover_index, settings.mutation_index)
         # The starting points are the first of the generations that fit into the budget.
         self._last = max(1, start.evaluations // settings.population - 1)
@@ -88,7 +88,7 @@ class _DynamicNsga3Search:
         self._next = self._make_children()
 
     def front(self) -> tuple[Array, Array]:
-        return feasible_front(*self._members[:3])
+        return select_feasible_front(*self._members[:3])
 
     def _epsilon(self) -> Array:
         return compute_boundary(self._first, self._generation, self._last, self._settings.decrease)

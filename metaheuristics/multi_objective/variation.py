@@ -37,7 +37,7 @@ class Variation:
         return fill_fixed(children.get("X").astype(float), self._start.lower, self._start.upper)
 
 
-def directions(number: int, objectives: int) -> Array:
+def make_directions(number: int, objectives: int) -> Array:
     """Evenly spread reference directions (number, objectives), after Das and Dennis.
 
     Raises:
@@ -60,7 +60,7 @@ def _spread(parts: int, objectives: int) -> int:
     return comb(parts + objectives - 1, objectives - 1)
 
 
-def feasible_front(X: Array, F: Array, violation: Array) -> tuple[Array, Array]:
+def select_feasible_front(X: Array, F: Array, violation: Array) -> tuple[Array, Array]:
     """Return the nondominated points among those without violation (P,), of points (P, n) with objectives (P, m)."""
     from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 

@@ -101,7 +101,7 @@ def _check_types(problem: object, fix: object, solver: object, progress: object)
         raise InputError(f"progress must be a function of one start's outcome, got {format_value(progress)}")
 
 
-def available_workers() -> int:
+def count_workers() -> int:
     """Return the default number of processes for several starts: one for each processor that this process may use.
 
     1 where a fork is not available or not safe: outside Linux, in another thread than the main one, and in worker processes.
@@ -123,7 +123,7 @@ def run_starts(
 ) -> Iterator[Outcome]:
     """Yield the outcome of the run from each point (n,), in their order; fewer after ``stop`` returns True.
 
-    Without ``workers``, the first run is made in this process, and the others are divided among ``available_workers`` if they
+    Without ``workers``, the first run is made in this process, and the others are divided among ``count_workers`` if they
     take long enough. Raises WorkerError if a process died, perhaps out of memory.
     """
     if workers is None and points:  # the first run says whether a fork pays for the others
@@ -131,7 +131,7 @@ def run_starts(
         yield solver.run(problem, points[0], stop)
         points = points[1:]
         fork_pays = (time.perf_counter() - started) * len(points) >= FORK_PAYS_FROM_S
-        workers = available_workers() if fork_pays else 1
+        workers = count_workers() if fork_pays else 1
         if stop():
             return
     count = min(workers or 1, len(points))

@@ -53,15 +53,15 @@ def export_solver(problem: GaitProblem, folder: Path, *, near: Outcome | None = 
     model = build_nlp(problem)
     found = make_nlp_plan(split_nlp(model.nlp))
     prefix = f"{problem.name.replace('-', '_')}_nlp"
-    words = _words(problem, model, found, prefix)
-    source = _source(problem, model, found, prefix)
+    words = _format_words(problem, model, found, prefix)
+    source = _read_source(problem, model, found, prefix)
     if near is None:
         return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
     words = {**words, **describe_planner(problem, model, found, prefix, near)}
     return write_c_files(folder, "nlp_gait.export", TEMPLATES | PLANNER_TEMPLATES, words, source)
 
 
-def _source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
+def _read_source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
     """Return the C++ file: the plan and its interpreter, constants, the functions of the header."""
     width = model.widths[-1]
     bounds = model.bounds(problem)
@@ -101,7 +101,7 @@ def _write_numbers(linkage: str, name: str, values: Array) -> str:
     return write_array("double", name, map(format_number, values.tolist())).replace("static ", linkage, 1)
 
 
-def _words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:
+def _format_words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:
     m, n = found.jacobian.shape
     return {
         "WHAT": f"{problem.address}: {problem.title}",

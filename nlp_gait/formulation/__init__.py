@@ -18,7 +18,7 @@ from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
 from nlp_gait.formulation.registry import load, maker, problem_names
 from nlp_gait.formulation.result import Result, load_result, sample_finely, sample_signals
-from nlp_gait.formulation.signals import Array, Columns, Signals, vector_columns
+from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
 
 __all__ = [
     "Array",
@@ -42,7 +42,7 @@ __all__ = [
     "Start",
     "Variable",
     "sample_finely",
-    "vector_columns",
+    "make_vector_columns",
     "load",
     "load_result",
     "maker",

@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation.assembly import InstantPoint, NumericPoint
-from nlp_gait.formulation.signals import Array, Columns, Signals, vector_columns
+from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
 # A ``nlp_gait.robots.Robot``. This package only passes it on, so it does not import it.
@@ -17,11 +17,11 @@ RobotModel: TypeAlias = Any
 
 # What the engine needs of a motion in addition to the joints' q, qd and tau. The floor, or its lowest part, is at z = 0.
 SIMULATED = {
-    "zmp": vector_columns("m", "xy"),  # planned centre of pressure of everything that stands on the ground
-    "hip": vector_columns("m"),  # origin of the robot's root
+    "zmp": make_vector_columns("m", "xy"),  # planned centre of pressure of everything that stands on the ground
+    "hip": make_vector_columns("m"),  # origin of the robot's root
     "attitude": Columns(unit="1", labels=("w", "x", "y", "z")),  # of the root, a quaternion; upright if missing
-    "left_foot": vector_columns("m"),  # the sole under the ankle
-    "right_foot": vector_columns("m"),
+    "left_foot": make_vector_columns("m"),  # the sole under the ankle
+    "right_foot": make_vector_columns("m"),
     "feet_yaw": Columns(unit="rad", labels=("left", "right")),  # direction of the soles; forward if missing
     # 1 where any part of the foot is on the ground, else 0; if missing, a foot is on the ground when its sole is.
     "left_bears": Columns(unit="1"),

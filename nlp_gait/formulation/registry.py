@@ -74,11 +74,11 @@ def find_maker(name: str) -> Maker:
     if name in PROBLEMS:
         return import_object(PROBLEMS[name])
     if user_code.is_user_code(name, "problem"):
-        return _user_maker(name)
+        return _load_user_maker(name)
     raise unknown("problem", name, [*PROBLEMS, *user_code.find_entry_points("problem")])
 
 
-def _user_maker(name: str) -> Maker:
+def _load_user_maker(name: str) -> Maker:
     user_code.allow_code(name, "problem")
     found: Any = user_code.load_object(name, "problem")
     path = user_code.parse_reference(name, "problem").home
@@ -125,7 +125,7 @@ class UserMaker:
 
 def check_options(make: Maker, options: Mapping[str, Any]) -> None:
     """Check that a maker has these options, and allows their values; raises UnknownNameError or InputError."""
-    known, allowed = inspect.signature(make).parameters, _choices(make)
+    known, allowed = inspect.signature(make).parameters, _list_choices(make)
     for option, given in options.items():
         value = _to_python(given)
         if option not in known:
@@ -156,7 +156,7 @@ def _to_python(value: Any) -> Any:
 
 
 @functools.cache
-def _choices(make: Maker) -> dict[str, tuple[str, ...]]:
+def _list_choices(make: Maker) -> dict[str, tuple[str, ...]]:
     return {name: get_args(hint) for name, hint in get_type_hints(make).items() if get_origin(hint) is Literal}
 
 

@@ -23,7 +23,7 @@ class Columns:
     labels: tuple[str, ...] = ("",)  #: one per column
 
 
-def vector_columns(unit: str, axes: str = "xyz") -> Columns:
+def make_vector_columns(unit: str, axes: str = "xyz") -> Columns:
     """Return the columns of a vector along axes of the world."""
     return Columns(unit=unit, labels=tuple(axes))
 

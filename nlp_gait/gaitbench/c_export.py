@@ -60,10 +60,13 @@ def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
             "namespace {  // so that a program can have several instances",
             write_kernel_source(kernel.function).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
-            *(f"static const double {name}[] = {_numbers(values)};" for name, values in constants.items()),
+            *(f"static const double {name}[] = {_format_numbers(values)};" for name, values in constants.items()),
             f"static const int instance_rows[] = {{{', '.join(map(str, sides.row.tolist()))}}};",
             f"static const char instance_upper_side[] = {{{', '.join('1' if s > 0 else '0' for s in sides.sign)}}};",
-            *(f'extern "C" const double {prefix}_{name}[] = {_numbers(values)};' for name, values in known.items()),
+            *(
+                f'extern "C" const double {prefix}_{name}[] = {_format_numbers(values)};'
+                for name, values in known.items()
+            ),
             *(f'extern "C" const char* const {prefix}_{name}[] = {values};' for name, values in names.items()),
             f"#define SIDES {len(sides.names)}",
             f"#define FUNCTION {prefix}_evaluate",
@@ -103,5 +106,5 @@ def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping
     }
 
 
-def _numbers(values: Array) -> str:
+def _format_numbers(values: Array) -> str:
     return "{" + ", ".join(repr(v).replace("inf", "INFINITY") for v in values.tolist()) + "}"

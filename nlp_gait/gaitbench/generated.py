@@ -24,7 +24,7 @@ from nlp_gait.formulation import GaitProblem, load
 from nlp_gait.gaitbench.facts import BY_ID, Definition, get_definition, read_data
 from nlp_gait.gaitbench.transform import AffineMap, rotate_pairs
 from nlp_gait.providers import PROBLEMS
-from nlp_gait.robots.perturbation import perturbed_name
+from nlp_gait.robots.perturbation import name_perturbed
 
 PREFIX = "gb2"
 ID = re.compile(rf"{PREFIX}:([a-z0-9-]+):(0|[1-9][0-9]{{0,11}})")
@@ -169,7 +169,7 @@ def draw_definition(id: str) -> Definition:
     options = {**family.options, **draw.all_within(family.steps)}
     if family.robots:
         chosen = family.robots[int(draw.share("robot") * len(family.robots))]
-        options["robot"] = perturbed_name(chosen, draw.all_within(family.robot))
+        options["robot"] = name_perturbed(chosen, draw.all_within(family.robot))
     return Definition(
         id=id,
         what=f"{family.what}, drawn by seed {draw.seed}",

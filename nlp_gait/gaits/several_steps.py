@@ -9,7 +9,7 @@ import numpy as np
 from nlp_gait.errors import check_count
 from nlp_gait.formulation.signals import Array, Signals
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import mirror_sign, partners
+from nlp_gait.robots.tree import find_partners, mirror_sign
 from nlp_gait.symbolic.kinematics import turn_quaternion
 
 JOINT_ARRAYS = ("q", "qd", "qdd", "tau")
@@ -28,7 +28,7 @@ MIRRORED_ATTITUDE = np.array([1.0, -1.0, 1.0, -1.0])
 def repeat_steps(cycle: Signals, robot: Robot, steps: int, *, rise_m: float = 0.0) -> Signals:
     """Return several steps of a cycle that ends in the mirror image of its start, each ``rise_m`` higher; InputError for none."""
     steps = check_count("steps", steps)
-    return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [step_length(cycle), 0.0, rise_m, 0.0]))
+    return join_steps([cycle] * steps, robot, np.outer(np.arange(steps), [measure_step(cycle), 0.0, rise_m, 0.0]))
 
 
 def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals:
@@ -44,7 +44,7 @@ def join_steps(steps: Sequence[Signals], robot: Robot, places: Array) -> Signals
     return replace(steps[0], arrays={name: np.concatenate(parts) for name, parts in arrays.items()})
 
 
-def step_length(cycle: Signals) -> float:
+def measure_step(cycle: Signals) -> float:
     """Return the distance that a cycle moves the hip forward [m]."""
     hip = cycle.arrays["hip"]
     return float(hip[-1, 0] - hip[0, 0])
@@ -52,7 +52,7 @@ def step_length(cycle: Signals) -> float:
 
 def mirror(signals: Signals, robot: Robot) -> Signals:
     """Return time histories with left and right exchanged; torques are right for a symmetric robot."""
-    images = partners(robot)
+    images = find_partners(robot)
     columns = [signals.joints.index(images[name]) for name in signals.joints]
     signs = np.array([mirror_sign(robot, name, images[name]) for name in signals.joints])
     arrays: dict[str, Array] = {}

@@ -129,7 +129,7 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     for constraint in still.constraints:
         by_kind[constraint.over].append(constraint)
     wanted = {constraint.name for constraint in by_kind["interval"]}
-    instants = [row for constraint in by_kind["instant"] for row in _at_one_sample(constraint)]
+    instants = [row for constraint in by_kind["instant"] for row in _select_first_sample(constraint)]
     means = [row for c in by_kind["mean"] for row in _split(c)]
     squares = [
         (name, unit, value**2, lower, upper)
@@ -140,7 +140,7 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     indexes = [(name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
     others, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
-    changes = [row for c in moved.constraints if c.name in wanted for row in _at_one_sample(c)]
+    changes = [row for c in moved.constraints if c.name in wanted for row in _select_first_sample(c)]
     given = [point.x, point.p, now]
     numbers = frozenset(range(first, first + len(squares)))
     at_once = TimeRows(instants, others, given, kinks) if instants or others else None
@@ -154,7 +154,7 @@ def _split(constraint: Constraint) -> list[tuple[Any, ...]]:
     return [(name, constraint.unit, *parts) for name, *parts in zip(constraint.row_names, *columns, strict=True)]
 
 
-def _at_one_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
+def _select_first_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
     """Return the same for the first sample, named without its number."""
     found: dict[str, tuple[Any, ...]] = {}
     labels = constraint.labels or ("",)

@@ -92,7 +92,9 @@ def make_biped_model(robot: Robot) -> Biped:
                 f"the foot, got {len(path)}: {', '.join(joint.name for joint in reversed(path)) or 'none'}"
             )
     moving = {joint.name for path in own for joint in path}
-    held = {name: _held_angle(joint, robot.posture_rad) for name, joint in robot.joints.items() if name not in moving}
+    held = {
+        name: _choose_held_angle(joint, robot.posture_rad) for name, joint in robot.joints.items() if name not in moving
+    }
     for name in robot.posture_rad:
         if name not in held:
             raise InputError(
@@ -109,7 +111,7 @@ def make_biped_model(robot: Robot) -> Biped:
     return Biped(full=full, model=model, legs=legs, posture_rad=held)
 
 
-def _held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
+def _choose_held_angle(joint: Joint, posture: Mapping[str, float]) -> float:
     low, high = joint.limits_rad
     angle = posture.get(joint.name)
     if angle is None:

@@ -232,7 +232,7 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[InferredS
     """
     between = chains[0][0].place - chains[1][0].place
     axis = 0 if abs(between[1]) >= abs(between[0]) else 1  # forward is along it
-    knee = sum(_knee_direction(chain)[axis] for chain in chains)
+    knee = sum(_find_knee_direction(chain)[axis] for chain in chains)
     lead = sum(sole.high[axis] + sole.low[axis] for sole in soles) / 2
     if abs(lead) < CLEAR_LEAD_M:
         lead = 0.0
@@ -249,7 +249,7 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[InferredS
 
 def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
     """Raise RobotDataError if the limits of both knees make them bend in opposite directions."""
-    one, other = (_knee_direction(chain) for chain in chains)
+    one, other = (_find_knee_direction(chain) for chain in chains)
     if float(one @ other) < 0:
         ranges = " and ".join(
             f"{knee.child!r} by {knee.limits[0]:.3g} to {knee.limits[1]:.3g} rad about {np.round(knee.axis, 3) + 0.0}"
@@ -260,7 +260,7 @@ def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
         )
 
 
-def _knee_direction(chain: Chain) -> Array:
+def _find_knee_direction(chain: Chain) -> Array:
     """Return the direction (3,) in which the knee points when it bends, 0 if its limits do not show it."""
     _, fifth, knee, *_ = chain
     return np.asarray(-find_bend(*knee.limits) * np.cross(knee.axis, fifth.place - knee.place))

@@ -16,12 +16,12 @@ from nlp_gait.decoding import decode, decode_value, read_dataclass
 from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
-from nlp_gait.robots.mjcf import list_dependencies, mjcf_record, read_foot_geoms
+from nlp_gait.robots.mjcf import list_dependencies, read_foot_geoms, read_mjcf
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_robot_name
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
-from nlp_gait.robots.urdf import find_moving_link, list_meshes, read_foot_shapes, urdf_record
+from nlp_gait.robots.urdf import find_moving_link, list_meshes, read_foot_shapes, read_urdf
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
@@ -195,7 +195,7 @@ def _read_merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
 
 def _read_model(source: str, about: About) -> RobotFile:
     with convert_errors(f"robot file {source!r}", RobotDataError):
-        raw = mjcf_record(source) if source.endswith(".xml") else urdf_record(source, about_joint=about == "joint")
+        raw = read_mjcf(source) if source.endswith(".xml") else read_urdf(source, about_joint=about == "joint")
         return _with_records(decode(RobotFile, {**raw, "inertia_about": about and "com"}), source)
 
 

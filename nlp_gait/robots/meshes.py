@@ -71,19 +71,19 @@ def make_pose(place: Sequence[float] | Array, roll_pitch_yaw: Sequence[float] = 
     return pose
 
 
-def box_points(half: Array) -> Array:
+def list_box_points(half: Array) -> Array:
     """Return the corners (8, 3) of a box with half its size (3,)."""
     return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
 
 
-def cylinder_points(radius: float, half_length: float) -> Array:
+def list_cylinder_points(radius: float, half_length: float) -> Array:
     """Return points (48, 3) of both edges of a cylinder along z."""
     turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
     rim = radius * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
     return np.concatenate([rim + [0.0, 0.0, end * half_length] for end in (-1, 1)])
 
 
-def mesh_points(path: Path) -> Array:
+def read_mesh_points(path: Path) -> Array:
     """Read the corners (N, 3) of a mesh in the file's unit, of Collada in metres, in a child process; raises RobotDataError."""
     data = read_in_child(f"mesh {str(path)!r}", lambda: np.asarray(_read_points(path), float).tobytes())
     return np.frombuffer(data).reshape(-1, 3).copy()
@@ -128,7 +128,7 @@ def _read_collada(data: bytes) -> Array:
     root = parse_xml(data)
     for element in root.iter():  # names without the namespace
         element.tag = element.tag.rpartition("}")[2]
-    geometries = {f"#{geometry.get('id')}": _positions(geometry) for geometry in root.iter("geometry")}
+    geometries = {f"#{geometry.get('id')}": _read_positions(geometry) for geometry in root.iter("geometry")}
     unit = root.find("asset/unit")
     scale = float(unit.get("meter", "1")) if unit is not None else 1.0
     up = root.findtext("asset/up_axis", "Y_UP").strip()
@@ -161,7 +161,7 @@ def _read_collada(data: bytes) -> Array:
     return np.asarray(scale * points @ upright.T)
 
 
-def _positions(geometry: Any) -> Array:
+def _read_positions(geometry: Any) -> Array:
     vertices = geometry.find("mesh/vertices/input[@semantic='POSITION']")
     source = vertices.get("source").lstrip("#")
     found = next(s for s in geometry.iter("source") if s.get("id") == source)

@@ -18,7 +18,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import check_counts, read_in_child
-from nlp_gait.robots.meshes import FootShapes, box_points, cylinder_points
+from nlp_gait.robots.meshes import FootShapes, list_box_points, list_cylinder_points
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 from nlp_gait.robots.tree import Array, Mass, combine_masses
 
@@ -28,7 +28,7 @@ IGNORED = {"armature": "kg m^2", "damping": "Nm s/rad", "frictionloss": "Nm"}  #
 _READING = threading.Lock()  # MuJoCo has one warning handler for all threads
 
 
-def mjcf_record(path: str) -> dict[str, Any]:
+def read_mjcf(path: str) -> dict[str, Any]:
     """Read links and joints of an MJCF file by the schema of a robot file, without feet.
 
     The robot is the heaviest tree of bodies in the world. All frames get its root's axes at the reference pose, where all angles
@@ -37,12 +37,12 @@ def mjcf_record(path: str) -> dict[str, Any]:
     """
     _read.cache_clear()  # the file, or one that it includes, may have changed
     model = _compile(path)
-    root, frames, carriers = _tree(model)
+    root, frames, carriers = _find_tree(model)
     _report_ignored(path, model)
     names = {i: model.body(i).name or f"body {i}" for i in frames}
     if len(set(names.values())) < len(names):
         raise ValueError("two bodies have the same name")
-    origins = {i: _joint_place(model, frames, i) for i in set(carriers.values())}
+    origins = {i: _place_joint(model, frames, i) for i in set(carriers.values())}
     links = {}
     for carrier, origin in origins.items():
         parts = [_read_mass(model, i, frames[i]) for i in frames if carriers[i] == carrier]
@@ -50,7 +50,7 @@ def mjcf_record(path: str) -> dict[str, Any]:
     joints = {}
     for carrier in sorted(set(carriers.values()) - {root}):
         parent = carriers[int(model.body_parentid[carrier])]
-        joint = _hinges(model, carrier)[0]
+        joint = _list_hinges(model, carrier)[0]
         low, high = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
         limited = bool(model.jnt_limited[joint])
         joints[model.joint(joint).name or f"joint {joint}"] = {
@@ -60,7 +60,7 @@ def mjcf_record(path: str) -> dict[str, Any]:
             "axis": (frames[carrier][:3, :3] @ model.jnt_axis[joint]).tolist(),
             "limits_rad": [float(low), float(high)] if limited else [-math.pi, math.pi],
             "velocity_limit_rad_s": UNLIMITED_RAD_S,
-            "torque_limit_Nm": _torque_limit(model, joint),
+            "torque_limit_Nm": _find_torque_limit(model, joint),
         }
     about = {"schema": 1, "name": Path(path).stem, "description": f"from {Path(path).name}"}
     return {**about, "root": names[root], "links": links, "joints": joints}
@@ -77,22 +77,22 @@ def _report_ignored(path: str, model: Any) -> None:
 def read_foot_geoms(path: str, link: str) -> FootShapes:
     """Return the points of all shapes that move with a link, as ``urdf.read_foot_shapes``; MuJoCo reads the meshes."""
     model = _compile(path)
-    _, frames, carriers = _tree(model)
+    _, frames, carriers = _find_tree(model)
     found = {kind: [np.zeros((0, 3))] for kind in ("collision", "visual")}
     for i, frame in frames.items():
         if (model.body(carriers[i]).name or f"body {carriers[i]}") != link:
             continue
-        origin = _joint_place(model, frames, carriers[i])
+        origin = _place_joint(model, frames, carriers[i])
         for geom in range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i]):
             kind = "collision" if model.geom_contype[geom] or model.geom_conaffinity[geom] else "visual"
-            pose = frame @ _pose(model.geom_pos[geom], model.geom_quat[geom])
-            found[kind].append(_shape_points(model, geom, pose) - origin)
+            pose = frame @ _make_pose(model.geom_pos[geom], model.geom_quat[geom])
+            found[kind].append(_list_shape_points(model, geom, pose) - origin)
     kind = "collision" if len(found["collision"]) > 1 else "visual"
     return FootShapes(np.concatenate(found[kind]), kind)
 
 
 def list_dependencies(path: str) -> list[str]:
-    """Return all files that an MJCF file includes or names; raises as ``mjcf_record``."""
+    """Return all files that an MJCF file includes or names; raises as ``read_mjcf``."""
     _compile(path)  # a file that MuJoCo accepts
     find = getattr(import_module("mujoco"), "mju_getXMLDependencies", None)
     if find is None:
@@ -166,7 +166,7 @@ def log_warnings(mujoco: Any, path: str) -> Iterator[None]:
             mujoco.set_mju_user_warning(earlier)
 
 
-def _tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:
+def _find_tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:
     """Return the root body, poses (4, 4) of its tree in its frame, and the body with the hinge that carries each."""
     tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
     if not tops:
@@ -178,8 +178,8 @@ def _tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:
         parent = int(model.body_parentid[i])
         if parent not in frames:
             continue
-        frames[i] = frames[parent] @ _pose(model.body_pos[i], model.body_quat[i])
-        hinges = _hinges(model, i)
+        frames[i] = frames[parent] @ _make_pose(model.body_pos[i], model.body_quat[i])
+        hinges = _list_hinges(model, i)
         if len(hinges) > 1:
             raise ValueError(
                 f"body {model.body(i).name!r} has {len(hinges)} hinges; give each its own body with a small mass"
@@ -188,26 +188,26 @@ def _tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:
     return root, frames, carriers
 
 
-def _hinges(model: Any, body: int) -> list[int]:
+def _list_hinges(model: Any, body: int) -> list[int]:
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     hinge = int(import_module("mujoco").mjtJoint.mjJNT_HINGE)
     return [j for j in range(first, first + count) if model.jnt_type[j] == hinge]
 
 
-def _joint_place(model: Any, frames: dict[int, Array], body: int) -> Array:
+def _place_joint(model: Any, frames: dict[int, Array], body: int) -> Array:
     """Return the place (3,) of the joint that carries a body; of the root its origin."""
-    hinges = _hinges(model, body)
+    hinges = _list_hinges(model, body)
     local = model.jnt_pos[hinges[0]] if hinges and model.body_parentid[body] else np.zeros(3)
     return np.asarray(frames[body][:3, :3] @ local + frames[body][:3, 3])
 
 
 def _read_mass(model: Any, body: int, frame: Array) -> Mass:
-    pose = frame @ _pose(model.body_ipos[body], model.body_iquat[body])
+    pose = frame @ _make_pose(model.body_ipos[body], model.body_iquat[body])
     own = Mass(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body]))
     return own.turn(pose[:3, :3]).move(pose[:3, 3])
 
 
-def _torque_limit(model: Any, joint: int) -> float:
+def _find_torque_limit(model: Any, joint: int) -> float:
     """Return the limit of the joint, or else of its actuator [Nm]; 0 if neither has one."""
     if model.jnt_actfrclimited[joint]:
         return float(np.abs(model.jnt_actfrcrange[joint]).max())
@@ -222,7 +222,7 @@ def _torque_limit(model: Any, joint: int) -> float:
     return 0.0
 
 
-def _shape_points(model: Any, geom: int, pose: Array) -> Array:
+def _list_shape_points(model: Any, geom: int, pose: Array) -> Array:
     """Return points (N, 3) of a shape at a pose (4, 4): corners, edges, or the lowest points of round shapes."""
     kinds = import_module("mujoco").mjtGeom
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
@@ -231,21 +231,21 @@ def _shape_points(model: Any, geom: int, pose: Array) -> Array:
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         points = np.array(model.mesh_vert[first : first + count], dtype=float)
     elif kind == int(kinds.mjGEOM_BOX):
-        points = box_points(size)
+        points = list_box_points(size)
     elif kind == int(kinds.mjGEOM_SPHERE):
         return np.array([pose[:3, 3] - [0.0, 0.0, size[0]]])
     elif kind == int(kinds.mjGEOM_CAPSULE):
         ends = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]) @ pose[:3, :3].T + pose[:3, 3]
         return np.asarray(ends - [0.0, 0.0, size[0]])
     elif kind == int(kinds.mjGEOM_CYLINDER):
-        points = cylinder_points(size[0], size[1])
+        points = list_cylinder_points(size[0], size[1])
     else:
         return np.zeros((0, 3))
     placed = np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
     return placed if are_plausible(placed) else np.zeros((0, 3))
 
 
-def _pose(place: Array, quaternion: Array) -> Array:
+def _make_pose(place: Array, quaternion: Array) -> Array:
     rotation, pose = np.zeros(9), np.eye(4)
     import_module("mujoco").mju_quat2Mat(rotation, quaternion)
     pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), place

@@ -39,10 +39,10 @@ def perturb(robot: Robot, changes: Mapping[str, float]) -> Robot:
         if not math.isfinite(value):
             raise InputError(f"robot {robot.name!r}: {name} must be a finite number, got {value}")
         robot = _change(robot, name, value)
-    return replace(robot, name=perturbed_name(robot.name, changes)) if changes else robot
+    return replace(robot, name=name_perturbed(robot.name, changes)) if changes else robot
 
 
-def perturbed_name(name: str, changes: Mapping[str, float]) -> str:
+def name_perturbed(name: str, changes: Mapping[str, float]) -> str:
     """Return a robot's name with its changes as text, to the last digit."""
     return f"{name}{MARK}{','.join(f'{key}={value!r}' for key, value in changes.items())}" if changes else name
 
@@ -68,7 +68,7 @@ def split_name(text: str) -> tuple[str, dict[str, float]]:
     return name, changes
 
 
-def quantities(robot: Robot) -> tuple[str, ...]:
+def list_quantities(robot: Robot) -> tuple[str, ...]:
     """Return the names of all quantities that can be changed in a robot."""
     return (MASS, *(f"{link}.{MASS}" for link in robot.links), *LENGTHS, *SOLES)
 
@@ -81,7 +81,7 @@ def _change(robot: Robot, name: str, value: float) -> Robot:
         return replace(robot, feet=feet)
     changed = [link for link in robot.links if name in (MASS, f"{link}.{MASS}")]
     if not changed:
-        raise unknown(f"quantity of robot {robot.name}", name, quantities(robot))
+        raise unknown(f"quantity of robot {robot.name}", name, list_quantities(robot))
     return replace(robot, links={**robot.links, **{link: _scale_mass(robot.links[link], value) for link in changed}})
 
 

@@ -35,7 +35,7 @@ class Mass(NamedTuple):
 
     def to_record(self) -> dict[str, Any]:
         """Return the fields of a link in a robot file."""
-        moments = list(inertia_moments(self.tensor_kgm2))
+        moments = list(list_moments(self.tensor_kgm2))
         return {"mass_kg": float(self.mass_kg), "com_m": self.com_m.tolist(), "inertia_com_kgm2": moments}
 
     def move(self, offset: Array) -> Self:
@@ -58,11 +58,13 @@ def combine_masses(parts: Sequence[Mass]) -> Mass:
     """Return several masses in one frame as one; without any mass, the centre is that of the first."""
     mass = sum(part.mass_kg for part in parts)
     com = sum((part.mass_kg * part.com_m for part in parts), np.zeros(3)) / mass if mass > 0.0 else parts[0].com_m
-    tensor = sum((part.tensor_kgm2 + point_inertia(part.mass_kg, part.com_m - com) for part in parts), np.zeros((3, 3)))
+    tensor = sum(
+        (part.tensor_kgm2 + compute_point_inertia(part.mass_kg, part.com_m - com) for part in parts), np.zeros((3, 3))
+    )
     return Mass(mass, com, tensor)
 
 
-def inertia_moments(matrix: Array) -> tuple[float, float, float, float, float, float]:
+def list_moments(matrix: Array) -> tuple[float, float, float, float, float, float]:
     """Return (ixx, iyy, izz, ixy, ixz, iyz) of a symmetric tensor (3, 3), as in ``Link``."""
     (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = matrix.tolist()
     return ixx, iyy, izz, ixy, ixz, iyz
@@ -74,7 +76,7 @@ def rotate(axis: Array, angle: float) -> Array:
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
 
 
-def point_inertia(mass: float, offset: Array) -> Array:
+def compute_point_inertia(mass: float, offset: Array) -> Array:
     """Return the tensor (3, 3) of a point mass [kg] about a point at a distance ``offset`` (3,) [m]."""
     tensor: Array = mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     return tensor
@@ -112,8 +114,8 @@ def check_inertias(robot: str, links: Sequence[Link]) -> None:
 
 def shift_to_com(link: Link) -> Link:
     """Return the link whose tensor was taken about its joint; raises RobotDataError if no rigid body has such a tensor."""
-    about_com = link.inertia_matrix - point_inertia(link.mass_kg, np.array(link.com_m))
-    return replace(link, inertia_com_kgm2=inertia_moments(about_com))
+    about_com = link.inertia_matrix - compute_point_inertia(link.mass_kg, np.array(link.com_m))
+    return replace(link, inertia_com_kgm2=list_moments(about_com))
 
 
 MIRROR_M, MIRROR_COSINE = 2e-3, 0.999  # mirrored places agree to this, and mirrored axes to this cosine
@@ -132,7 +134,7 @@ class TreeBody:
     armature_kgm2: float = 0.0  # inertia of the rotor at the joint, if the robot's dynamics include it [kg m^2]
 
 
-def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[TreeBody, ...]:
+def make_tree(robot: Robot, fixed_link: str, joints: Collection[str] | None = None) -> tuple[TreeBody, ...]:
     """Return the bodies from the fixed link outwards, parents before children, connected by some joints (None: by all).
 
     The fixed link's reference point is its frame's origin. Raises InputError for an unknown link, UnknownNameError for a joint.
@@ -157,8 +159,8 @@ def tree_from(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
             parent=parent,
             joint=joint,
             direction=1 if forward else -1,
-            offset_m=_vector(np.subtract(centre_in_parent, parent_reference)),
-            com_offset_m=_vector(np.subtract(link.com_m, reference)),
+            offset_m=_to_vector(np.subtract(centre_in_parent, parent_reference)),
+            com_offset_m=_to_vector(np.subtract(link.com_m, reference)),
             armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
         )
         bodies.append(body)
@@ -176,10 +178,12 @@ def weld(robot: Robot, joints: Collection[str]) -> Robot:
         joint = remaining.pop(name)
         child = _read_mass(links.pop(joint.child)).move(np.array(joint.origin_m))
         total = combine_masses([_read_mass(links[joint.parent]), child])
-        com, tensor = _vector(total.com_m), inertia_moments(total.tensor_kgm2)
+        com, tensor = _to_vector(total.com_m), list_moments(total.tensor_kgm2)
         links[joint.parent] = replace(links[joint.parent], mass_kg=total.mass_kg, com_m=com, inertia_com_kgm2=tensor)
         for other in [j for j in remaining.values() if j.parent == joint.child]:
-            remaining[other.name] = replace(other, parent=joint.parent, origin_m=plus(joint.origin_m, other.origin_m))
+            remaining[other.name] = replace(
+                other, parent=joint.parent, origin_m=add_vectors(joint.origin_m, other.origin_m)
+            )
     return replace(robot, links=links, joints=remaining)
 
 
@@ -200,8 +204,8 @@ def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
         joints[joint.name] = _turn_joint(joint, before, angle)
         turn, link = turns[joint.child], links[joint.child]
         if not np.array_equal(turn, np.eye(3)):
-            tensor = inertia_moments(turn @ link.inertia_matrix @ turn.T)
-            links[joint.child] = replace(link, com_m=_vector(turn @ np.array(link.com_m)), inertia_com_kgm2=tensor)
+            tensor = list_moments(turn @ link.inertia_matrix @ turn.T)
+            links[joint.child] = replace(link, com_m=_to_vector(turn @ np.array(link.com_m)), inertia_com_kgm2=tensor)
         waiting += [other for other in robot.joints.values() if other.parent == joint.child]
     return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
 
@@ -214,14 +218,14 @@ def _turn_joint(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
     (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad
     return replace(
         joint,
-        origin_m=_vector(turn @ np.array(joint.origin_m)),
-        axis=_vector(axis / np.linalg.norm(axis)),
+        origin_m=_to_vector(turn @ np.array(joint.origin_m)),
+        axis=_to_vector(axis / np.linalg.norm(axis)),
         limits_rad=(low - angle, high - angle),
         planning_limits_rad=(plan_low - angle, plan_high - angle),
     )
 
 
-def _vector(values: np.ndarray) -> Vector:
+def _to_vector(values: np.ndarray) -> Vector:
     x, y, z = values.tolist()
     return x, y, z
 
@@ -233,24 +237,24 @@ def reverse_joint(joint: Joint) -> Joint:
     return replace(joint, axis=(-x, -y, -z), limits_rad=(-high, -low), planning_limits_rad=(-plan_high, -plan_low))
 
 
-def point_masses(robot: Robot) -> Robot:
+def make_point_masses(robot: Robot) -> Robot:
     """Return the robot with every link's inertia about its centre of mass set to zero."""
     links = {name: replace(link, inertia_com_kgm2=(0.0,) * 6) for name, link in robot.links.items()}
     return replace(robot, links=links)
 
 
-def plus(a: Vector, b: Vector) -> Vector:
+def add_vectors(a: Vector, b: Vector) -> Vector:
     """Return the sum of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-def partner(name: str) -> str:
+def find_partner(name: str) -> str:
     """Return the joint on the other side by name, LKneePitch for RKneePitch; a joint of neither side is its own partner."""
     swapped = {"L": "R", "R": "L"}.get(name[0])
     return swapped + name[1:] if swapped and name[1:2].isupper() else name
 
 
-def partners(robot: Robot) -> Mapping[str, str]:
+def find_partners(robot: Robot) -> Mapping[str, str]:
     """Return the mirror image of every joint by its place at zero angles, because names mislead; else by its name."""
     places = {
         name: np.sum([above.origin_m for above in robot.path_to_root(joint.child)], axis=0)
@@ -259,7 +263,7 @@ def partners(robot: Robot) -> Mapping[str, str]:
     axes = {name: np.array(joint.axis) for name, joint in robot.joints.items()}
 
     def image(name: str) -> str:
-        named = partner(name)
+        named = find_partner(name)
         fitting = [o for o in places if are_mirror_images(places[name], axes[name], places[o], axes[o])]
         if named in fitting or not fitting:
             return named if named in places else name

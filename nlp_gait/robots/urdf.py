@@ -12,9 +12,17 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
-from nlp_gait.robots.meshes import FootShapes, box_points, cylinder_points, find_mesh, make_pose, mesh_points, parse_xml
+from nlp_gait.robots.meshes import (
+    FootShapes,
+    find_mesh,
+    list_box_points,
+    list_cylinder_points,
+    make_pose,
+    parse_xml,
+    read_mesh_points,
+)
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
-from nlp_gait.robots.tree import Array, Mass, combine_masses, point_inertia
+from nlp_gait.robots.tree import Array, Mass, combine_masses, compute_point_inertia
 
 # Elements that are read; shapes, transmissions and plugins are removed before parsing.
 READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}
@@ -25,7 +33,7 @@ MOST_PARTS = 2000  # links and joints; the time to read them grows with the squa
 OWNER = re.compile(r"^Unknown attribute .* in (/robot[^/]*)?/?(robot|link|joint)(\[[^\]]*\])?$")
 
 
-def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
+def read_urdf(path: str, *, about_joint: bool = False) -> dict[str, Any]:
     """Read links and joints of a URDF by the schema of a robot file, without feet.
 
     All frames get the root's axes at the zero pose. Links that do not turn against each other become one: those behind fixed,
@@ -35,7 +43,7 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
     """
     model = _parse(_read_xml(path), path)
     joints = {joint.child: joint for joint in model.joints}
-    frames = _zero_pose(model, joints)
+    frames = _place_links(model, joints)
     carriers = {name: _find_carrier(name, joints) for name in frames}
     bodies: dict[str, list[Mass]] = {}
     for link in model.links:
@@ -46,12 +54,12 @@ def urdf_record(path: str, *, about_joint: bool = False) -> dict[str, Any]:
         "description": f"from {Path(path).name}",
         "root": next(name for name in frames if name not in joints),
         "links": {name: combine_masses(parts).move(-frames[name][:3, 3]).to_record() for name, parts in bodies.items()},
-        "joints": {j.name: _joint_record(j, frames, carriers) for j in model.joints if j.type in TURNING},
+        "joints": {j.name: _describe_joint(j, frames, carriers) for j in model.joints if j.type in TURNING},
     }
 
 
 def find_moving_link(path: str, link: str) -> str:
-    """Return the link that turns with a link behind fixed joints, or the link itself; raises as ``urdf_record``."""
+    """Return the link that turns with a link behind fixed joints, or the link itself; raises as ``read_urdf``."""
     joints = {joint.child: joint for joint in _parse(_read_xml(path), path).joints}
     return _find_carrier(link, joints)
 
@@ -59,23 +67,23 @@ def find_moving_link(path: str, link: str) -> str:
 def read_foot_shapes(path: str, link: str) -> FootShapes:
     """Return the points of all shapes that move with a link, from its joint, along the root's axes at zero angles.
 
-    Visual shapes count only if none of these links has a collision shape. Raises as ``urdf_record``, or for a damaged mesh.
+    Visual shapes count only if none of these links has a collision shape. Raises as ``read_urdf``, or for a damaged mesh.
     """
     tree = _read_xml(path)
     shapes = {kind: {part.get("name"): part.findall(kind) for part in tree.iter("link")} for kind in SHAPES}
     model = _parse(tree, path)
     joints = {joint.child: joint for joint in model.joints}
-    frames = {name: frame for name, frame in _zero_pose(model, joints).items() if _find_carrier(name, joints) == link}
+    frames = {name: frame for name, frame in _place_links(model, joints).items() if _find_carrier(name, joints) == link}
     kind = next((kind for kind in SHAPES if any(shapes[kind][name] for name in frames)), SHAPES[0])
     found, missing = [np.zeros((0, 3))], []
     for name, frame in frames.items():
         for shape in shapes[kind][name]:
             geometries = [part for geometry in shape.findall("geometry") for part in geometry]
             origin = {} if shape.find("origin") is None else shape.find("origin").attrib
-            place, angles = (_numbers(origin.get(key, "0 0 0"), 3, name) for key in ("xyz", "rpy"))
+            place, angles = (_parse_numbers(origin.get(key, "0 0 0"), 3, name) for key in ("xyz", "rpy"))
             pose = make_pose(-frames[link][:3, 3]) @ frame @ make_pose(place, angles)
             for geometry in geometries:
-                points = _shape_points(geometry, pose, Path(path), name)
+                points = _list_shape_points(geometry, pose, Path(path), name)
                 if points is None:
                     missing.append(str(geometry.get("filename")))
                 else:
@@ -84,33 +92,33 @@ def read_foot_shapes(path: str, link: str) -> FootShapes:
 
 
 def list_meshes(path: str) -> list[str]:
-    """Return the files of the meshes of collision shapes, or of visual shapes of links without; raises as ``urdf_record``."""
+    """Return the files of the meshes of collision shapes, or of visual shapes of links without; raises as ``read_urdf``."""
     shapes = (link.findall(SHAPES[0]) or link.findall(SHAPES[1]) for link in _read_xml(path).iter("link"))
     addresses = {mesh.get("filename", "") for listed in shapes for shape in listed for mesh in shape.iter("mesh")}
     return [str(file) for address in addresses if (file := find_mesh(address, Path(path))) is not None]
 
 
-def _shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None:
+def _list_shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None:
     """Return points (N, 3) of a shape at a pose (4, 4); None for a mesh that does not exist."""
     if kind.tag == "mesh":
         mesh = find_mesh(kind.get("filename", ""), file)
         if mesh is None:
             return None
-        points = mesh_points(mesh) * _numbers(kind.get("scale", "1 1 1"), 3, link)
+        points = read_mesh_points(mesh) * _parse_numbers(kind.get("scale", "1 1 1"), 3, link)
     elif kind.tag == "box":
-        points = box_points(np.array(_numbers(kind.get("size", ""), 3, link)) / 2)
+        points = list_box_points(np.array(_parse_numbers(kind.get("size", ""), 3, link)) / 2)
     elif kind.tag == "sphere":
-        centre, (radius,) = pose[:3, 3], _numbers(kind.get("radius", ""), 1, link)
+        centre, (radius,) = pose[:3, 3], _parse_numbers(kind.get("radius", ""), 1, link)
         return np.array([centre - [0.0, 0.0, radius]])
     elif kind.tag in ("cylinder", "capsule"):
-        (radius,), (length,) = (_numbers(kind.get(name, ""), 1, link) for name in ("radius", "length"))
-        points = cylinder_points(radius, length / 2)
+        (radius,), (length,) = (_parse_numbers(kind.get(name, ""), 1, link) for name in ("radius", "length"))
+        points = list_cylinder_points(radius, length / 2)
     else:
         return np.zeros((0, 3))
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
-def _numbers(text: str, count: int, link: str) -> list[float]:
+def _parse_numbers(text: str, count: int, link: str) -> list[float]:
     values = [float(word) for word in text.split()]
     if len(values) != count or not are_plausible(values):
         raise ValueError(f"link {link!r}: a shape needs {count} finite numbers, got {text[:60]!r}")
@@ -166,7 +174,7 @@ def _handle_message(path: str, message: str) -> None:
     warn_once("robot file %r: %s; it is ignored, and may be removed", path, message)
 
 
-def _zero_pose(model: Any, joints: dict[str, Any]) -> dict[str, Array]:
+def _place_links(model: Any, joints: dict[str, Any]) -> dict[str, Array]:
     """Return the pose (4, 4) of each link's frame in the root's at zero angles, parents first; raises ValueError."""
     names = [link.name for link in model.links]
     for kind, found in (("link", names), ("joint", [joint.name for joint in model.joints])):
@@ -189,7 +197,7 @@ def _zero_pose(model: Any, joints: dict[str, Any]) -> dict[str, Array]:
         if not ready:
             raise ValueError(f"joint {waiting[0].name!r} is part of a ring of joints")
         for joint in ready:
-            frames[joint.child] = frames[joint.parent] @ _pose(joint.origin, f"joint {joint.name!r}")
+            frames[joint.child] = frames[joint.parent] @ _read_pose(joint.origin, f"joint {joint.name!r}")
         waiting = [joint for joint in waiting if joint.child not in frames]
     return frames
 
@@ -209,14 +217,14 @@ def _read_mass(link: Any, frame: Array, about_joint: bool) -> Mass:
         raise ValueError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
     if not are_plausible([inertial.mass, *np.ravel(inertial.inertia.to_matrix())]):
         raise ValueError(f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}")
-    pose = frame @ _pose(inertial.origin, f"link {link.name!r}")
+    pose = frame @ _read_pose(inertial.origin, f"link {link.name!r}")
     tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
     if about_joint:
-        tensor = tensor - point_inertia(inertial.mass, pose[:3, 3] - frame[:3, 3])
+        tensor = tensor - compute_point_inertia(inertial.mass, pose[:3, 3] - frame[:3, 3])
     return Mass(inertial.mass, pose[:3, 3], tensor)
 
 
-def _joint_record(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> dict[str, Any]:
+def _describe_joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> dict[str, Any]:
     limit = joint.limit
     if limit is None:
         raise ValueError(
@@ -239,7 +247,7 @@ def _joint_record(joint: Any, frames: dict[str, Array], carriers: dict[str, str]
     }
 
 
-def _pose(origin: Any, owner: str) -> Array:
+def _read_pose(origin: Any, owner: str) -> Array:
     if origin is None:
         return np.eye(4)
     if not are_plausible([*(origin.rpy or ()), *(origin.xyz or ())]):

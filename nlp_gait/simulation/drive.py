@@ -56,7 +56,7 @@ class Drive:
 
     def stiffness(self, joint: Joint) -> float:
         """Return the stiffness of a joint's drive [Nm/rad]."""
-        return stall_torque(joint) / self.full_error_rad
+        return find_stall_torque(joint) / self.full_error_rad
 
     def damping(self, joint: Joint) -> float:
         """Return the damping of a joint's drive [Nm s/rad]."""
@@ -98,11 +98,11 @@ class Drive:
         if self.torque_limits == "urdf" or joint.motor is None:
             return joint.torque_limit_Nm
         if self.torque_limits == "stall":
-            return stall_torque(joint)
+            return find_stall_torque(joint)
         return joint.motor.continuous_torque_Nm
 
 
-def stall_torque(joint: Joint) -> float:
+def find_stall_torque(joint: Joint) -> float:
     """Return the torque of a joint at stall with a lossless gear [Nm]; the stated limit if the motor is unknown."""
     return joint.torque_limit_Nm if joint.motor is None else joint.motor.stall_torque_Nm
 

@@ -17,7 +17,7 @@ from nlp_gait.errors import InputError, MissingExtraError
 from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.plan import SIDES, STANDING, Plan
 from nlp_gait.symbolic.balance import SOLE_FRICTION, shift_down, shift_up, sole_limits
@@ -103,7 +103,7 @@ def compute_instants(plan: Plan, samples: slice) -> SharedLoads:
     wrench = SX.sym("wrench", WRENCH)
     q, qd, qdd = (dict(zip(joints, ca.vertsplit(symbol), strict=True)) for symbol in symbols)
     pushes = {feet["right"].link: shift_up(wrench, feet["right"].ankle_height_m)}
-    tree = tree_from(plan.robot, feet["left"].link)
+    tree = make_tree(plan.robot, feet["left"].link)
     torques, at_ankle = newton_euler(tree, q, qd, qdd, tilt_gravity(plan.gravity, plan.slope_rad), pushes=pushes)
     loads = ca.vertcat(*(torques[name] for name in joints)), shift_down(at_ankle, feet["left"].ankle_height_m)
     parts = [part for value in loads for part in (value, -ca.jacobian(value, wrench))]

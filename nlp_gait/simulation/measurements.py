@@ -104,31 +104,31 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     pressure, planned = average_pressure(simulation, drive.period_s), plan.at("zmp", simulation.t)
     raw = np.linalg.norm(simulation.pressure - planned, axis=1)[during]
     deviation = np.linalg.norm(pressure - planned, axis=1)[during]
-    in_feet = np.linalg.norm(pressure - planned - _feet_moved(plan, simulation), axis=1)[during]
-    landed = _touchdowns(plan, simulation)
+    in_feet = np.linalg.norm(pressure - planned - _measure_feet(plan, simulation), axis=1)[during]
+    landed = _find_touchdowns(plan, simulation)
     share = simulation.t[during] / plan.duration_s
     middle = deviation[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
     return Measurements(
         fallen=simulation.fell_at_s is not None,
         fell_at_s=simulation.fell_at_s,
         largest_tilt_deg=math.degrees(float(simulation.tilt.max())),
-        tracking_rms_rad=_rms(error),
+        tracking_rms_rad=_compute_rms(error),
         tracking_max_rad=float(np.abs(error).max()),
-        slip_m=_slip(plan, simulation),
-        landings={side: _landing(plan, simulation, side) for side in SIDES if side not in plan.supports},
-        pressure_rms_m=_if_any(_rms, deviation),
-        pressure_max_m=_if_any(np.max, deviation),
-        pressure_middle_rms_m=_if_any(_rms, middle),
-        pressure_raw_rms_m=_if_any(_rms, raw),
-        pressure_in_feet_rms_m=_if_any(_rms, in_feet),
+        slip_m=_measure_slip(plan, simulation),
+        landings={side: _measure_landing(plan, simulation, side) for side in SIDES if side not in plan.supports},
+        pressure_rms_m=_apply_if_any(_compute_rms, deviation),
+        pressure_max_m=_apply_if_any(np.max, deviation),
+        pressure_middle_rms_m=_apply_if_any(_compute_rms, middle),
+        pressure_raw_rms_m=_apply_if_any(_compute_rms, raw),
+        pressure_in_feet_rms_m=_apply_if_any(_compute_rms, in_feet),
         touchdowns=landed,
         earliest_landing_s=max((at.planned_s - at.measured_s for at in landed), default=None),
         landing_speed_m_s=max((at.speed_m_s for at in landed), default=None),
         predicted=predict_power(plan),
         measured=Power.compute(torque, simulation.qd[during], plan.heat_loss, np.mean),
-        saturated=_by_joint(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
-        beyond_limit=_by_joint(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
-        joint_limits=tuple(_by_joint(plan, outside.any(axis=0), above=0)),
+        saturated=_select_joints(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
+        beyond_limit=_select_joints(plan, np.abs(plan.signals.arrays["tau"]).max(axis=0) / limits, above=1.0),
+        joint_limits=tuple(_select_joints(plan, outside.any(axis=0), above=0)),
     )
 
 
@@ -157,7 +157,7 @@ def average_pressure(simulation: Simulation, period_s: float) -> Array:
     return np.asarray(np.where(mean_load[:, None] > LEAST_LOAD, centre, np.nan))
 
 
-def _slip(plan: Plan, simulation: Simulation) -> float:
+def _measure_slip(plan: Plan, simulation: Simulation) -> float:
     feet = {side: simulation.feet[:, SIDES.index(side), :2] for side in SIDES}
     moved = [feet[side] for side in plan.supports]
     if not moved:  # both feet swing: their supports begin and end
@@ -168,7 +168,7 @@ def _slip(plan: Plan, simulation: Simulation) -> float:
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
 
 
-def _feet_moved(plan: Plan, simulation: Simulation) -> Array:
+def _measure_feet(plan: Plan, simulation: Simulation) -> Array:
     """Return the distance (T, 2) of the supporting feet from their planned places [m], averaged over these feet."""
     weights = np.stack([plan.stands(side, simulation.t) for side in SIDES], axis=1)
     moved = np.stack(
@@ -179,7 +179,7 @@ def _feet_moved(plan: Plan, simulation: Simulation) -> Array:
         return np.asarray((weights[:, :, None] * moved).sum(axis=1) / weights.sum(axis=1)[:, None])
 
 
-def _touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
+def _find_touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
     found, lasting = [], round(SHORTEST_CONTACT / TIME_STEP)
     for i, side in enumerate(SIDES):
         swings = np.diff(np.concatenate([[1.0], plan.bears(side, simulation.t), [1.0]]))
@@ -197,22 +197,22 @@ def _touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
     return tuple(sorted(found, key=lambda at: at.planned_s))
 
 
-def _landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
+def _measure_landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
     planned = plan.at(f"{side}_foot", np.array([plan.duration_s]))[0, :2].tolist()
     measured = simulation.feet[-1, SIDES.index(side), :2].tolist()
     error = float(np.linalg.norm(np.subtract(measured, planned)))
     return Landing(planned_m=tuple(planned), measured_m=tuple(measured), error_m=error)
 
 
-def _by_joint(plan: Plan, shares: Array, above: float) -> dict[str, float]:
+def _select_joints(plan: Plan, shares: Array, above: float) -> dict[str, float]:
     return {name: share for name, share in zip(plan.joints, shares.tolist(), strict=True) if share > above}
 
 
-def _rms(values: Array) -> float:
+def _compute_rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _if_any(statistic: Any, values: Array) -> float | None:
+def _apply_if_any(statistic: Any, values: Array) -> float | None:
     numbers = values[np.isfinite(values)]
     return float(statistic(numbers)) if numbers.size else None
 
@@ -243,7 +243,7 @@ class Walk:
 def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -> Walk:
     """Compute the numbers of a simulated walk."""
     measurements = measure(plan, simulation, drive)
-    planned, (walked, drift) = planned_distance(plan), walked_distance(simulation, plan_way(plan))
+    planned, (walked, drift) = measure_planned_distance(plan), measure_walked_distance(simulation, plan_way(plan))
     energy = measurements.measured.total_W * plan.duration_s
     fell = simulation.fell_at_s
     return Walk(
@@ -262,7 +262,7 @@ def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -
     )
 
 
-def planned_distance(plan: Plan) -> float:
+def measure_planned_distance(plan: Plan) -> float:
     """Return the planned distance of the point halfway between the feet, from its start straight to its end [m]."""
     return math.hypot(*plan_way(plan))
 
@@ -274,7 +274,7 @@ def plan_way(plan: Plan) -> tuple[float, float]:
     return (x, y) if math.hypot(x, y) > ON_GROUND else (0.0, 0.0)
 
 
-def walked_distance(simulation: Simulation, way: tuple[float, float] = (1.0, 0.0)) -> tuple[float, float]:
+def measure_walked_distance(simulation: Simulation, way: tuple[float, float] = (1.0, 0.0)) -> tuple[float, float]:
     """Return the distances of the point halfway between the feet along a way (x, y) and to its left, from start to rest [m]."""
     middle = simulation.feet.mean(axis=1)
     x, y = (middle[-1] - middle[0])[:2].tolist()

@@ -10,7 +10,7 @@ import numpy as np
 from nlp_gait.formulation.display import Tread
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Link
-from nlp_gait.robots.tree import TreeBody, tree_from
+from nlp_gait.robots.tree import TreeBody, make_tree
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.plan import Plan
 from nlp_gait.simulation.shapes import Prism, Shape, make_shapes
@@ -42,25 +42,32 @@ def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction:
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     _, option, default, _, assets, world, actuators = root
     root.set("model", robot.name)
-    option.attrib |= {"timestep": _numbers(TIME_STEP), "gravity": _numbers(*tilt_gravity(plan.gravity, plan.slope_rad))}
-    default[0].set("friction", _numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
+    option.attrib |= {
+        "timestep": _format_numbers(TIME_STEP),
+        "gravity": _format_numbers(*tilt_gravity(plan.gravity, plan.slope_rad)),
+    }
+    default[0].set("friction", _format_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
     for link, parts in shapes.items():
         for i, shape in enumerate(parts):
             if isinstance(shape, Prism):
                 levels = (shape.bottom, shape.bottom + shape.thickness)
                 corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
-                Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_numbers(*corners))
+                Xml.SubElement(assets, "mesh", name=f"{link} {i}", vertex=_format_numbers(*corners))
     _add_stairs(world, plan.ground)
-    bodies = add_bodies(world, tree_from(robot, robot.root), shapes, root="planar" if plan.planar else "free")
+    bodies = add_bodies(world, make_tree(robot, robot.root), shapes, root="planar" if plan.planar else "free")
     _paint(bodies, robot)
     light = Xml.SubElement(bodies[robot.root], "light", mode="track", directional="true", pos="0.6 -0.8 1.5")
     light.attrib |= {"dir": "-0.6 0.8 -1.5", "diffuse": "0.5 0.5 0.5", "specular": "0.1 0.1 0.1"}
     for side, foot in robot.feet.items():
-        Xml.SubElement(bodies[foot.link], "site", name=side, pos=_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002")
+        Xml.SubElement(
+            bodies[foot.link], "site", name=side, pos=_format_numbers(0.0, 0.0, -foot.ankle_height_m), size="0.002"
+        )
     for name, joint in robot.joints.items():
         limit = drive.torque_limit(joint)
-        actuator = Xml.SubElement(actuators, "position", name=name, joint=name, forcerange=_numbers(-limit, limit))
-        actuator.attrib |= {"kp": _numbers(drive.stiffness(joint)), "kv": _numbers(drive.damping(joint))}
+        actuator = Xml.SubElement(
+            actuators, "position", name=name, joint=name, forcerange=_format_numbers(-limit, limit)
+        )
+        actuator.attrib |= {"kp": _format_numbers(drive.stiffness(joint)), "kv": _format_numbers(drive.damping(joint))}
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
 
@@ -72,7 +79,9 @@ def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
         end = edges[i] if i < len(edges) else tread.edge_m + LAST_TREAD
         half = ((end - tread.edge_m) / 2, STAIR_HALF_WIDTH, tread.height_m / 2)
         middle = (tread.edge_m + half[0], 0.0, half[2])
-        box = Xml.SubElement(world, "geom", name=f"tread {i}", type="box", size=_numbers(*half), pos=_numbers(*middle))
+        box = Xml.SubElement(
+            world, "geom", name=f"tread {i}", type="box", size=_format_numbers(*half), pos=_format_numbers(*middle)
+        )
         box.attrib |= {"contype": "1", "rgba": "0.8 0.78 0.74 1"}
 
 
@@ -83,28 +92,28 @@ def add_bodies(
     elements: list[Xml.Element] = []
     for body in tree:
         parent = world if body.parent < 0 else elements[body.parent]
-        element = Xml.SubElement(parent, "body", name=body.link.name, pos=_numbers(*body.offset_m))
+        element = Xml.SubElement(parent, "body", name=body.link.name, pos=_format_numbers(*body.offset_m))
         elements.append(element)
         if body.joint is not None:
             axis = (body.direction * a for a in body.joint.axis)
-            limits = _numbers(*body.joint.limits_rad)
-            joint = Xml.SubElement(element, "joint", name=body.joint.name, axis=_numbers(*axis), range=limits)
+            limits = _format_numbers(*body.joint.limits_rad)
+            joint = Xml.SubElement(element, "joint", name=body.joint.name, axis=_format_numbers(*axis), range=limits)
             if body.armature_kgm2:
-                joint.set("armature", _numbers(body.armature_kgm2))
+                joint.set("armature", _format_numbers(body.armature_kgm2))
         elif root == "free":
             Xml.SubElement(element, "freejoint")
         elif root == "planar":
             for name, (kind, along) in PLANAR_JOINTS.items():
                 Xml.SubElement(element, "joint", name=name, type=kind, axis=along)
         link = body.link
-        tensor, mass = _numbers(*_positive_tensor(link)), _numbers(link.mass_kg)
-        Xml.SubElement(element, "inertial", pos=_numbers(*body.com_offset_m), mass=mass, fullinertia=tensor)
+        tensor, mass = _format_numbers(*_make_positive_tensor(link)), _format_numbers(link.mass_kg)
+        Xml.SubElement(element, "inertial", pos=_format_numbers(*body.com_offset_m), mass=mass, fullinertia=tensor)
         for i, shape in enumerate(shapes.get(link.name, ())):
             _add_geometry(element, shape, f"{link.name} {i}")
     return {body.link.name: element for body, element in zip(tree, elements, strict=True)}
 
 
-def _positive_tensor(link: Link) -> tuple[float, ...]:
+def _make_positive_tensor(link: Link) -> tuple[float, ...]:
     """Return the tensor xx, yy, zz, xy, xz, yz [kg m^2]; points and thin rods, which MuJoCo refuses, get a small ball's."""
     moments, products = link.inertia_com_kgm2[:3], link.inertia_com_kgm2[3:]
     thin = np.linalg.eigvalsh(link.inertia_matrix)[0] < LEAST_MOMENT
@@ -117,15 +126,15 @@ def _add_geometry(element: Xml.Element, shape: Shape, name: str) -> None:
         Xml.SubElement(element, "geom", name=name, type="mesh", mesh=name)
         return
     if shape.start == shape.end:
-        place = {"type": "sphere", "pos": _numbers(*shape.start)}
+        place = {"type": "sphere", "pos": _format_numbers(*shape.start)}
     else:
-        place = {"type": "capsule", "fromto": _numbers(*shape.start, *shape.end)}
-    geometry = Xml.SubElement(element, "geom", {"name": name, **place, "size": _numbers(shape.radius)})
+        place = {"type": "capsule", "fromto": _format_numbers(*shape.start, *shape.end)}
+    geometry = Xml.SubElement(element, "geom", {"name": name, **place, "size": _format_numbers(shape.radius)})
     if not shape.solid:
         geometry.set("conaffinity", "0")
 
 
-def _numbers(*values: float) -> str:
+def _format_numbers(*values: float) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 

@@ -220,7 +220,7 @@ class StepPlanner:
         trial, planner = self._make(t, now.share_at(t), commanded), self._planners[name]
         trial = trial._replace(
             values=trial.values
-            | {**_pair(rest.MISS, miss), rest.RATE: growth, rest.REACH: self._reach_m, **self._find_rise(t)}
+            | {**_name_numbers(rest.MISS, miss), rest.RATE: growth, rest.REACH: self._reach_m, **self._find_rise(t)}
         )
         solver = planner.prepare(trial)
         if name not in self._used:
@@ -251,15 +251,15 @@ class StepPlanner:
         left = (1.0 - share) * phase.duration_s
         rate, foot = faster * end.hip_rate, faster[:2] * end.foot if name == "ssp" else state.foot
         place = faster * end.hip + [*foot, 0.0]
-        ends = {**_pair(rest.HIP_PLACES, place), **_pair(rest.HIP_RATES, rate), duration: left}
+        ends = {**_name_numbers(rest.HIP_PLACES, place), **_name_numbers(rest.HIP_RATES, rate), duration: left}
         if name == "ssp":
-            ends |= _pair(rest.FOOT, foot)
+            ends |= _name_numbers(rest.FOOT, foot)
         values = {f"{each}.planned": value for each, value in ends.items()}
-        values |= _pair("xyz", state.hip, "_start_m", "hip_")
-        values |= _pair("xyz", state.hip_rate, "_start_m_s", "hip_v")
+        values |= _name_numbers("xyz", state.hip, "_start_m", "hip_")
+        values |= _name_numbers("xyz", state.hip_rate, "_start_m_s", "hip_v")
         arms = {"start": state.arms, "end": end.arms, "start_rate": state.arms_rate, "end_rate": end.arms_rate}
         for kind, numbers in arms.items():
-            values |= _pair(self._body.angle_names(name), numbers, f"_{kind}")
+            values |= _name_numbers(self._body.angle_names(name), numbers, f"_{kind}")
         values[f"{duration}.lower"] = min(FASTEST_S[name] * (1.0 - share), left)
         values[f"{duration}.upper"] = SLOWEST * left
         for each, what in zip((*rest.FOOT, duration), FREE, strict=True):
@@ -268,10 +268,10 @@ class StepPlanner:
         if name == "ssp":
             values["swing_share_start"] = share
             values["swing_height_m"] = phase.height
-            values |= _pair("xy", state.foot, "_start_m", "foot_")
-            values |= _pair("xy", state.foot_rate, "_start_m_s", "foot_v")
+            values |= _name_numbers("xy", state.foot, "_start_m", "foot_")
+            values |= _name_numbers("xy", state.foot_rate, "_start_m_s", "foot_v")
         else:
-            values |= _pair(rest.FOOT, foot)
+            values |= _name_numbers(rest.FOOT, foot)
         values |= self._list_edges([np.array([0.0, left_y])] + [foot] * (name == "dsp"))
         x = np.array([ends.get(each, 0.0) for each in self._planners[name].names])
         planned = PlanState(place, rate, foot, np.zeros(2), end.arms, end.arms_rate)
@@ -314,7 +314,7 @@ def find_ankle_joints(body: Body, side: str) -> list[Joint]:
     return [below[last.parent], last]
 
 
-def _pair(names: Sequence[str], numbers: Array, after: str = "", before: str = "") -> dict[str, float]:
+def _name_numbers(names: Sequence[str], numbers: Array, after: str = "", before: str = "") -> dict[str, float]:
     return {f"{before}{name}{after}": value for name, value in zip(names, numbers.tolist(), strict=True)}
 
 

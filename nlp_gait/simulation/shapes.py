@@ -9,7 +9,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.robots.robot import Vector
-from nlp_gait.robots.tree import plus
+from nlp_gait.robots.tree import add_vectors
 
 SOLES = ("rectangle", "polygon")  # the outline for balance margins, or the true one
 
@@ -30,7 +30,7 @@ class Capsule:
 
     def move(self, by: Vector) -> Self:
         """Return the shape, moved by a vector."""
-        return replace(self, start=plus(self.start, by), end=plus(self.end, by))
+        return replace(self, start=add_vectors(self.start, by), end=add_vectors(self.end, by))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Columns, Signals, vector_columns
+from nlp_gait.formulation import Array, Columns, Signals, make_vector_columns
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
@@ -19,12 +19,12 @@ SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot t
 FALLEN_TILT = math.radians(45.0)
 FALLEN_HEIGHT = 0.6  # of the torso's planned height at the start; sinking by the rest below the plan is a fall
 COLUMNS = {
-    "torso": vector_columns("m"),
+    "torso": make_vector_columns("m"),
     "tilt": Columns(unit="rad"),
     "heading": Columns(unit="rad"),
     "feet": Columns(unit="m", labels=SIDES),
     "loads": Columns(unit="N", labels=SIDES),
-    "pressure": vector_columns("m", "xy"),
+    "pressure": make_vector_columns("m", "xy"),
 }
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
@@ -134,7 +134,7 @@ def simulate_plan(
         torso, axes = data.xpos[at.torso].copy(), data.xmat[at.torso]
         upright, heading = float(axes[2::3] @ axis), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
-        rows.append((q, qd, torque, torso, upright, heading, feet, *_pressure(data, at)))
+        rows.append((q, qd, torque, torso, upright, heading, feet, *_measure_pressure(data, at)))
         diverged = not np.isfinite(data.qvel).all()
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
@@ -174,7 +174,7 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     return model, data
 
 
-def _pressure(data: Any, at: Addresses) -> tuple[Array, Array]:
+def _measure_pressure(data: Any, at: Addresses) -> tuple[Array, Array]:
     """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
     contact = data.contact
     active = contact.efc_address >= 0

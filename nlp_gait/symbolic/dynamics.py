@@ -71,7 +71,7 @@ def newton_euler(
     """Return the joint torques of a tree whose first body is fixed to the ground.
 
     Args:
-        tree: bodies, parents first (see ``robots.tree.tree_from``).
+        tree: bodies, parents first (see ``robots.tree.make_tree``).
         q: joint angles by name [rad]; a constant angle costs no operations.
         qd: joint velocities by name [rad/s].
         qdd: joint accelerations by name [rad/s^2].

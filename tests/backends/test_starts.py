@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.solve import available_workers
+from nlp_gait.backends.solve import count_workers
 from nlp_gait.backends.solvers.solver import Solver, judge_point
 from nlp_gait.errors import InputError, WorkerError
 from nlp_gait.formulation import Array, GaitProblem
@@ -136,6 +136,6 @@ def test_what_a_run_raises_is_raised_and_a_dead_process_is_reported() -> None:
 
 def test_a_worker_forks_no_workers_and_their_number_is_checked() -> None:
     with multiprocessing.get_context("fork").Pool(1) as pool:
-        assert pool.apply(available_workers) == 1
+        assert pool.apply(count_workers) == 1
     with pytest.raises(InputError, match="workers must be a whole number >= 1"):
         nlp_gait.solve(toy(corner), workers=0)

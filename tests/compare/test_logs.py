@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.record_statistics import ecdf
+from compare.analysis.record_statistics import compute_ecdf
 from compare.bench.leaderboard import rank_solvers
 from compare.logs import NOTHING_FEASIBLE, SMALLEST, make_traces, write_coco, write_ioh
 
@@ -62,7 +62,7 @@ def test_iohinspector_finds_our_numbers(comparisons: list[Comparison], form: str
             shares = get_data_ecdf(rows, f_min=1e-6, f_max=1.0, eval_values=at)
             targets = np.logspace(0.0, -6.0, TARGETS)
             costs = np.array([[c.cost_to_reach(t) for t in targets] for c in solver.curves]).ravel()
-            cost, share = ecdf(costs)
+            cost, share = compute_ecdf(costs)
             ours_at = [float(share[cost <= count][-1]) if (cost <= count).any() else 0.0 for count in at]
             np.testing.assert_allclose(shares["eaf"], ours_at, atol=1.0 / (TARGETS - 1))
     assert compared > 100

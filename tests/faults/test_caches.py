@@ -57,7 +57,7 @@ def test_two_processes_share_a_cache_and_an_output_folder(tmp_path: Path) -> Non
 
 def test_a_load_makes_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(tmp_path))
-    monkeypatch.setattr(library_cache, "private_folder", library_cache.cache(lambda: pytest.fail("made")))
+    monkeypatch.setattr(library_cache, "make_private_folder", library_cache.cache(lambda: pytest.fail("made")))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         source = 'extern "C" int one(void) { return 1; }\n'

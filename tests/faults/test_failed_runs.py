@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from metaheuristics import ParticleSwarm
-from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_folder, private_folder, warn_once
+from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_folder, make_private_folder, warn_once
 from tests.faults.processes import ROOT, quick_compiler
 
 RUN = CliRunner()
@@ -93,7 +93,7 @@ def test_a_user_without_a_home_compiles_in_a_temporary_folder(
     monkeypatch.chdir(tmp_path)
     warn_once.cache_clear()
     folder = find_cache_folder()
-    assert folder == private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
+    assert folder == make_private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
     assert "Could not determine home directory." in caplog.text
 
 

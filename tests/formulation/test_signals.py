@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Columns, Signals, vector_columns
+from nlp_gait.formulation import Columns, Signals, make_vector_columns
 from tests.backends.toys import corner, toy
 
 T = np.array([0.0, 0.5, 1.0])
@@ -17,7 +17,7 @@ def test_every_column_has_its_name_and_unit() -> None:
     signals = Signals(
         joints=("hip", "knee"),
         arrays={"tau": np.ones((3, 2)), "zmp": np.zeros((3, 2)), "share": T, "t": T},
-        columns={"zmp": vector_columns("m", "xy"), "share": Columns(unit="1")},
+        columns={"zmp": make_vector_columns("m", "xy"), "share": Columns(unit="1")},
     )
     assert [(name, unit) for name, unit, _ in signals.named_columns()] == [
         ("t", "s"),
@@ -38,7 +38,7 @@ def test_a_time_history_without_a_unit_is_refused() -> None:
 @pytest.mark.parametrize(
     ("name", "columns", "message"),
     [
-        ("zmp", {"zmp": vector_columns("m")}, "'zmp' has 2 columns, but 3 are described"),
+        ("zmp", {"zmp": make_vector_columns("m")}, "'zmp' has 2 columns, but 3 are described"),
         ("zmp", {"zmp": Columns(unit="m")}, "'zmp' has 2 columns, but 1 are described"),
         ("q", {}, "'q' has 2 columns, but 1 are described"),
     ],

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from metaheuristics import SearchError, algorithm, installed_algorithms, minimize
-from metaheuristics.algorithms.differential_evolution import gains, lehmer_mean
+from metaheuristics import SearchError, algorithm, list_installed_algorithms, minimize
+from metaheuristics.algorithms.differential_evolution import compute_gains, compute_lehmer_mean
 from metaheuristics.interface import FEASIBILITY, Array, Start
 from tests.metaheuristics.problems import Function, disc, sphere
 
@@ -102,9 +102,9 @@ def test_a_bad_setting_is_refused_in_one_sentence(name: str, settings: dict[str,
 def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     for package in ("cma", "egobox", "pymoo"):
         pytest.importorskip(package)
-    assert {"lshade", "cma-al", "bayes", "scipy:COBYQA", "pymoo:GA"} <= set(installed_algorithms())
+    assert {"lshade", "cma-al", "bayes", "scipy:COBYQA", "pymoo:GA"} <= set(list_installed_algorithms())
     monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
-    assert "lshade" in installed_algorithms() and not {"bayes", "cma-al"} & set(installed_algorithms())
+    assert "lshade" in list_installed_algorithms() and not {"bayes", "cma-al"} & set(list_installed_algorithms())
     with pytest.raises(SearchError, match=r"'bayes' needs the package egobox.*pip install 'nlp-gait\[bayes\]'"):
         algorithm("bayes")
 
@@ -136,11 +136,13 @@ def test_the_population_of_lshade_shrinks_to_four() -> None:
 
 
 def test_means_and_gains_of_lshade_by_hand() -> None:
-    assert lehmer_mean(np.array([0.2, 0.6]), np.array([1.0, 3.0])) == pytest.approx((0.04 + 3 * 0.36) / (0.2 + 1.8))
-    assert lehmer_mean(np.zeros(2), np.ones(2)) == 0.0
+    assert compute_lehmer_mean(np.array([0.2, 0.6]), np.array([1.0, 3.0])) == pytest.approx(
+        (0.04 + 3 * 0.36) / (0.2 + 1.8)
+    )
+    assert compute_lehmer_mean(np.zeros(2), np.ones(2)) == 0.0
     before = np.array([4.0, 2.0, 0.0, 0.0]), np.array([1.0, 1.0, 10.0, 10.0])
     after = np.array([0.0, 1.0, 0.0, 0.0]), np.array([9.0, 9.0, 5.0, 8.0])
-    np.testing.assert_allclose(gains(before, after), [1.0, 0.25, 1.0, 0.4])
+    np.testing.assert_allclose(compute_gains(before, after), [1.0, 0.25, 1.0, 0.4])
 
 
 def _start(population: int, n: int) -> Start:

@@ -7,8 +7,8 @@ import pytest
 
 from metaheuristics import SearchError
 from metaheuristics.interface import Array, Constraints
-from metaheuristics.multi_objective import FRONT_ALGORITHMS, front_algorithm, minimize_many
-from metaheuristics.multi_objective.constrained_moead import places_to_take
+from metaheuristics.multi_objective import FRONT_ALGORITHMS, make_front_algorithm, minimize_many
+from metaheuristics.multi_objective.constrained_moead import find_places_to_take
 from metaheuristics.multi_objective.dynamic_nsga3 import compute_boundary
 
 
@@ -29,7 +29,7 @@ class TwoParabolas:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FRONT_ALGORITHMS)
 def test_fronts_are_feasible_near_the_true_one_and_repeat_with_their_seed(name: str) -> None:
-    algorithm = front_algorithm(name, population=20)
+    algorithm = make_front_algorithm(name, population=20)
     first, second = minimize_many(TwoParabolas(), algorithm, evaluations=(20, 800), seed=3)
     assert (first.evaluations, second.evaluations) == (20, 800)
     x, y = second.X[:, 0], second.X[:, 1]
@@ -43,7 +43,7 @@ def test_fronts_are_feasible_near_the_true_one_and_repeat_with_their_seed(name: 
 
 
 def test_a_later_budget_does_not_change_an_earlier_snapshot() -> None:
-    algorithm = front_algorithm("NSGA2", population=20)
+    algorithm = make_front_algorithm("NSGA2", population=20)
     alone = minimize_many(TwoParabolas(), algorithm, evaluations=(200,), seed=0)[0]
     first = minimize_many(TwoParabolas(), algorithm, evaluations=(200, 400), seed=0)[0]
     np.testing.assert_array_equal(alone.X, first.X)
@@ -54,7 +54,7 @@ def test_without_a_feasible_point_the_front_is_empty() -> None:
         def __call__(self, X: Array) -> tuple[Array, Array]:
             return super().__call__(X)[0], np.full(len(X), 1.0)
 
-    (only,) = minimize_many(Infeasible(), front_algorithm("NSGA2", population=10), evaluations=(30,))
+    (only,) = minimize_many(Infeasible(), make_front_algorithm("NSGA2", population=10), evaluations=(30,))
     assert only.X.shape == (0, 3)
     assert only.F.shape == (0, 2)
 
@@ -62,12 +62,12 @@ def test_without_a_feasible_point_the_front_is_empty() -> None:
 @pytest.mark.parametrize("budgets", [(), (5,), (400, 200)])
 def test_budgets_that_cannot_be_are_refused(budgets: tuple[int, ...]) -> None:
     with pytest.raises(SearchError, match="evaluations must rise"):
-        minimize_many(TwoParabolas(), front_algorithm("NSGA2", population=20), evaluations=budgets)
+        minimize_many(TwoParabolas(), make_front_algorithm("NSGA2", population=20), evaluations=budgets)
 
 
 def test_an_unknown_algorithm_is_refused() -> None:
     with pytest.raises(SearchError, match="did you mean 'CMOEAD'"):
-        front_algorithm("MOEAD")
+        make_front_algorithm("MOEAD")
 
 
 @pytest.mark.parametrize("name", ["CMOEAD", "DCNSGA3"])
@@ -81,7 +81,7 @@ def test_an_unknown_algorithm_is_refused() -> None:
 )
 def test_a_bad_setting_is_refused_in_one_sentence(name: str, settings: dict[str, float], said: str) -> None:
     with pytest.raises(SearchError, match=said):
-        front_algorithm(name, **settings)
+        make_front_algorithm(name, **settings)
 
 
 @pytest.mark.parametrize("name", ["CMOEAD", "DCNSGA3"])
@@ -90,7 +90,7 @@ def test_a_population_without_an_even_spread_of_directions_is_refused(name: str)
         count = 3
 
     with pytest.raises(SearchError, match="got 20; the nearest ones are 15 and 21"):
-        minimize_many(Three(), front_algorithm(name, population=20), evaluations=(100,))
+        minimize_many(Three(), make_front_algorithm(name, population=20), evaluations=(100,))
 
 
 def test_nothing_to_vary_is_refused() -> None:
@@ -98,7 +98,7 @@ def test_nothing_to_vary_is_refused() -> None:
         upper = TwoParabolas.lower
 
     with pytest.raises(SearchError, match="all variables are fixed"):
-        minimize_many(Fixed(), front_algorithm("CMOEAD", population=20), evaluations=(100,))
+        minimize_many(Fixed(), make_front_algorithm("CMOEAD", population=20), evaluations=(100,))
 
 
 class Circle:
@@ -127,14 +127,14 @@ class Circle:
 def test_the_front_of_a_published_problem_is_found(name: str) -> None:
     """Over seeds 0 to 4 no point lies farther than 0.011 from the circle; NSGA-II does no better."""
     circle = Circle()
-    (found,) = minimize_many(circle, front_algorithm(name, population=40), evaluations=(1600,), seed=1)
+    (found,) = minimize_many(circle, make_front_algorithm(name, population=40), evaluations=(1600,), seed=1)
     assert len(found.F) > 10
     assert np.max(np.abs(np.hypot(*found.F.T) - 1.0)) < 0.03
     assert np.all(circle(found.X)[1] == 0.0)
 
 
 def test_a_look_counts_feasible_evaluations_and_time() -> None:
-    (look,) = minimize_many(TwoParabolas(), front_algorithm("DCNSGA3", population=20), evaluations=(200,), seed=0)
+    (look,) = minimize_many(TwoParabolas(), make_front_algorithm("DCNSGA3", population=20), evaluations=(200,), seed=0)
     assert 0 < look.feasible < look.evaluations == 200
     assert look.first_feasible is not None and look.first_feasible <= 20
     assert 0.0 <= look.objective_time_s <= look.time_s
@@ -145,9 +145,9 @@ def test_places_go_to_a_child_that_violates_less_or_is_no_worse() -> None:
     places = np.array([7, 3, 2, 5])
     old, new = np.array([0.1, 0.1, 0.5, 0.0]), np.array([0.5, 0.5, 0.5, 9.0])
     violation = np.array([2.0, 1.0, 1.0, 3.0])
-    assert places_to_take(old, new, violation, 1.0, places, 4).tolist() == [7, 2, 5]
-    assert places_to_take(old, new, violation, 1.0, places, 1).tolist() == [7]
-    assert places_to_take(old, new, violation, 2.5, places, 4).tolist() == [5]
+    assert find_places_to_take(old, new, violation, 1.0, places, 4).tolist() == [7, 2, 5]
+    assert find_places_to_take(old, new, violation, 1.0, places, 1).tolist() == [7]
+    assert find_places_to_take(old, new, violation, 2.5, places, 4).tolist() == [5]
 
 
 def test_the_boundary_falls_from_the_first_violation_to_zero() -> None:

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from metaheuristics.algorithms.ant_colony import AntColony, deviations, kernel_probabilities, pick, renew
+from metaheuristics.algorithms.ant_colony import AntColony, compute_deviations, compute_probabilities, pick, renew
 from metaheuristics.algorithms.genetic import (
     Flip,
     GeneticAlgorithm,
     SinglePoint,
-    polynomial,
-    simulated_binary,
-    tournaments,
+    cross_simulated_binary,
+    hold_tournaments,
+    mutate_polynomially,
 )
 from metaheuristics.algorithms.particle_swarm import ParticleSwarm, move, reflect
 from metaheuristics.algorithms.points import Points
@@ -83,7 +83,7 @@ def test_swarm_follows_the_source_particle_by_particle() -> None:
 @pytest.mark.parametrize(("u", "spread"), [(0.5, 1.0), (0.0, 0.0), (0.25, 0.5 ** (1 / 3)), (0.75, 2 ** (1 / 3))])
 def test_sbx_far_from_bounds(u: float, spread: float) -> None:
     # Index 2: spread = (2u)^(1/3) up to u = 1/2, then (1 / (2 (1 - u)))^(1/3); children 3 -+ spread * 1.
-    low, high = simulated_binary(
+    low, high = cross_simulated_binary(
         np.array([[4.0]]), np.array([[2.0]]), np.array([-WIDE]), np.array([WIDE]), 2.0, np.array([[u]])
     )
     np.testing.assert_allclose([low[0, 0], high[0, 0]], [3.0 - spread, 3.0 + spread], rtol=1e-12)
@@ -93,7 +93,7 @@ def test_sbx_near_a_bound() -> None:
     # Parents 1 and 3 within 0..3, index 2, u = 0.75.
     # Low side: beta = 1 + 2 * 1 / 2 = 2, alpha = 2 - 1/8 = 1.875, u alpha = 1.40625 > 1:
     # spread (1 / 0.59375)^(1/3). High side: beta = 1, alpha = 1, u alpha = 0.75: spread 0.75^(1/3).
-    low, high = simulated_binary(
+    low, high = cross_simulated_binary(
         np.array([[1.0]]), np.array([[3.0]]), np.array([0.0]), np.array([3.0]), 2.0, np.array([[0.75]])
     )
     np.testing.assert_allclose(low, 2.0 - (1 / 0.59375) ** (1 / 3))
@@ -103,7 +103,7 @@ def test_sbx_near_a_bound() -> None:
 @repeatable
 @given(unit, unit, unit, st.floats(0.0, 100.0))
 def test_sbx_children_stay_within_bounds_and_in_order(a: float, b: float, u: float, index: float) -> None:
-    low, high = simulated_binary(
+    low, high = cross_simulated_binary(
         np.array([[a]]), np.array([[b]]), np.array([0.0]), np.array([1.0]), index, np.array([[u]])
     )
     assert 0.0 <= low[0, 0] <= high[0, 0] <= 1.0
@@ -114,7 +114,7 @@ def test_polynomial_mutation() -> None:
     # the same upwards; u = 0.5 nothing; u = 0 the lower bound. In 0..2 about 1 the steps double.
     u = np.array([[0.125, 0.875, 0.5, 0.0, 0.125]])
     X = np.array([[0.5, 0.5, 0.5, 0.5, 1.0]])
-    mutant = polynomial(X, np.zeros(5), np.array([1.0, 1.0, 1.0, 1.0, 2.0]), 1.0, u)
+    mutant = mutate_polynomially(X, np.zeros(5), np.array([1.0, 1.0, 1.0, 1.0, 2.0]), 1.0, u)
     step = 1.0 - np.sqrt(0.4375)
     np.testing.assert_allclose(mutant, [[0.5 - step, 0.5 + step, 0.5, 0.0, 1.0 - 2.0 * step]], atol=1e-15)
 
@@ -122,7 +122,7 @@ def test_polynomial_mutation() -> None:
 @repeatable
 @given(unit, unit, st.floats(0.0, 100.0))
 def test_polynomial_mutation_stays_within_bounds(x: float, u: float, index: float) -> None:
-    mutant = polynomial(np.array([[x]]), np.array([0.0]), np.array([1.0]), index, np.array([[u]]))[0, 0]
+    mutant = mutate_polynomially(np.array([[x]]), np.array([0.0]), np.array([1.0]), index, np.array([[u]]))[0, 0]
     assert 0.0 <= mutant <= 1.0 and (mutant <= x if u <= 0.5 else mutant >= x)
 
 
@@ -142,12 +142,12 @@ def test_flip_mutation_of_the_paper() -> None:
 
 
 def test_binary_tournaments_draw_every_parent_twice() -> None:
-    winners = np.bincount(tournaments(50, 50, 2, np.random.default_rng(0)), minlength=50)
+    winners = np.bincount(hold_tournaments(50, 50, 2, np.random.default_rng(0)), minlength=50)
     assert winners.sum() == 50 and winners[0] == 2 and winners[-1] == 0 and winners.max() == 2
 
 
 def test_tournaments_of_one_are_a_shuffle() -> None:
-    assert sorted(tournaments(7, 7, 1, np.random.default_rng(0))) == list(range(7))
+    assert sorted(hold_tournaments(7, 7, 1, np.random.default_rng(0))) == list(range(7))
 
 
 def test_copies_survive_only_if_nothing_else_is_left() -> None:
@@ -192,14 +192,14 @@ def test_a_collapsed_archive_ends_the_search() -> None:
 def test_archive_probabilities() -> None:
     # q k = 0.5 * 4 = 2: weights exp(0), exp(-1/8), exp(-4/8), exp(-9/8).
     weights = np.exp([0.0, -0.125, -0.5, -1.125])
-    np.testing.assert_allclose(kernel_probabilities(4, 0.5), weights / weights.sum())
-    np.testing.assert_allclose(kernel_probabilities(50, 1e-4), np.eye(50)[0])  # the greedy q of the source
+    np.testing.assert_allclose(compute_probabilities(4, 0.5), weights / weights.sum())
+    np.testing.assert_allclose(compute_probabilities(50, 1e-4), np.eye(50)[0])  # the greedy q of the source
 
 
 def test_archive_deviations() -> None:
     archive = np.array([[0.0, 1.0], [1.0, 1.0], [5.0, 1.0]])
     # From 1: (1 + 0 + 4) / 2 * 0.8 = 2; from 5: (5 + 4 + 0) / 2 * 0.8 = 3.6.
-    np.testing.assert_allclose(deviations(archive, archive[[1, 2]], 0.8), [[2.0, 0.0], [3.6, 0.0]])
+    np.testing.assert_allclose(compute_deviations(archive, archive[[1, 2]], 0.8), [[2.0, 0.0], [3.6, 0.0]])
 
 
 def test_pheromone_renewal() -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from tests.evaluation import evaluated
@@ -105,7 +105,7 @@ def test_lengths_scale_like_the_square_of_times(tmp_path: Path, name: str) -> No
 def loads(robot: Robot, foot: str, arrays: dict[str, Array], sample: int) -> tuple[dict[str, float], Array]:
     """Torques and ZMP relative to the ankle of a robot that stands on one foot, from joint histories by name."""
     q, qd, qdd = ({name: arrays[f"{key} {name}"][sample] for name in JOINT_SIGNS} for key in ("q", "qd", "qdd"))
-    tree = tree_from(robot, robot.feet[foot].link)
+    tree = make_tree(robot, robot.feet[foot].link)
     torques, wrench = newton_euler(tree, q, qd, qdd, GRAVITY, upright=find_upright_links(robot))
     zmp = zmp_of_wrench(wrench, robot.feet[foot].ankle_height_m, robot.mass_kg * GRAVITY)
     return {name: float(torque) for name, torque in torques.items()}, np.array([float(zmp[0]), float(zmp[1])])

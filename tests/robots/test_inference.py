@@ -18,7 +18,7 @@ from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import make_leg
 from nlp_gait.robots.loading import hash_robot
 from nlp_gait.robots.robot import Link
-from nlp_gait.robots.tree import partner, partners
+from nlp_gait.robots.tree import find_partner, find_partners
 from tests.robots.crooked import ANKLE_M, ARM_KG, LEG, MASSES, SOLE_AHEAD_M, SOLE_M, TORSO_KG, crooked, crooked_urdf
 
 pytest.importorskip("urdf_parser_py")
@@ -86,11 +86,11 @@ def test_what_is_ignored_is_reported(tmp_path: Path, caplog: pytest.LogCaptureFi
 
 
 def test_images_are_found_where_names_mislead(robot: Robot) -> None:
-    images = partners(robot)
+    images = find_partners(robot)
     assert images["A_knee"] == "B_knee" and images["B_shoulder"] == "A_shoulder"
-    assert partner("A_knee") == "A_knee"
+    assert find_partner("A_knee") == "A_knee"
     nao = load_robot("nao-v6")
-    assert partners(nao) == {name: partner(name) for name in nao.joints}
+    assert find_partners(nao) == {name: find_partner(name) for name in nao.joints}
 
 
 @pytest.mark.parametrize("turn", [90, 180, 270])

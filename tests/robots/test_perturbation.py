@@ -11,7 +11,7 @@ import pytest
 from nlp_gait.errors import InputError, RobotDataError, UnknownNameError
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.leg import make_leg
-from nlp_gait.robots.perturbation import perturb, perturbed_name, quantities, split_name
+from nlp_gait.robots.perturbation import list_quantities, name_perturbed, perturb, split_name
 from tests.robots.crooked import crooked
 
 NAO = load_robot("nao-v5")
@@ -72,7 +72,7 @@ def test_a_longer_sole_reaches_further_on_one_side() -> None:
 
 def test_a_name_carries_the_changes() -> None:
     changes = {"mass": 1.05, "thigh_m": 1 / 3000}
-    name = perturbed_name("nao-v5", changes)
+    name = name_perturbed("nao-v5", changes)
     assert split_name(name) == ("nao-v5", changes)
     robot = load_robot(name)
     assert robot.name == name
@@ -82,7 +82,7 @@ def test_a_name_carries_the_changes() -> None:
 
 
 def test_every_quantity_can_be_changed() -> None:
-    for name in quantities(NAO):
+    for name in list_quantities(NAO):
         value = 1.01 if name.endswith("mass") else 1e-3
         assert perturb(NAO, {name: value}) is not NAO
 

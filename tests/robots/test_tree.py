@@ -10,7 +10,7 @@ from casadi import SX
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import point_masses, tree_from, weld
+from nlp_gait.robots.tree import make_point_masses, make_tree, weld
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from tests.pinocchio_oracle import floating_model, inertia
 
@@ -24,7 +24,7 @@ TOLERANCE = 1e-12
 
 def com_seen_from(robot: Robot, link: str, q: dict[str, float]) -> tuple[Array, dict[str, Array]]:
     """Centre of mass and link centres relative to a link's frame."""
-    tree = tree_from(robot, link)
+    tree = make_tree(robot, link)
     poses = forward_kinematics(tree, {name: SX(angle) for name, angle in q.items()}, SX(3, 1))
     centres = {b.link.name: np.array(ca.DM(p.com)).ravel() for b, p in zip(tree, poses, strict=True)}
     return np.array(ca.DM(centre_of_mass(tree, poses))).ravel(), centres
@@ -58,7 +58,7 @@ def test_every_link_seen_from_every_link_is_where_pinocchio_puts_it(link: str, s
 
 def test_a_tree_holds_every_link_once_and_parents_come_first() -> None:
     for link in ROBOT.links:
-        tree = tree_from(ROBOT, link)
+        tree = make_tree(ROBOT, link)
         assert sorted(body.link.name for body in tree) == sorted(ROBOT.links)
         assert tree[0].link.name == link
         assert all(body.parent < i for i, body in enumerate(tree))
@@ -67,17 +67,17 @@ def test_a_tree_holds_every_link_once_and_parents_come_first() -> None:
 
 def test_a_tree_through_some_joints_is_a_part_of_the_robot() -> None:
     left = [name for name in ROBOT.joints if name.startswith("L")]
-    part = {body.link.name for body in tree_from(ROBOT, "l_ankle", left)}
+    part = {body.link.name for body in make_tree(ROBOT, "l_ankle", left)}
     assert part == {"torso", *(ROBOT.joint(name).child for name in left)}
 
 
 def test_unknown_links_and_joints_are_refused() -> None:
     with pytest.raises(InputError, match="robot 'nao-v5' has no link 'tail'"):
-        tree_from(ROBOT, "tail")
+        make_tree(ROBOT, "tail")
     with pytest.raises(UnknownNameError, match="did you mean 'HeadYaw'"):
         weld(ROBOT, ["HeadYaww"])
     with pytest.raises(UnknownNameError, match="did you mean 'LHipRoll'"):
-        tree_from(ROBOT, "l_ankle", ["LHipRol"])
+        make_tree(ROBOT, "l_ankle", ["LHipRol"])
 
 
 def test_a_welded_head_is_pinocchios_sum_of_inertias() -> None:
@@ -104,7 +104,7 @@ def test_welding_inner_joints_moves_no_mass() -> None:
 
 
 def test_point_masses_keep_mass_and_centre_and_lose_inertia() -> None:
-    points = point_masses(ROBOT)
+    points = make_point_masses(ROBOT)
     for name, link in ROBOT.links.items():
         assert (points.links[name].mass_kg, points.links[name].com_m) == (link.mass_kg, link.com_m)
         assert not points.links[name].inertia_matrix.any()

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from nlp_gait.errors import GaitError, MissingExtraError, RobotDataError
 from nlp_gait.robots import Robot, load_robot, urdf
-from nlp_gait.robots.urdf import urdf_record
+from nlp_gait.robots.urdf import read_urdf
 from tests.robots.custom import about_joints, as_urdf, humanoid, nao, partner
 from tests.robots.files import written
 
@@ -287,4 +287,4 @@ def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object
 def test_without_the_extra_its_name_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(urdf, "find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"need the package urdf-parser-py.*pip install 'nlp-gait\[urdf\]'"):
-        urdf_record(stored(tmp_path, as_urdf(nao())))
+        read_urdf(stored(tmp_path, as_urdf(nao())))

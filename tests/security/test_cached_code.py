@@ -22,7 +22,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder, private = tmp_path / "cache", tmp_path / "private"
     private.mkdir(mode=0o700)
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(library_cache, "private_folder", functools.cache(lambda: private))
+    monkeypatch.setattr(library_cache, "make_private_folder", functools.cache(lambda: private))
     library_cache.warn_once.cache_clear()
     return folder
 
@@ -78,7 +78,7 @@ def test_a_folder_that_others_may_exchange_is_not_used(
 ) -> None:
     """One of its parents, above or below, may be written to by others; with the sticky bit only owners rename."""
     library_cache.warn_once.cache_clear()
-    monkeypatch.setattr(library_cache, "private_folder", lambda: tmp_path)
+    monkeypatch.setattr(library_cache, "make_private_folder", lambda: tmp_path)
     folder = tmp_path / "a" / "b" / "c" / "cache"
     folder.mkdir(parents=True, mode=0o700)
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))

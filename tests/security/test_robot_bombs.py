@@ -12,9 +12,9 @@ import pytest
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import limits, load_robot
-from nlp_gait.robots.meshes import mesh_points
-from nlp_gait.robots.mjcf import mjcf_record
-from nlp_gait.robots.urdf import urdf_record
+from nlp_gait.robots.meshes import read_mesh_points
+from nlp_gait.robots.mjcf import read_mjcf
+from nlp_gait.robots.urdf import read_urdf
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory exist on Linux")
 
@@ -87,7 +87,7 @@ def _check_rejected(folder: Path, text: str, reason: str) -> None:
     file.write_text(text)
     began = time.monotonic()
     with pytest.raises(RobotDataError, match=reason) as raised:
-        mjcf_record(str(file))
+        read_mjcf(str(file))
     assert str(file) in str(raised.value) and "\n" not in str(raised.value)
     assert time.monotonic() - began < TIME_S + SLACK_S  # far less than the limit of 60 s
 
@@ -105,7 +105,7 @@ def test_a_collada_file_with_many_instances_is_rejected(tmp_path: Path) -> None:
         + "</node></visual_scene></library_visual_scenes></COLLADA>"
     )
     with pytest.raises(RobotDataError, match="more than 4000000 points; simplify it"):
-        mesh_points(file)
+        read_mesh_points(file)
 
 
 @pytest.mark.slow
@@ -115,7 +115,7 @@ def test_a_urdf_with_a_long_chain_is_rejected(tmp_path: Path) -> None:
     links = "".join(f'<link name="a{k}"/><joint name="j{k}" type="fixed"/>' for k in range(20_000))
     file.write_text(f'<robot name="r">{links}</robot>')
     with pytest.raises(ValueError, match="it has 40000 links and joints, more than 2000; simplify the file"):
-        urdf_record(str(file))
+        read_urdf(str(file))
 
 
 @pytest.mark.slow

@@ -15,10 +15,10 @@ from rich.console import Console
 from compare.analysis.comparison import compare_problems
 from compare.cli import endings, printing
 from compare.cli.printing import PlainConsole, escape_controls
-from compare.drawing.figures import inline_svg, new_figure, render_svg, style
+from compare.drawing.figures import inline_svg, make_figure, render_svg, use_style
 from compare.report.document import Figure, iterate_leaves
 from compare.report.study_report import make_study_document
-from compare.report.writing import html, markdown_page
+from compare.report.writing import render_markdown, render_page
 from compare.study.settings import Manifest, Session, SolverSpec, StudySettings
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import Signals
@@ -78,9 +78,11 @@ def hostile_report() -> tuple[Page, str]:
     document = make_study_document(compare_problems(records), Manifest(settings=settings, sessions=(session,)))
     page = Page()
     page.feed(
-        html(document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in iterate_leaves(document.parts)))
+        render_page(
+            document, ["<svg ></svg>"] * sum(isinstance(part, Figure) for part in iterate_leaves(document.parts))
+        )
     )
-    return page, markdown_page(document)
+    return page, render_markdown(document)
 
 
 def test_a_report_shows_markup_and_does_not_obey_it() -> None:
@@ -96,8 +98,8 @@ def test_a_report_shows_markup_and_does_not_obey_it() -> None:
 
 
 def test_text_in_figures_is_escaped() -> None:
-    with style():
-        figure = new_figure()
+    with use_style():
+        figure = make_figure()
         figure.subplots().set_xlabel(f"{SCRIPT} {QUOTED}")
         svg = render_svg(figure)
     root = ElementTree.fromstring(svg)
@@ -155,7 +157,7 @@ def test_progress_shows_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> No
     """A row's name, ``torque_change[LKneePitch, 3]``, would be taken for markup and vanish; ``[/]`` would be an error."""
     out = io.StringIO()
     monkeypatch.setattr(printing, "stderr", PlainConsole(file=out, force_terminal=True, width=200))
-    with printing.progress_bar("[/] runs\x1b[2J", 2) as advance:
+    with printing.show_progress("[/] runs\x1b[2J", 2) as advance:
         advance("torque_change[LKneePitch, 3] [/]\x1b[2J")
     assert "[/] runs" in out.getvalue() and "\x1b[2J" not in out.getvalue()
     assert "torque_change[LKneePitch, 3]" in out.getvalue()

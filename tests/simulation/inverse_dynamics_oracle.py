@@ -10,11 +10,11 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Result, Signals
-from nlp_gait.gaits.biped.load_sharing import torso_shares
+from nlp_gait.gaits.biped.load_sharing import share_torso
 from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import TreeBody, tree_from
+from nlp_gait.robots.tree import TreeBody, make_tree
 from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.mjcf import add_bodies
 
@@ -34,13 +34,13 @@ def engine_torques(result: Result, signals: Signals) -> Array:
     robot = model.robot
     torques = np.zeros_like(signals.arrays["tau"])
     if result.problem.name == "nao-ssp":
-        _fill(torques, tree_from(robot, robot.feet["left"].link), signals)
+        _fill(torques, make_tree(robot, robot.feet["left"].link), signals)
         return torques
     hip = SX.sym("hip")
     feet_y = (float(signals.arrays["left_foot"][0, 1]), float(signals.arrays["right_foot"][0, 1]))
-    by_side = torso_shares(hip, options["torso_share"], feet_y)  # type: ignore[arg-type]
+    by_side = share_torso(hip, options["torso_share"], feet_y)  # type: ignore[arg-type]
     for side, foot in BOTH_FEET.items():
-        tree = tree_from(robot, robot.feet[foot].link, [j for j in signals.joints if j.startswith(side)])
+        tree = make_tree(robot, robot.feet[foot].link, [j for j in signals.joints if j.startswith(side)])
         share = ca.Function("share", [hip], [by_side[side]])(signals.arrays["hip"][:, 1]).full().ravel()
         _fill(torques, tree, signals, robot.root, share)
     return torques
@@ -77,7 +77,7 @@ def standing_on(
         forces: of the ground (T, 3) [N] on the frame of each of these links, beyond its sole's front.
     """
     engine, forces = load_mujoco(), forces or {}
-    model = engine.MjModel.from_xml_string(fixed_model(tree_from(robot, robot.feet[side].link), gravity))
+    model = engine.MjModel.from_xml_string(fixed_model(make_tree(robot, robot.feet[side].link), gravity))
     data = engine.MjData(model)
     columns = [signals.joints.index(model.joint(i).name) for i in range(model.njnt)]
     torques, wrench = np.zeros_like(signals.arrays["q"]), np.zeros((len(signals.arrays["t"]), 6))

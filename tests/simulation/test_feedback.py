@@ -17,7 +17,7 @@ import nlp_gait
 from compare.cli import app
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import forward_kinematics
 
 pytest.importorskip("mujoco")
@@ -132,7 +132,7 @@ def test_torques_do_the_virtual_work_of_the_springs(plan: Plan) -> None:
 def virtual_work(plan: Plan, foot: str, force: Array, at: Array) -> Array:
     """Slope of the work of a force on the torso's origin over each joint, one foot held flat [Nm]."""
     q = SX.sym("q", len(plan.joints))
-    tree = tree_from(plan.robot, foot)
+    tree = make_tree(plan.robot, foot)
     poses = forward_kinematics(tree, dict(zip(plan.joints, ca.vertsplit(q), strict=True)), SX(3, 1))
     torso = next(i for i, body in enumerate(tree) if body.link.name == "torso")
     # A body's reference point is the joint through which it is reached: here a hip, from which its origin is this far.

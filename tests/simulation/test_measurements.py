@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from nlp_gait.formulation import Signals, vector_columns  # noqa: E402
+from nlp_gait.formulation import Signals, make_vector_columns  # noqa: E402
 from nlp_gait.robots import load_robot  # noqa: E402
 from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.measurements import average_pressure, measure  # noqa: E402
@@ -46,8 +46,8 @@ def planned():
         "left_foot": still(t, [0.0, 0.05, 0.0]),
         "right_foot": swing(t),
     }
-    columns = {"zmp": vector_columns("m", "xy")} | {
-        name: vector_columns("m") for name in ("hip", "left_foot", "right_foot")
+    columns = {"zmp": make_vector_columns("m", "xy")} | {
+        name: make_vector_columns("m") for name in ("hip", "left_foot", "right_foot")
     }
     signals = Signals(joints=JOINTS, arrays=arrays, columns=columns)
     return Plan(robot=ROBOT, full_robot=ROBOT, signals=signals, heat_loss=0.1, gravity=9.81)

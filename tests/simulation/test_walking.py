@@ -14,7 +14,7 @@ from compare.cli import app
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Result, Signals, sample_finely
 from nlp_gait.gaits.nao.body import GRAVITY, load_nao
-from nlp_gait.gaits.several_steps import repeat_steps, step_length
+from nlp_gait.gaits.several_steps import measure_step, repeat_steps
 from nlp_gait.robots import load_robot
 from tests.pinocchio_oracle import left_over
 
@@ -69,7 +69,7 @@ def test_a_walk_has_no_jump_in_any_angle_or_position(signals: Signals) -> None:
 
 def test_every_second_step_is_a_mirror_image_and_two_of_them_move_alike(signals: Signals) -> None:
     arrays = repeat_steps(signals, load_nao("nao-v5"), 3).arrays
-    n, step = len(signals.arrays["t"]) - 1, step_length(signals)
+    n, step = len(signals.arrays["t"]) - 1, measure_step(signals)
     assert step == pytest.approx(0.07619)
     np.testing.assert_allclose(arrays["q"][2 * n :], arrays["q"][: n + 1], atol=CONTINUITY)
     np.testing.assert_allclose(arrays["hip"][n : 2 * n + 1, 1], -arrays["hip"][: n + 1, 1], atol=CONTINUITY)

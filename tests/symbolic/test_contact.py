@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import LINKS, centres, points, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped, locate_centres, locate_points
 from nlp_gait.symbolic.dynamics import equations_of_motion
 from nlp_gait.symbolic.quantised import (
     CREEP_SPEED,
@@ -59,11 +59,11 @@ WEIGHT_TOLERANCE = 1e-5  # a contact 1.3 mm deep has faded in but for 1e-6 of it
 def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> None:
     """On each contact point alone, and on all six; its weight is what the springs then carry."""
     q, v = SX.sym("q", 11), SX.sym("v", 11)  # stance ankle and nine angles: nothing is fixed
-    found = points(q[2:], q[:2])
-    middles = centres(found)
+    found = locate_points(q[2:], q[:2])
+    middles = locate_centres(found)
     kinetic, potential = SX(0), SX(0)
     for i, link in enumerate(LINKS):
-        rod = toe_foot_biped().link(link)
+        rod = load_toe_foot_biped().link(link)
         kinetic += (rod.mass_kg * ca.sumsqr(ca.jtimes(middles[link], q, v)) + rod.inertia_kgm2 * v[2 + i] ** 2) / 2
         potential += rod.mass_kg * GRAVITY * middles[link][1]
     motion = equations_of_motion(kinetic, potential, q, v)
@@ -83,7 +83,7 @@ def test_the_robot_dropped_on_its_feet_comes_to_rest(names: tuple[str, ...]) -> 
     assert np.abs(path[11:, -50:]).max() < AT_REST
     depth = -np.array(heights(path[:11, -1])).ravel()
     carried = STIFFNESS * YIELD_DEPTH * np.tanh(np.maximum(depth, 0.0) / YIELD_DEPTH)
-    assert carried.sum() == pytest.approx(toe_foot_biped().mass_kg * GRAVITY, rel=WEIGHT_TOLERANCE)
+    assert carried.sum() == pytest.approx(load_toe_foot_biped().mass_kg * GRAVITY, rel=WEIGHT_TOLERANCE)
 
 
 def test_friction_slows_a_sliding_mass_and_holds_it() -> None:

@@ -11,7 +11,7 @@ from casadi import SX
 
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import TreeBody, tree_from, weld
+from nlp_gait.robots.tree import TreeBody, make_tree, weld
 from nlp_gait.symbolic.balance import LEAST_LOAD, combine_zmps, ground_load, zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler, regroup_inertias
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
@@ -19,7 +19,7 @@ from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 GRAVITY = 9.8
 ROBOT = weld(load_robot("nao-v5"), ("HeadYaw", "HeadPitch"))
 FOOT = ROBOT.feet["left"]
-TREE = tree_from(ROBOT, FOOT.link)
+TREE = make_tree(ROBOT, FOOT.link)
 JOINTS = tuple(body.joint.name for body in TREE if body.joint is not None)
 WEIGHT = ROBOT.mass_kg * GRAVITY
 # Sums of some hundred products of order one in double precision.
@@ -119,7 +119,7 @@ def test_with_a_fixed_foot_joint_power_is_the_rate_of_energy(seed: int) -> None:
 def test_two_trees_that_share_a_link_carry_the_whole_robot() -> None:
     """Both halves stand on the same foot frame's axes; at rest their ground forces add up to the weight."""
     halves = {
-        side: tree_from(ROBOT, ROBOT.feet[foot].link, [name for name in JOINTS if name.startswith(side)])
+        side: make_tree(ROBOT, ROBOT.feet[foot].link, [name for name in JOINTS if name.startswith(side)])
         for side, foot in (("L", "left"), ("R", "right"))
     }
     loads = {
@@ -146,7 +146,7 @@ def test_a_share_of_a_link_is_a_link_of_that_mass_and_inertia() -> None:
     )
     q, qd, qdd = (random_pose(seed) for seed in (1, 2, 3))
     shared = dynamics(TREE, {ROBOT.root: SX(0.25)})(q, qd, qdd)
-    for value, expected in zip(shared, dynamics(tree_from(lighter, FOOT.link))(q, qd, qdd), strict=True):
+    for value, expected in zip(shared, dynamics(make_tree(lighter, FOOT.link))(q, qd, qdd), strict=True):
         np.testing.assert_allclose(np.array(value), np.array(expected), rtol=0, atol=TOLERANCE)
 
 

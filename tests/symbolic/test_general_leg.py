@@ -19,7 +19,7 @@ from nlp_gait.gaits.nao.joints import LEG_JOINTS, measure_leg
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.biped import make_biped_model
 from nlp_gait.robots.leg import Leg
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.general_leg import TorsoMotion, leg_motion, sample_flat_foot_poses
 from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics, leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -73,7 +73,7 @@ def test_the_foot_is_flat_and_at_the_requested_place(robots: dict[str, Robot], n
     robot = robots[name]
     leg, solve = leg_function(robot, side)
     model = make_biped_model(robot).model
-    q, tree = SX.sym("q", 6), tree_from(model, model.root)
+    q, tree = SX.sym("q", 6), make_tree(model, model.root)
     angles = {joint: SX(0) for joint in model.joints} | {joint: q[i] for i, joint in enumerate(leg.joints)}
     found = forward_kinematics(tree, angles, SX.zeros(3))[[b.link.name for b in tree].index(model.feet[side].link)]
     ahead = ca.Function("ahead", [q], [found.rotation, found.position])

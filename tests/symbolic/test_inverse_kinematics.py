@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.nao.joints import LEG_JOINTS
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import forward_kinematics, leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact, Lifted, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
@@ -35,7 +35,7 @@ def leg_fk() -> ca.Function:
     robot = load_robot("nao-v5")
     names = [f"L{name}" for name in LEG_JOINTS]
     angles = SX.sym("q", 5)
-    tree = tree_from(robot, robot.root, ["LHipYawPitch", *names])
+    tree = make_tree(robot, robot.root, ["LHipYawPitch", *names])
     q = {"LHipYawPitch": SX(0), **{name: angles[i] for i, name in enumerate(names)}}
     foot = forward_kinematics(tree, q, SX(3, 1))[-1]
     hip_joint = ca.DM(robot.joint("LHipYawPitch").origin_m)

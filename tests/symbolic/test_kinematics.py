@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import axis_rotation, centre_of_mass, forward_kinematics, relative_rotation
 
 # Products of sines and cosines.
@@ -39,7 +39,7 @@ def test_a_rotation_about_a_coordinate_axis_costs_a_sine_and_a_cosine() -> None:
 
 @pytest.mark.parametrize(("start", "direction"), [("LThigh", 1), ("LTibia", -1)])
 def test_a_joint_passed_upwards_turns_the_other_way(start: str, direction: int) -> None:
-    first, second = tree_from(ROBOT, start, KNEE)
+    first, second = make_tree(ROBOT, start, KNEE)
     assert second.direction == direction
     rotation = np.array(DM(relative_rotation(second, {"LKneePitch": SX(0.3)})))
     expected = Rotation.from_rotvec([0.0, direction * 0.3, 0.0]).as_matrix()
@@ -49,7 +49,7 @@ def test_a_joint_passed_upwards_turns_the_other_way(start: str, direction: int) 
 
 def test_a_bent_knee_by_hand() -> None:
     """The knee 0.1 m below the thigh's frame at (1, 2, 3), bent by a right angle: the shin points backwards."""
-    tree = tree_from(ROBOT, "LThigh", KNEE)
+    tree = make_tree(ROBOT, "LThigh", KNEE)
     poses = forward_kinematics(tree, {"LKneePitch": SX(math.pi / 2)}, SX(DM([1, 2, 3])))
     thigh, tibia = (ROBOT.links[name] for name in ("LThigh", "LTibia"))
     (tx, ty, tz), (sx, sy, sz) = thigh.com_m, tibia.com_m
@@ -62,7 +62,7 @@ def test_a_bent_knee_by_hand() -> None:
 
 
 def test_poses_of_another_tree_are_refused() -> None:
-    tree = tree_from(ROBOT, "LThigh", KNEE)
+    tree = make_tree(ROBOT, "LThigh", KNEE)
     poses = forward_kinematics(tree, {"LKneePitch": SX(0.0)}, SX(3, 1))
     with pytest.raises(ValueError, match="shorter"):
         centre_of_mass(tree, poses[:1])

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import ENDS, LINKS, biped_dynamics, centres, points, rod, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import (
+    ENDS,
+    LINKS,
+    get_rod,
+    load_toe_foot_biped,
+    locate_centres,
+    locate_points,
+    make_dynamics,
+)
 from nlp_gait.symbolic.dynamics import equations_of_motion
 
 pinocchio = pytest.importorskip("pinocchio")
@@ -31,7 +39,7 @@ TREE = (
 @pytest.fixture(scope="module")
 def dynamics() -> ca.Function:
     q, qd = SX.sym("q", 9), SX.sym("qd", 9)
-    motion = biped_dynamics(q, qd, q)
+    motion = make_dynamics(q, qd, q)
     return ca.Function("dynamics", [q, qd], ca.cse(list(motion)))
 
 
@@ -76,7 +84,7 @@ def planar_model() -> tuple[object, np.ndarray]:
     Every joint turns clockwise seen with x to the right and z up, that is about +y; a link lies along its own x axis, the
     torso too, whose angle therefore enters with a minus sign. A link passed from its far end lies along -x.
     """
-    robot = toe_foot_biped()
+    robot = load_toe_foot_biped()
     model = pinocchio.Model()
     model.gravity = pinocchio.Motion(np.array([0.0, 0.0, -GRAVITY]), np.zeros(3))
     ids: dict[str, int] = {}
@@ -104,8 +112,8 @@ def fall(dynamics: ca.Function, step_s: float, duration_s: float) -> tuple[np.nd
     """Largest change of the energy so far [J] and largest rate of any link [rad/s], (m,) each, of the robot let go, by RK4."""
     q, qd = SX.sym("q", 9), SX.sym("qd", 9)
     M, C, G = dynamics(q, qd)
-    middles = centres(points(q, SX(2, 1)))
-    height = sum(rod(link).mass_kg * GRAVITY * middles[link][1] for link in LINKS)
+    middles = locate_centres(locate_points(q, SX(2, 1)))
+    height = sum(get_rod(link).mass_kg * GRAVITY * middles[link][1] for link in LINKS)
     energy = ca.Function("energy", [q, qd], [ca.dot(qd, M @ qd) / 2 + height])
     rate = ca.Function("rate", [ca.vertcat(q, qd)], [ca.vertcat(qd, ca.solve(M, -C @ qd - G))])
     x, h = ca.MX.sym("x", 18), step_s
@@ -152,7 +160,7 @@ def test_pendulum() -> None:
 
 def test_upright_points() -> None:
     down = np.pi / 2
-    found = points(SX([down, down, down, down, down, 0, 0, 0, 0]), SX(2, 1))
+    found = locate_points(SX([down, down, down, down, down, 0, 0, 0, 0]), SX(2, 1))
     expected = {"H": (0.0, 0.8), "K": (0.0, 0.4), "A": (0.0, 0.0), "U": (0.0, 1.1), "T": (0.17, 0.0), "T'": (0.17, 0.0)}
     for name, place in expected.items():
         assert np.array(ca.DM(found[name])).ravel() == pytest.approx(place, abs=1e-12)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from compare.cli.command import command
 from compare.cli.options import AnyCycle, AnyProblem, NamedProblem, NaoPhase, name_all, parse_names
-from compare.cli.printing import print_json, progress_bar, stdout
+from compare.cli.printing import print_json, show_progress, stdout
 from compare.cli.questions.output import Output
 from compare.cli.simulate import DriveOptions
 from nlp_gait.errors import InputError
@@ -57,7 +57,7 @@ def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: b
     found, repeated = check_certificate(file, points=points, paths=paths, seed=seed), None
     if repeat_in is not None:
         make_writable_folder(repeat_in)
-        with progress_bar("boxes", None) as advance:
+        with show_progress("boxes", None) as advance:
             repeated = repeat_proof(file, progress=advance, checkpoint=repeat_in / f".{path.stem}.open")
     if as_json:
         print_json({"schema": 1, **asdict(found), "repeated": None if repeated is None else asdict(repeated)})
@@ -216,12 +216,12 @@ def walk(
     """
     from compare.questions.sweep import parse_axis
     from compare.questions.walk.gait_library import LibraryOfGaits
-    from compare.questions.walk.walk import CheapestWalk, check_cycle, default_speeds
+    from compare.questions.walk.walk import CheapestWalk, check_cycle, choose_speeds
     from compare.study.simulations import STEPS
 
     check_cycle(problem.name)
     cycle = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name).load()
-    axes = [parse_axis(text) for text in over or [default_speeds(cycle)]]
+    axes = [parse_axis(text) for text in over or [choose_speeds(cycle)]]
     if library:
         if engine or steps or baseline:
             raise InputError(

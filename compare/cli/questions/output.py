@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from compare.cli.endings import describe_stored, end_interrupted, fail
 from compare.cli.options import RESULTS
-from compare.cli.printing import describe_command, print_result, print_table, progress_bar, say, stdout
+from compare.cli.printing import describe_command, print_result, print_table, say, show_progress, stdout
 from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.files import make_writable_folder
@@ -38,7 +38,7 @@ class Output:
         from compare.questions.question import Work
 
         findings, stopped, notes = None, "", 0
-        with progress_bar(question.counts, question.total) as advance:
+        with show_progress(question.counts, question.total) as advance:
 
             def progress(note: str) -> None:
                 nonlocal notes

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from compare.analysis.record_statistics import a12, rank_sum_normal
+from compare.analysis.record_statistics import approximate_rank_sum, compute_a12
 from compare.papers import claims
 from compare.papers.claims import Check, ClaimVerdict, compare_changes, compare_levels, decide, require_change
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
@@ -31,7 +31,12 @@ def _check_better(phase: PhaseFindings, swarm: str, kind: str = "") -> Check:
     pso, ga = (phase.final_powers(f"{name}{kind}") for name in (swarm, "ga"))
     test, of_pso, of_ga = phase.test(f"{swarm}{kind}", f"ga{kind}"), float(np.median(pso)), float(np.median(ga))
     printed_lead = 1000 * (phase.paper.optima["ga"].power_W - phase.paper.optima["pso"].power_W)
-    values: dict[str, Any] = {"swarm": NAMES[swarm], "test": test, "p": test.p_two_sided, "effect": a12(pso, ga)}
+    values: dict[str, Any] = {
+        "swarm": NAMES[swarm],
+        "test": test,
+        "p": test.p_two_sided,
+        "effect": compute_a12(pso, ga),
+    }
     values |= {"pso": of_pso, "ga": of_ga, "best": phase.best, "best_run": min(pso + ga), "pairs": len(pso)}
     values |= {"printed_lead": printed_lead, "lead": 1000 * (of_ga - of_pso), "share": 100 * (of_ga / of_pso - 1)}
     values["printed_share"] = 100 * (phase.paper.optima["ga"].power_W / phase.paper.optima["pso"].power_W - 1)
@@ -82,7 +87,7 @@ def _check_statistic(phase: PhaseFindings) -> Check:
 def _check_steadier(phase: PhaseFindings, swarm: str) -> Check:
     powers = [np.array(phase.final_powers(name)) for name in (swarm, "ga")]
     pso, ga = (1000 * float(np.ptp(power)) for power in powers)
-    p = rank_sum_normal(*(np.abs(power - np.median(power)).tolist() for power in powers)).p_two_sided
+    p = approximate_rank_sum(*(np.abs(power - np.median(power)).tolist() for power in powers)).p_two_sided
     change = 100 * (pso / ga - 1)
     check = require_change(-change, swarm=NAMES[swarm], pso=pso, ga=ga, change=change, p=p)
     return claims.require_significance(check, "rank-sum test of distances from the median", p)
@@ -125,7 +130,7 @@ def _check_torque_change(phase: PhaseFindings, swarm: str) -> Check:
     ends = [[run.verdict.indexes["torque_change_Nm"] for run in phase.searches[name]] for name in (swarm, "ga")]
     middle = [phase.median(name).verdict.indexes["torque_change_Nm"] for name in (swarm, "ga")]
     printed = [phase.paper.optima[name].indexes["torque_change_Nm"] for name in ALGORITHMS]
-    (pso, ga), p = (float(np.median(values)) for values in ends), rank_sum_normal(*ends).p_two_sided
+    (pso, ga), p = (float(np.median(values)) for values in ends), approximate_rank_sum(*ends).p_two_sided
     leads = {"printed_lead": 100 * (printed[0] / printed[1] - 1), "lead": 100 * (pso / ga - 1)}
     check = compare_changes(*leads.values(), **leads, swarm=NAMES[swarm], pso=pso, ga=ga, middle=middle, p=p)
     return claims.require_significance(check, RANK_SUM, p)

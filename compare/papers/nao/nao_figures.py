@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compare.analysis.units import axis_label
+from compare.analysis.units import make_axis_label
 from compare.drawing.animation import plot_poses
-from compare.drawing.figures import COLOURS, new_axes, new_figure
+from compare.drawing.figures import COLOURS, make_axes, make_figure
 from compare.drawing.gait_figure import make_skeleton
 from compare.papers.nao.nao_findings import NAMES, FeasiblePoints, NaoFindings, PhaseFindings
 from compare.papers.nao.nao_runs import ALGORITHMS, PAPER, SEARCHES
@@ -43,7 +43,7 @@ def _draw_convergence(phase: PhaseFindings) -> Figure:
 
     A line begins where every run has found a feasible solution.
     """
-    figure = new_figure(7.5, 2.9)
+    figure = make_figure(7.5, 2.9)
     for axes, name in zip(figure.subplots(1, len(SEARCHES), sharey=True), SEARCHES, strict=True):
         best = np.array([run.history.objective for run in phase.searches[name]], dtype=float)
         generations = np.arange(1, best.shape[1] + 1)
@@ -66,12 +66,12 @@ def _draw_convergence(phase: PhaseFindings) -> Figure:
 
 
 def _draw_scatter(phase: PhaseFindings, positions: tuple[int, ...]) -> Figure:
-    figure = new_figure(7.5, 0.5 + 2.1 * len(positions))
+    figure = make_figure(7.5, 0.5 + 2.1 * len(positions))
     grid = figure.subplots(len(positions), len(SEARCHES), sharey=True, sharex="row", squeeze=False)
     for k, (row, position) in enumerate(zip(grid, positions, strict=True)):
         variable, sweep = phase.problem.variables[position], phase.sweeps[position]
         optima = np.array([(held.at, held.power_W if held.feasible else np.nan) for held in sweep]).T
-        label = rf"$x_{{{position + 1}}}$: {axis_label(variable.name, variable.unit)}"
+        label = rf"$x_{{{position + 1}}}$: {make_axis_label(variable.name, variable.unit)}"
         for axes, name in zip(row, SEARCHES, strict=True):
             _plot_solutions(axes, phase.points[name], position, name)
             axes.plot(*optima, color=COLOURS["ipopt"], linewidth=1.2)
@@ -99,7 +99,7 @@ def _draw_swing(findings: NaoFindings) -> Figure:
     """Price of a higher swing foot: the true sweep, and what the search histories of the paper and ours show."""
     phase = findings.ssp
     heights = [held.at for held in findings.swing]
-    figure, axes = new_axes(5.2, 3.2)
+    figure, axes = make_axes(5.2, 3.2)
 
     def plot(power: Sequence[float] | Array, line: str, colour: str, label: str) -> None:
         axes.plot(heights, np.array(power) / np.nanmin(power), line, color=colour, label=label)
@@ -109,7 +109,7 @@ def _draw_swing(findings: NaoFindings) -> Figure:
         plot(PAPER.swing_power_W[name], f"{marker}--", PAPER_COLOUR, f"paper, {name.upper()}")
     for name, marker in zip(SEARCHES, "s^v", strict=True):
         plot(phase.list_swing_powers(name), f"{marker}:", COLOURS[name], f"ours, {NAMES[name]}")
-    axes.set(xlabel=axis_label("swing_height_m", "m"), ylabel="power / least power [1]")
+    axes.set(xlabel=make_axis_label("swing_height_m", "m"), ylabel="power / least power [1]")
     axes.legend()
     return figure
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.record_statistics import RankSum, rank_sum_normal
+from compare.analysis.record_statistics import RankSum, approximate_rank_sum
 from compare.papers.nao.nao_runs import PAPER, SWING_HEIGHT, FixedOptimum, PrintedPhase, evaluate_indexes
 from compare.papers.paper_runs import choose_best
 from compare.study.record import RunRecord, Verdict
@@ -138,7 +138,7 @@ class PhaseFindings:
 
     def test(self, algorithm: str, other: str = "ga") -> RankSum:
         """Return the rank-sum test of a search's powers against another's."""
-        return rank_sum_normal(self.final_powers(algorithm), self.final_powers(other))
+        return approximate_rank_sum(self.final_powers(algorithm), self.final_powers(other))
 
     def range_within(self, position: int, share: float) -> tuple[float, float]:
         """Return the least and the greatest value of a variable at which IPOPT's line is at most a share above the best."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.record_statistics import rank_sum_normal
+from compare.analysis.record_statistics import approximate_rank_sum
 from compare.papers import claims
 from compare.papers.claims import Check, Series, compare_changes, compare_levels, decide, require_change
 from compare.papers.nao.nao_findings import NAMES, NaoFindings, PhaseFindings
@@ -227,7 +227,7 @@ def _check_hip_variation(phase: PhaseFindings, swarm: str = "") -> Check:
     else:
         found = [[list(optimum.x)] for optimum in phase.paper.optima.values()]
     rises = [[_compute_hip_rise(phase, x) for x in solutions] for solutions in found]
-    (pso, ga), p = map(np.median, rises), rank_sum_normal(*rises).p_two_sided
+    (pso, ga), p = map(np.median, rises), approximate_rank_sum(*rises).p_two_sided
     values = {"pso": pso, "ga": ga, "change": 100 * float(pso / ga - 1)}
     check = require_change(-values["change"], **values, swarm=NAMES.get(swarm))
     with_p = replace(check, values={**check.values, "p": p})

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.analysis.record_statistics import a12, holm
+from compare.analysis.record_statistics import compute_a12, correct_by_holm
 from compare.papers.claims import SIGNIFICANT, bind_checks
 from compare.papers.nao import nao_claims, nao_gait_claims
 from compare.papers.nao import nao_runs as nao
@@ -169,7 +169,7 @@ def _compare_verdicts(findings: NaoFindings) -> dict[str, Any]:
     rows = {name: check.apply(texts[name]) for name, check in here.items()}
     agree = [check.values["agree"] for check in here.values() if "agree" in check.values]
     p = {name: float(check.values["p"]) for name, check in here.items() if "p" in check.values}
-    corrected = dict(zip(p, holm([*p.values()]), strict=True))
+    corrected = dict(zip(p, correct_by_holm([*p.values()]), strict=True))
     lost = [f"{rows[name].text} (p = {p[name]:.2g})" for name in p if p[name] < SIGNIFICANT <= corrected[name]]
     changed = dict.fromkeys(NaoEffort.others, unknown := "not computed at this effort")
     verdicts = {choice: dict.fromkeys(checks, unknown) for choice in changed}
@@ -215,7 +215,7 @@ def _compute_phase_values(phase: PhaseFindings) -> dict[str, Any]:
         "best_W": phase.best,
         "printed_W": {name: here["power_W"] for name, here in phase.printed_here.items()},
         "more": phase.test("pso-more", "ga-more"),
-        "more_a12": a12(phase.final_powers("pso-more"), phase.final_powers("ga-more")),
+        "more_a12": compute_a12(phase.final_powers("pso-more"), phase.final_powers("ga-more")),
         "dense_W": (optimum.dense or {}).get("power_W", math.nan),
         "yaw_mW": 1000 * shares["HipYawPitch"] * phase.printed_here["pso"]["power_W"],
         "converged": phase.converged,
@@ -330,7 +330,7 @@ def _list_tests(phase: PhaseFindings) -> Rows:
     """Section 5.3: Wilcoxon's rank-sum tests of PSO's powers against GA's, and the effect size."""
     tests = [("paper", phase.paper.test, compute_implied_a12(phase))]
     for name in ("pso-constant", "pso"):
-        share = a12(phase.final_powers(name), phase.final_powers("ga"))
+        share = compute_a12(phase.final_powers(name), phase.final_powers("ga"))
         tests.append((f"here, {NAMES[name]}", phase.test(name), share))
     return [[phase.paper.title, name, t.rank_sum, t.z, t.p_two_sided, t.p_less, share] for name, t, share in tests]
 

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from compare.analysis.record_statistics import rank_sum
+from compare.analysis.record_statistics import compute_rank_sum
 from compare.papers.claims import SIGNIFICANT, Check, ClaimVerdict, decide
 from compare.papers.nao_pareto.nao_pareto_runs import ALGORITHMS, ParetoEffort
 from compare.questions.pareto.competing import CompetingObjective
@@ -194,22 +194,22 @@ def _is_faster(runs: dict[str, Measures]) -> Tested:
 def _is_competitive(runs: dict[str, Measures]) -> Tested:
     volume = _find_medians(runs, "hypervolume")
     behind = max(volume.values()) - volume["CMOPSO"]
-    return behind <= COMPETITIVE, f"{100 * behind:.2f} % behind {NAMES[_first(volume, max)]}"
+    return behind <= COMPETITIVE, f"{100 * behind:.2f} % behind {NAMES[_find_first(volume, max)]}"
 
 
 def _is_extreme(samples: dict[str, Array], name: str, best: Callable[..., str], factor: float, unit: str) -> Tested:
     medians = {n: float(np.median(values)) for n, values in samples.items()}
-    following = _first({n: median for n, median in medians.items() if n != name}, best)
-    p = rank_sum(samples[name].tolist(), samples[following].tolist())
+    following = _find_first({n: median for n, median in medians.items() if n != name}, best)
+    p = compute_rank_sum(samples[name].tolist(), samples[following].tolist())
     shown = ", ".join(f"{NAMES[n]} {factor * median:.3g}{unit}" for n, median in medians.items())
-    return _first(medians, best) == name and p < SIGNIFICANT, f"{shown}; against {NAMES[following]} p = {p:.2g}"
+    return _find_first(medians, best) == name and p < SIGNIFICANT, f"{shown}; against {NAMES[following]} p = {p:.2g}"
 
 
 def _find_medians(runs: dict[str, Measures], measure: str) -> dict[str, float]:
     return {name: float(np.median(m.get_end(measure))) for name, m in runs.items()}
 
 
-def _first(values: dict[str, float], best: Callable[..., str]) -> str:
+def _find_first(values: dict[str, float], best: Callable[..., str]) -> str:
     return best(values, key=lambda name: values[name])
 
 

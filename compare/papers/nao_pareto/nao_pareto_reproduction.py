@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.analysis.units import axis_label, join_words
-from compare.drawing.figures import COLOURS, add_legend_below, new_figure, use_log_axes
+from compare.analysis.units import join_words, make_axis_label
+from compare.drawing.figures import COLOURS, add_legend_below, make_figure, use_log_axes
 from compare.papers.claims import ClaimVerdict, bind_checks
 from compare.papers.nao_pareto import nao_pareto_claims
 from compare.papers.nao_pareto import nao_pareto_runs as runs
@@ -125,7 +125,7 @@ def draw_figures(findings: ParetoFindings) -> dict[str, Figure]:
 
 def _draw_running(phase: PhaseFronts) -> Figure:
     """Hypervolume missing and distance over evaluations, with the largest budget: medians, and the range of all runs."""
-    figure = new_figure(6.6, 3.0)
+    figure = make_figure(6.6, 3.0)
     left, right = figure.subplots(1, 2)
     for name in ALGORITHMS:
         m = phase.measures[name, phase.budgets[-1]]
@@ -147,7 +147,7 @@ def _draw_running(phase: PhaseFronts) -> Figure:
 def _draw_fronts(phase: PhaseFronts) -> Figure:
     budget, criterion = phase.budgets[-1], phase.criterion
     line = np.array([(p.value, p.power_W) for p in phase.front])
-    figure = new_figure(6.6, 4.6)
+    figure = make_figure(6.6, 4.6)
     for axes, name in zip(figure.subplots(2, 2, sharex=True, sharey=True).ravel(), ALGORITHMS, strict=True):
         values, powers = phase.points(name, budget)
         axes.plot(values, powers, ".", color=SEARCH_COLOURS[name], markersize=2.5, alpha=0.4, rasterized=True)
@@ -160,7 +160,7 @@ def _draw_fronts(phase: PhaseFronts) -> Figure:
         axes.set_xlim(line[0, 0] - 0.05 * width, line[-1, 0] + 0.05 * width)
         axes.set_ylim(0.0, line[-1, 1] + 0.15 * height)
     for axes in figure.axes[2:]:
-        axes.set_xlabel(axis_label(criterion.name, criterion.unit))
+        axes.set_xlabel(make_axis_label(criterion.name, criterion.unit))
     for axes in figure.axes[::2]:
         axes.set_ylabel("power [W]")
     add_legend_below(figure)

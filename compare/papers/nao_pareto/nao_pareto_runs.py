@@ -15,7 +15,7 @@ from compare.questions.pareto.front import FrontPoint
 from compare.questions.pareto.searches import PowerAndCompeting, Scale
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec
-from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, front_algorithm, minimize_many
+from metaheuristics.multi_objective import FRONT_ALGORITHMS, Snapshot, make_front_algorithm, minimize_many
 from nlp_gait.backends.kernel.compiled import compile_objective
 
 ALGORITHMS = tuple(FRONT_ALGORITHMS)
@@ -69,7 +69,7 @@ def run_search(
     criterion = make_competing_objective(CRITERION, problem)
     scale = Scale([FrontPoint(demanded=value, value=value, power_W=W, violation=0.0, x=()) for value, W in ends])
     objectives = PowerAndCompeting(compile_objective(criterion.drop_demand(problem), threads=1), criterion, scale)
-    snapshots = minimize_many(objectives, front_algorithm(algorithm), evaluations=choose_looks(budget), seed=seed)
+    snapshots = minimize_many(objectives, make_front_algorithm(algorithm), evaluations=choose_looks(budget), seed=seed)
     looks = [{**asdict(snapshot), "X": [], "F": snapshot.F.tolist()} for snapshot in snapshots]
     looks[-1]["X"] = snapshots[-1].X.tolist()
     return looks

@@ -6,7 +6,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from compare.analysis.units import join_words
-from compare.drawing.figures import COLOURS, new_axes, new_figure
+from compare.drawing.figures import COLOURS, make_axes, make_figure
 from compare.papers.claims import bind_checks
 from compare.papers.nao_walk import nao_walk_claims
 from compare.papers.nao_walk import nao_walk_runs as runs
@@ -131,7 +131,7 @@ def draw_figures(findings: NaoWalkFindings) -> dict[str, Figure]:
 
 def _draw_joints(findings: NaoWalkFindings) -> Figure:
     """Energy by kind of joint; full colour is heat, pale is mechanical."""
-    figure, axes = new_axes(6.3, 3.4)
+    figure, axes = make_axes(6.3, 3.4)
     for place, (gait, where, _) in enumerate(BARS):
         bottom = 0.0
         for kind, colour in zip(KINDS, PALETTE, strict=True):
@@ -147,7 +147,7 @@ def _draw_joints(findings: NaoWalkFindings) -> Figure:
 
 
 def _draw_speeds(findings: NaoWalkFindings) -> Figure:
-    figure, axes = new_axes(4.6, 3.0)
+    figure, axes = make_axes(4.6, 3.0)
     for heat, name, colour in (("paper", "paper", COLOURS["pso"]), ("sheet", "data sheet", COLOURS["ga"])):
         curve = findings.curve(heat)
         speeds, costs = [100.0 * at["speed_m_s"] for at in curve], [at["cost_of_transport"] for at in curve]
@@ -160,7 +160,7 @@ def _draw_speeds(findings: NaoWalkFindings) -> Figure:
 
 
 def _draw_drives(findings: NaoWalkFindings) -> Figure:
-    figure = new_figure(6.3, 2.8)
+    figure = make_figure(6.3, 2.8)
     energy, falls, speed = figure.subplots(1, 3)
     shares = findings.effort.stiffnesses
     for name, label, colour in (("none", "plain", COLOURS["ga"]), ("torque", "torque fed forward", COLOURS["pso"])):

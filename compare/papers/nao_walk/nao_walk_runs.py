@@ -23,7 +23,7 @@ from nlp_gait.gaits.biped.cart_table import Footsteps, plan_cart_table_walk
 from nlp_gait.gaits.nao.joints import YAW_PITCHES
 from nlp_gait.gaits.nao.problems import make_nao_cycles
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import planned_distance, walked_distance
+from nlp_gait.simulation.measurements import measure_planned_distance, measure_walked_distance
 from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import Conditions, Push, Simulation, simulate_plan
 
@@ -153,7 +153,7 @@ def simulate_joints(feed_forward: str, heat: str, x: Mapping[str, float], steps:
         result = plan_own_walk(make_footsteps())
     plan = make_plan(result, steps)
     trace = simulate_plan(plan, drive=Drive(feed_forward=feed_forward))
-    walk = {"fell_at_s": trace.fell_at_s, "walked_m": walked_distance(trace)[0], "duration_s": plan.duration_s}
+    walk = {"fell_at_s": trace.fell_at_s, "walked_m": measure_walked_distance(trace)[0], "duration_s": plan.duration_s}
     return {**walk, "model": _sum_planned(plan), "engine": _sum_simulated(plan, trace)}
 
 
@@ -173,10 +173,10 @@ def simulate_drives(
         longer = make_plan(plan_own_walk(make_footsteps(step_m=length)), steps)
         tried = simulate_plan(longer, drive=drive)
         if tried.fell_at_s is None:
-            fastest = max(fastest, walked_distance(tried)[0] / longer.duration_s)
+            fastest = max(fastest, measure_walked_distance(tried)[0] / longer.duration_s)
     return {
         "fell": fell,
-        "walked_share": None if fell else walked_distance(trace)[0] / planned_distance(plan),
+        "walked_share": None if fell else measure_walked_distance(trace)[0] / measure_planned_distance(plan),
         **{f"{heat}_J_per_m": None if fell else sum_energy(energy, heat) for heat in SPECS},
         "tracking_rad": float(np.abs(plan.at("q", trace.t[during]) - trace.q[during]).max()),
         "falls": falls,
@@ -208,12 +208,12 @@ def _compute_knee_deg(result: Result) -> float:
 def _sum_planned(plan: Plan) -> dict[str, dict[str, float]]:
     """Return the energies of the model, see ``_sum_by_kind``."""
     arrays = plan.signals.arrays
-    return _sum_by_kind(plan, arrays["tau"], arrays["qd"], arrays["t"], planned_distance(plan))
+    return _sum_by_kind(plan, arrays["tau"], arrays["qd"], arrays["t"], measure_planned_distance(plan))
 
 
 def _sum_simulated(plan: Plan, trace: Simulation) -> dict[str, dict[str, float]]:
     """Return the energies of a simulated walk while its plan lasts, see ``_sum_by_kind``."""
-    during, (walked, _) = trace.t <= plan.duration_s, walked_distance(trace)
+    during, (walked, _) = trace.t <= plan.duration_s, measure_walked_distance(trace)
     return _sum_by_kind(plan, trace.torque[during], trace.qd[during], trace.t[during], walked)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from compare.drawing.figures import add_legend_below, new_axes, new_figure
+from compare.drawing.figures import add_legend_below, make_axes, make_figure
 from compare.papers.paper_runs import get_point
 from compare.papers.stairs.stairs_paper import TABLE_4
 from compare.papers.stairs.stairs_planning import move
@@ -16,7 +16,7 @@ from compare.papers.stairs.stairs_runs import DRAWN_CASE, StairsFindings, roll_o
 from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.closed_loop import ANGLES, measure_joints
-from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped
 from nlp_gait.gaits.stairs.stair import SETBACK
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _draw_stair(axes: Axes, step: tuple[float, float], count: int) -> None:
 
 
 def _draw_segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step: tuple[float, float]) -> Figure:
-    figure, axes = new_axes(height_in=3.6)
+    figure, axes = make_axes(height_in=3.6)
     _draw_stair(axes, step, 3)
     place = arrays["ankle"] + np.array(step)
     ends = [0.0, plan["t1_s"], plan["t2_s"], plan["t_bc_s"], plan["t3_s"]]
@@ -78,7 +78,7 @@ def _draw_segments(arrays: Mapping[str, Array], plan: Mapping[str, float], step:
 
 
 def _draw_sticks(motion: tuple[Signals, dict[str, Array]], step: tuple[float, float], name: str) -> Figure:
-    figure, (signals, legs) = new_figure(height_in=3.4), motion
+    figure, (signals, legs) = make_figure(height_in=3.4), motion
     t, first = signals.arrays["t"], name.startswith("first")
     poses = [int(np.abs(t - at).argmin()) for at in np.linspace(t[0], t[-1], STICKS)]
     for axes, side, leg in zip(figure.subplots(1, 2, sharey=True), (RIGHT, LEFT), ("swing", "stance"), strict=True):
@@ -94,7 +94,7 @@ def _draw_sticks(motion: tuple[Signals, dict[str, Array]], step: tuple[float, fl
 
 
 def _draw_ankle(arrays: Mapping[str, Array]) -> Figure:
-    figure = new_figure(height_in=4.4)
+    figure = make_figure(height_in=4.4)
     t, place = arrays["t"], arrays["ankle"]
     keep = np.concatenate([[True], np.diff(t) > 1e-9])
     t, place = t[keep], place[keep]
@@ -112,7 +112,7 @@ def _draw_ankle(arrays: Mapping[str, Array]) -> Figure:
 
 
 def _draw_stairs_compared(findings: StairsFindings) -> Figure:
-    figure = new_figure(height_in=2.9)
+    figure = make_figure(height_in=2.9)
     panels = figure.subplots(1, len(findings.cases), sharey=True, squeeze=False)[0]
     for axes, case in zip(panels, findings.cases, strict=True):
         step, (_, legs) = TABLE_4[case].step_m, move(findings, "jerk", case)
@@ -126,7 +126,7 @@ def _draw_stairs_compared(findings: StairsFindings) -> Figure:
 
 
 def _draw_pose_times(network: Mapping[str, Any], case: int) -> Figure:
-    figure, axes = new_axes()
+    figure, axes = make_axes()
     for rule, found in network.items():
         label = f"{rule}: {found['converged']} of {found['poses']} poses"
         axes.plot(np.array(found["time_s"]) * 1e3, label=label, linewidth=0.9)
@@ -136,7 +136,7 @@ def _draw_pose_times(network: Mapping[str, Any], case: int) -> Figure:
 
 
 def _draw_tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit: str) -> Figure:
-    figure = new_figure(height_in=7.0)
+    figure = make_figure(height_in=7.0)
     panels = figure.subplots(4, 2, sharex=True).ravel()
     for i, link in enumerate(TRACKED_LINKS):
         for case, arrays in followed.items():
@@ -155,8 +155,8 @@ def _draw_tracking(followed: Mapping[int, Mapping[str, Array]], name: str, unit:
 
 
 def _draw_zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, Mapping[str, float]]) -> Figure:
-    figure, axes = new_axes()
-    foot = toe_foot_biped().foot_m
+    figure, axes = make_axes()
+    foot = load_toe_foot_biped().foot_m
     axes.axhspan(0.0, foot, color="0.9", label="stance foot")
     for case, arrays in followed.items():
         (line,) = axes.plot(arrays["t"], arrays["zmp"], label=f"case {case}")
@@ -169,7 +169,7 @@ def _draw_zmp(followed: Mapping[int, Mapping[str, Array]], plans: Mapping[int, M
 
 
 def _draw_torques(followed: Mapping[int, Mapping[str, Array]]) -> Figure:
-    figure = new_figure(height_in=2.9)
+    figure = make_figure(height_in=2.9)
     panels = figure.subplots(1, len(followed), sharey=True, squeeze=False)[0]
     for axes, (case, arrays) in zip(panels, followed.items(), strict=True):
         for i, joint in enumerate(ANGLES["joint"]):

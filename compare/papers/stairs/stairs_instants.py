@@ -13,8 +13,8 @@ from metaheuristics import minimize
 from metaheuristics.interface import Algorithm
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.stairs.closed_loop import GIVEN, QUANTUM, TORSO, ClosedLoop, N
-from nlp_gait.gaits.stairs.display import JOINTS, rigid_bodies
-from nlp_gait.gaits.stairs.track import LARGEST_STATE, support_polygon
+from nlp_gait.gaits.stairs.display import JOINTS, make_rigid_bodies
+from nlp_gait.gaits.stairs.track import LARGEST_STATE, compute_support
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Decides = Literal["gains", "torques"]
@@ -32,10 +32,10 @@ class Quanta:
 
     @cached_property
     def bounds(self) -> Array:
-        """(2, n) of x: the problem's; for torques the robot's weight at a lever, see ``rigid_bodies``, as the paper has none."""
+        """(2, n) of x: the problem's; for torques weight at a lever, see ``make_rigid_bodies``; the paper names none."""
         if self.decides == "gains":
             return np.stack([self.problem.lower, self.problem.upper])
-        joints = rigid_bodies().joints
+        joints = make_rigid_bodies().joints
         hip, knee, ankle, toe = (joints[name].torque_limit_Nm for name in JOINTS[:4])
         fifth = ankle if self.loop.coordinates == "joint" else hip  # of the stance ankle, or of the torso
         limits = np.array([hip, knee, hip, knee, fifth, ankle, toe, ankle, toe])
@@ -46,7 +46,7 @@ class Quanta:
         """Desired states (m + 1, 18), other inputs (m, n), and both ends of the support polygon (m, 2) [m]."""
         at = self.problem.at([1.0, 1.0, self.torso_rad])
         desired, given = (np.array(ca.evalf(part)).T for part in self.loop.inputs(at, Exact())[:2])
-        ends = [np.array(ca.evalf(part)) for part in support_polygon(at, self.loop)]
+        ends = [np.array(ca.evalf(part)) for part in compute_support(at, self.loop)]
         return desired, given, np.hstack(ends)
 
     @cached_property

@@ -13,7 +13,7 @@ import numpy as np
 from compare.papers.claims import read_printed, read_tables
 from nlp_gait.decoding import decode
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, load_toe_foot_biped
 from nlp_gait.gaits.stairs.stair import SETBACK
 
 OURS, FREE, PRINTED = "ours", "free", "printed"  # readings of the tracked step
@@ -81,7 +81,7 @@ def measure_printed_equations(case: Case, ankle: Array) -> dict[str, float]:
 
     For the printed pose of the foot, ankle (m, 2) is the path of our swing ankle through the air from the stance ankle [m].
     """
-    robot, (tread, rise) = toe_foot_biped(), case.step_m
+    robot, (tread, rise) = load_toe_foot_biped(), case.step_m
     t1, t2, t_bc, sole, toe, catch = (
         TABLE_3[name] for name in ("t1_s", "t2_s", "t_bc_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")
     )
@@ -134,6 +134,6 @@ def measure_slide(tread: float, rise: float) -> float:
     past = tread - SETBACK - max(2 * tread - math.pi * rise, 0.0)  # of the cycloid, at the edge
     angles = np.linspace(0.0, math.pi, 100_001)
     angle = float(np.interp(past, rise * (angles - np.sin(angles)), angles))
-    lift = toe_foot_biped().toe_m * math.sin(TABLE_3["toe_angle_rad"])
+    lift = load_toe_foot_biped().toe_m * math.sin(TABLE_3["toe_angle_rad"])
     flat = math.pi * rise < 2 * tread
     return 1e3 * max(rise - lift - rise * (1 - math.cos(angle)), 0.0) * flat

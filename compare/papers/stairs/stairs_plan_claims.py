@@ -22,7 +22,15 @@ from nlp_gait.formulation.display import RIGHT
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM
 from nlp_gait.gaits.stairs.leg_network import ONLINE
 from nlp_gait.gaits.stairs.plan import SAMPLING_RESERVE
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, JOINT_RATES, MOVING, centres, points, rod, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import (
+    GRAVITY,
+    JOINT_RATES,
+    MOVING,
+    get_rod,
+    load_toe_foot_biped,
+    locate_centres,
+    locate_points,
+)
 from nlp_gait.gaits.stairs.planned_motion import PHASES
 from nlp_gait.gaits.stairs.stair import SETBACK
 
@@ -144,7 +152,7 @@ def _change_inertia(arrays: Mapping[str, Array], share: float) -> tuple[float, f
 
     The equations of motion are in absolute link angles: an inertia acts on the acceleration of its own link only.
     """
-    robot = toe_foot_biped()
+    robot = load_toe_foot_biped()
     inertias = np.array([robot.link(link).inertia_kgm2 for link in MOVING])
     extra = (share - 1) * inertias * arrays["link_qdd"] @ np.linalg.inv(JOINT_RATES)
     power = np.abs((arrays["tau"] + extra) * arrays["qd"]).sum(axis=1)
@@ -174,9 +182,9 @@ def measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
 def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
     """Return how far the centre of gravity of all links is below the hip at the start of a plan [mm]."""
     angles = move(findings, what, case)[0].arrays["link_q"][0]
-    place = points(ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
-    moment = sum(rod(link).mass_kg * float(middle[1]) for link, middle in centres(place).items())
-    return 1e3 * (float(place["H"][1]) - moment / toe_foot_biped().mass_kg)
+    place = locate_points(ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
+    moment = sum(get_rod(link).mass_kg * float(middle[1]) for link, middle in locate_centres(place).items())
+    return 1e3 * (float(place["H"][1]) - moment / load_toe_foot_biped().mass_kg)
 
 
 def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:
@@ -372,7 +380,7 @@ def _differentiate_ankle(findings: StairsFindings, what: str, case: int) -> tupl
 
 
 def _check_cycloid_begin(findings: StairsFindings) -> Check:
-    start = 6 * TABLE_3["sole_angle_rad"] / TABLE_3["t1_s"] ** 2 * toe_foot_biped().sole_m
+    start = 6 * TABLE_3["sole_angle_rad"] / TABLE_3["t1_s"] ** 2 * load_toe_foot_biped().sole_m
     caught = float(np.linalg.norm(_differentiate_ankle(findings, "jerk", DRAWN_CASE)[1][-1, 0]))
     return compare_levels([0.0, 0.0], [start, caught], start=start, caught=caught)
 
@@ -390,7 +398,7 @@ def _check_jerk_terms(_: StairsFindings) -> Check:
 
 
 def _check_torso_mass(_: StairsFindings) -> Check:
-    torso, total = rod("UH").mass_kg, toe_foot_biped().mass_kg
+    torso, total = get_rod("UH").mass_kg, load_toe_foot_biped().mass_kg
     return decide(torso > total / 2, torso=torso, total=total, share=100 * torso / total)
 
 

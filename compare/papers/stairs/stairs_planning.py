@@ -19,7 +19,7 @@ from compare.study.task import IPOPT, ProblemSpec, Task
 from nlp_gait.formulation import Array, Result, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT
 from nlp_gait.gaits.stairs.plan import ZMP_OF_STANDING
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, load_toe_foot_biped
 
 PLANS = {"jerk": "rad/s^3", "plan": "J"}  # of least jerk, of least energy; unit of what is least
 INDEXES = {"jerk": "peak_jerk_rad_s3", "plan": "energy_J"}
@@ -208,6 +208,6 @@ def _list_ideal(findings: StairsFindings, case: int) -> list[Value]:
     arrays = make_track_spec(case, findings.plan(case)).load().signals(get_point(step)).arrays
     acceleration = np.gradient(arrays["link_qd"][:, :7], arrays["t"], axis=0)
     efforts.append(compute_effort(arrays["t"], arrays["tau"], acceleration))
-    weight = toe_foot_biped().mass_kg * GRAVITY * TABLE_4[case].step_m[1]
+    weight = load_toe_foot_biped().mass_kg * GRAVITY * TABLE_4[case].step_m[1]
     climbs = [describe_climb(findings.others[f"climb-{what}-{case}"]) for what in CLIMBS]
     return [case, *efforts, weight, *energies, step.verdict.indexes["energy_J"], *climbs]

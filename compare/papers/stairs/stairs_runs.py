@@ -22,9 +22,9 @@ from metaheuristics import AntColony, AntColonyGrid, GeneticAlgorithm, ParticleS
 from metaheuristics.interface import Algorithm
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.formulation import Array, Assembly, Point
-from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkPath, NetworkSettings, leg_vector, network_angles
+from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkPath, NetworkSettings, compute_leg_vector, train_angles
 from nlp_gait.gaits.stairs.leg_network import PRINTED as PRINTED_NETWORK
-from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped
 from nlp_gait.gaits.stairs.track import PLAN
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -238,13 +238,13 @@ def train_network(case: int, plan: Mapping[str, float], poses: int, printed_pose
     """Train the network on the first poses of a plan's swing leg: convergence, time and error against the closed form."""
     desired = roll_out(case, plan, [100.0, 100.0, plan["torso_pitch_rad"]])["q_desired"]
     all_poses = np.cumsum(desired[:poses, :2], axis=1) - plan["torso_pitch_rad"]  # thigh from torso, knee from thigh
-    robot = toe_foot_biped()
+    robot = load_toe_foot_biped()
     lengths = np.array([robot.link(name).length_m for name in LEGS[0]])
-    legs = np.hstack([np.array(leg_vector(angles, *lengths)) for angles in all_poses]).T
+    legs = np.hstack([np.array(compute_leg_vector(angles, *lengths)) for angles in all_poses]).T
     found = {CLOSED_FORM: _describe_path(_solve_legs(legs, *lengths), all_poses, NetworkSettings())}
     for name, (settings, unit) in RULES.items():
         count = printed_poses if "printed" in name else poses
-        path = network_angles(unit * legs[:count], unit * lengths[0], unit * lengths[1], settings)
+        path = train_angles(unit * legs[:count], unit * lengths[0], unit * lengths[1], settings)
         found[name] = _describe_path(path, all_poses[:count], settings)
     return found
 

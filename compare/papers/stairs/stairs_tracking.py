@@ -19,7 +19,7 @@ from compare.study.record import RunRecord
 from compare.study.store import Computation
 from compare.study.task import ProblemSpec, Task
 from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop
-from nlp_gait.gaits.stairs.display import rigid_bodies
+from nlp_gait.gaits.stairs.display import make_rigid_bodies
 from nlp_gait.gaits.stairs.planar_biped import LINKS
 
 FOLLOWED_RAD = 0.1
@@ -131,7 +131,7 @@ def compute_tracking_values(findings: StairsFindings) -> dict[str, Any]:
         "over": {index: _describe_range(findings, index) for index in LEAST_ROWS.values()},
         "instant_ms": _describe_instant_times(findings),
         "powerless": _describe({name: findings.collect(f"powerless-{name}", "energy_J") for name in POWERLESS}),
-        "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in rigid_bodies().joints.values()})),
+        "torque_limits": Series(sorted({joint.torque_limit_Nm for joint in make_rigid_bodies().joints.values()})),
     }
 
 

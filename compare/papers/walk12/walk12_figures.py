@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.drawing.figures import COLOURS, new_axes, new_figure
+from compare.drawing.figures import COLOURS, make_axes, make_figure
 from compare.papers.paper_runs import get_point
 from compare.papers.walk12.walk12_findings import Walk12Findings, follow
 from compare.papers.walk12.walk12_paper import find_row
@@ -30,27 +30,27 @@ TURNING_WEIGHT = 0.9  # on circles the paper keeps lambda >= 0.7
 
 def draw_figures(findings: Walk12Findings) -> dict[str, Figure]:
     """Return the figures by name."""
-    gaits = _gaits(findings, 0.15)
+    gaits = _list_gaits(findings, 0.15)
     return {
         "fig08": _draw_fitness(findings.records(PAPER, 0.15, "ga"), findings.optimum(PAPER, 0.15)),
         "fig09": _draw_angles(gaits, FIGURE_9),
         "fig10": _draw_angles(gaits, FIGURE_10),
-        **{name: _draw_zmp(_gaits(findings, weight)) for name, weight in ZMP_FIGURES.items()},
+        **{name: _draw_zmp(_list_gaits(findings, weight)) for name, weight in ZMP_FIGURES.items()},
         "tradeoff": _draw_tradeoff(findings.front, findings.weighted),
         "circle": _draw_circle(get_point(findings.optimum(PAPER, TURNING_WEIGHT)), TURN_RAD),
     }
 
 
-def _gaits(findings: Walk12Findings, weight: float) -> dict[str, Sequence[float]]:
+def _list_gaits(findings: Walk12Findings, weight: float) -> dict[str, Sequence[float]]:
     return {"paper's gait": find_row(weight).x, "IPOPT": get_point(findings.optimum(PAPER, weight))}
 
 
-def _colour(label: str) -> str:
+def _choose_colour(label: str) -> str:
     return PAPER_COLOUR if label.startswith("paper") else COLOURS["ipopt"]
 
 
 def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
-    figure, axes = new_axes(4.2, 2.8)
+    figure, axes = make_axes(4.2, 2.8)
     runs = np.array([run.history.objective for run in ga], dtype=float)
     epochs = np.arange(runs.shape[1])
     paint = dict[str, Any](where="post", color=COLOURS["ga"])
@@ -64,14 +64,14 @@ def _draw_fitness(ga: Sequence[RunRecord], optimum: RunRecord) -> Figure:
 
 
 def _draw_angles(gaits: Mapping[str, Sequence[float]], pairs: Sequence[tuple[int, int]]) -> Figure:
-    figure = new_figure(6.3, 5.2)
+    figure = make_figure(6.3, 5.2)
     grid = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
     for label, x in gaits.items():
         arrays = follow(x, steps=10, intervals=40)
         for row, pair in zip(grid, pairs, strict=True):
             for axes, joint in zip(row, pair, strict=True):
                 degrees = np.degrees(arrays["q"][:, joint - 1])
-                axes.plot(arrays["t"], degrees, color=_colour(label), label=label, linewidth=1.0)
+                axes.plot(arrays["t"], degrees, color=_choose_colour(label), label=label, linewidth=1.0)
                 axes.set(ylabel=rf"$\theta_{{{joint}}}$ [deg]")
                 if not degrees.any():  # else noise would fill the axes
                     axes.set_ylim(-1.0, 1.0)
@@ -85,7 +85,7 @@ def _draw_angles(gaits: Mapping[str, Sequence[float]], pairs: Sequence[tuple[int
 def _draw_zmp(gaits: Mapping[str, Sequence[float]]) -> Figure:
     from matplotlib.patches import Rectangle
 
-    figure = new_figure(6.3, 3.0)
+    figure = make_figure(6.3, 3.0)
     plane, time = figure.subplots(1, 2)
     robot = load_point_mass_biped()
     back, front, width = (MILLIMETRES * m for m in (robot.foot_back_m, robot.foot_front_m, robot.foot_width_m))
@@ -95,7 +95,7 @@ def _draw_zmp(gaits: Mapping[str, Sequence[float]]) -> Figure:
     for label, x in gaits.items():
         arrays = follow(x, steps=1, intervals=400)
         zmp = MILLIMETRES * arrays["zmp_foot"]
-        colour = _colour(label)
+        colour = _choose_colour(label)
         plane.plot(zmp[:, 0], zmp[:, 1], color=colour, label=label)
         plane.plot(*zmp[0], color=colour, marker="o")
         time.plot(arrays["t"], zmp[:, 0], color=colour, linestyle=":", label=f"x, {label}")
@@ -113,7 +113,7 @@ def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) ->
     def plane_of(path: Sequence[PathPoint]) -> tuple[list[float], list[float]]:
         return [MILLIMETRES * at.step_length_m for at in path], [1e3 * at.Q_m2s for at in path]
 
-    figure = new_figure(6.3, 3.0)
+    figure = make_figure(6.3, 3.0)
     plane, sweep = figure.subplots(1, 2)
     plane.plot(*plane_of(front), color=COLOURS["pso"], label="Pareto front")
     points = [at for at in weighted if at.at > 0.0]  # at zero Q does not count
@@ -133,7 +133,7 @@ def _draw_tradeoff(front: Sequence[PathPoint], weighted: Sequence[PathPoint]) ->
 
 def _draw_circle(x: Sequence[float], turn_rad: float) -> Figure:
     arrays = follow(x, steps=int(np.ceil(2 * np.pi / turn_rad)), intervals=20, turn_rad=turn_rad)
-    figure, axes = new_axes(3.6, 3.4)
+    figure, axes = make_axes(3.6, 3.4)
     axes.plot(*arrays["waist"][:, :2].T, color="0.5", linewidth=0.8, label="waist")
     for side, stance, colour in (("left", 1.0, COLOURS["pso"]), ("right", 0.0, COLOURS["ga"])):
         prints = np.unique(np.round(arrays[f"{side}_ankle"][arrays["left_stance"] == stance], 9), axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.drawing.figures import COLOURS, add_legend_below, new_axes, new_figure, style
+from compare.drawing.figures import COLOURS, add_legend_below, make_axes, make_figure, use_style
 from compare.questions.motions.motion import (
     COARSE_KIND,
     FREE_ORDERS,
@@ -160,8 +160,8 @@ def _make_csv(stem: str, motions: Sequence[SolvedMotion]) -> Table:
 
 def plot_powers(motions: Sequence[SolvedMotion]) -> Drawing:
     """Plot the power over the number of free coefficients, with the limit of the richest motions."""
-    with style():
-        figure, axes = new_axes(4.6, 3.0)
+    with use_style():
+        figure, axes = make_axes(4.6, 3.0)
         for kind, (colour, line, words) in LOOKS.items():
             drawn = [m for m in motions if m.task.kind == kind]
             if not drawn:
@@ -196,8 +196,8 @@ def plot_paths(motions: Sequence[SolvedMotion]) -> Drawing:
     arrays = [_sample_finely(m) for m in drawn]
     swings = bool(np.ptp(arrays[0]["right_foot"][:, 0]) > 0.0)
     colours = (COLOURS["ipopt"], *(colour for colour, _, _ in LOOKS.values()))
-    with style():
-        figure = new_figure(6.3 if swings else 4.6, 2.4)
+    with use_style():
+        figure = make_figure(6.3 if swings else 4.6, 2.4)
         panels: Sequence[Axes] = figure.subplots(1, 3 if swings else 2)
         for motion, path, colour, line in zip(drawn, arrays, colours, ("--", "-", "-"), strict=False):
             x, y, z = 1e3 * path["hip"].T

@@ -48,7 +48,7 @@ class Margin:
 
     def evaluate_many(self, objective: CompiledObjective, X: Array) -> Array:
         """Return the values (P,) of candidates (P, n)."""
-        margins: Array = objective.constraints(X)[:, _rows(objective.groups, self._group)].min(axis=1)
+        margins: Array = objective.constraints(X)[:, _find_rows(objective.groups, self._group)].min(axis=1)
         return margins
 
     def express(self, point: Point, assembly: Assembly) -> MX:
@@ -68,7 +68,7 @@ class Margin:
 
 
 @lru_cache(maxsize=16)  # some searches evaluate one point at a time
-def _rows(groups: tuple[str, ...], group: str) -> list[int]:
+def _find_rows(groups: tuple[str, ...], group: str) -> list[int]:
     return [i for i, name in enumerate(groups) if name == group]
 
 

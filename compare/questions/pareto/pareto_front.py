@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import axis_label
-from compare.drawing.figures import COLOURS, new_figure, style
+from compare.analysis.units import make_axis_label
+from compare.drawing.figures import COLOURS, make_figure, use_style
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import Bends, FrontPoint, find_bends, solve_front
@@ -28,7 +28,7 @@ from compare.questions.question import Answer, Question, Work, make_csv_table, m
 from compare.report.document import Figure, Part, Table
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
-from metaheuristics.multi_objective import front_algorithm
+from metaheuristics.multi_objective import make_front_algorithm
 from metaheuristics.multi_objective.minimize_many import check_budgets
 from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.decoding import decode
@@ -79,7 +79,7 @@ class ParetoFront(Question[FoundFront]):
         """
         make_competing_objective(self.objective, self.problem)
         for algorithm, budgets in self.searches.items():
-            check_budgets(front_algorithm(algorithm), budgets)
+            check_budgets(make_front_algorithm(algorithm), budgets)
 
     @cached_property
     def criterion(self) -> CompetingObjective:
@@ -220,12 +220,12 @@ def _make_csv(stem: str, findings: FoundFront, criterion: CompetingObjective, pr
 def plot_front(findings: FoundFront, criterion: CompetingObjective, problem: GaitProblem) -> Drawing:
     """Plot the front with its knees and the points of the searches (left), and its lower part (right)."""
     front, knees = findings.front, findings.bends.knees
-    with style():
-        figure = new_figure(7.2, 3.3)
+    with use_style():
+        figure = make_figure(7.2, 3.3)
         left, right = figure.subplots(1, 2)
         for axes in (left, right):
             _plot_points(axes, findings)
-            axes.set_xlabel(axis_label(criterion.name, criterion.unit))
+            axes.set_xlabel(make_axis_label(criterion.name, criterion.unit))
             axes.locator_params(axis="x", nbins=6)
         left.set_ylabel("power [W]")
         values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))

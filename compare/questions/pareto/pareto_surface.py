@@ -12,8 +12,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import axis_label
-from compare.drawing.figures import new_axes, style
+from compare.analysis.units import make_axis_label
+from compare.drawing.figures import make_axes, use_style
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import solve_ends
 from compare.questions.question import Answer, Question, Work
@@ -135,18 +135,18 @@ def _satisfies(point: SurfacePoint, other: SurfacePoint) -> bool:
 
 def plot_surface(points: tuple[SurfacePoint, ...], first: CompetingObjective, second: CompetingObjective) -> Drawing:
     """Plot the power over the first criterion, in lines of equal demand on the second one."""
-    with style():
-        figure, axes = new_axes(5.6, 3.4)
+    with use_style():
+        figure, axes = make_axes(5.6, 3.4)
         levels = sorted({p.demanded[1] for p in points})
         norm = Normalize(levels[0], levels[-1] if levels[-1] > levels[0] else levels[0] + 1.0)
         colours = matplotlib.colormaps["viridis"]
         for level in levels:
             line = sorted((p.values[0], p.power_W) for p in points if p.demanded[1] == level)
             axes.plot(*zip(*line, strict=True), "o-", color=colours(0.9 * norm(level)), markersize=3)
-        axes.set_xlabel(axis_label(first.name, first.unit))
+        axes.set_xlabel(make_axis_label(first.name, first.unit))
         axes.set_ylabel("least power [W]")
         axes.set_ylim(bottom=0.0)
         shades = ListedColormap(colours(np.linspace(0.0, 0.9, 256)))
         bar = figure.colorbar(ScalarMappable(norm, shades), ax=axes)
-        bar.set_label(f"at least this {axis_label(second.name, second.unit)}")
+        bar.set_label(f"at least this {make_axis_label(second.name, second.unit)}")
     return figure

@@ -11,7 +11,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, select_front, solve_point
 from compare.questions.question import Work
 from metaheuristics.interface import Array
-from metaheuristics.multi_objective import front_algorithm
+from metaheuristics.multi_objective import make_front_algorithm
 from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, minimize_many
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
@@ -95,7 +95,7 @@ def run_searches(
     identity = {**fingerprint(problem), "criterion": criterion.name, "scale": ranges}
     fronts = []
     for name, budgets in searches.items():
-        algorithm = front_algorithm(name)
+        algorithm = make_front_algorithm(name)
         for run in range(runs):
             inputs = {**identity, "budgets": list(budgets), "algorithm": repr(algorithm), "seed": seed + run}
             compute = partial(_run_search, compiled, algorithm, budgets, seed + run)

@@ -7,8 +7,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import millimetres
-from compare.drawing.figures import add_legend_below, new_figure, style
+from compare.analysis.units import format_millimetres
+from compare.drawing.figures import add_legend_below, make_figure, use_style
 from compare.questions.perturbed_problem import is_mass
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_optima_table, make_table
 from compare.questions.robust.robust_gait import (
@@ -130,8 +130,8 @@ def _make_simulation_table(widest: RobustGait, simulations: Sequence[RobotSimula
             "robot": lambda s: _describe_corner(widest.corners[widest.robots.index(s.robot)]),
             "in MuJoCo": lambda s: "stays up" if s.fell_at_s is None else f"FALLS at {s.fell_at_s:.2f} s",
             "largest tilt": lambda s: f"{s.largest_tilt_deg:.1f} degrees",
-            "mean lateral margin: model": lambda s: millimetres(s.predicted_margin_m),
-            "MuJoCo": lambda s: millimetres(s.margin_m),
+            "mean lateral margin: model": lambda s: format_millimetres(s.predicted_margin_m),
+            "MuJoCo": lambda s: format_millimetres(s.margin_m),
         },
     )
 
@@ -157,8 +157,8 @@ def plot_robust(gaits: Sequence[RobustGait], simulations: Sequence[RobotSimulati
     nominal = gaits[0].nominal_W
     names = ["none", *(gait.name for gait in gaits)]
     places = np.arange(len(names))
-    with style():
-        figure = new_figure(7.2 if simulations else 4.2, 2.7)
+    with use_style():
+        figure = make_figure(7.2 if simulations else 4.2, 2.7)
         ratios = (1.15, 1.0) if simulations else None
         left, *others = figure.subplots(1, 2 if simulations else 1, squeeze=False, width_ratios=ratios)[0]
         powers, worst = [nominal, *(g.power_W for g in gaits)], [nominal, *(g.worst_W for g in gaits)]

@@ -300,12 +300,12 @@ def _simulate(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float
         robot=robot,
         fell_at_s=trace.fell_at_s,
         largest_tilt_deg=math.degrees(float(trace.tilt.max())),
-        margin_m=lateral_margin(plan, average_pressure(trace, drive.period_s)[during, 1]),
-        predicted_margin_m=lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
+        margin_m=compute_lateral_margin(plan, average_pressure(trace, drive.period_s)[during, 1]),
+        predicted_margin_m=compute_lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
     )
 
 
-def lateral_margin(plan: Plan, y: Array) -> float:
+def compute_lateral_margin(plan: Plan, y: Array) -> float:
     """Return the mean distance of lateral positions (T,) [m] to the nearer side of the supporting soles [m]."""
     feet = [
         (plan.at(f"{side}_foot", np.zeros(1))[0, 1], plan.robot.feet[side]) for side in SIDES if side in plan.supports

@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import axis_label, units_of, with_unit
-from compare.drawing.figures import new_axes, style
+from compare.analysis.units import list_units, make_axis_label, with_unit
+from compare.drawing.figures import make_axes, use_style
 from compare.questions.perturbed_problem import rebuild
 from compare.questions.question import Work, make_csv_table, make_table
 from compare.questions.walk.cheapest_cycle import Gait, describe_end, simulate_walk
@@ -70,14 +70,14 @@ def check_planners(names: Sequence[str], problem: GaitProblem) -> None:
         if name not in PLANNERS:
             raise InputError(f"a baseline is one of {', '.join(PLANNERS)}, got {name!r}")
     if CART_TABLE in names:
-        shared = _shared_options(problem)
+        shared = _select_shared_options(problem)
         defaults = ProblemSpec(name=problem.address, options=shared).load().options
         for name, value in problem.options.items():
             if name not in ("objective", *shared) and value != defaults.get(name):
                 raise InputError(f"the {CART_TABLE} walk does not support {name}={value}; leave that option out")
 
 
-def _shared_options(problem: GaitProblem) -> dict[str, Any]:
+def _select_shared_options(problem: GaitProblem) -> dict[str, Any]:
     """Options of a cycle that its textbook walk has too."""
     known = inspect.signature(resolve(CART_TABLE_BODIES, problem.name)).parameters
     return {name: value for name, value in problem.options.items() if name in known}
@@ -111,7 +111,7 @@ def plan_gaits(
 def plan_cart_table(gait: Gait, work: Work) -> tuple[Result | None, str]:
     """Return the textbook's walk at the cheapest height of its hip, from the highest that reaches downwards."""
     problem, x = gait.result.problem, gait.point.x
-    cycles = resolve(CART_TABLE_BODIES, problem.name)(**_shared_options(problem))
+    cycles = resolve(CART_TABLE_BODIES, problem.name)(**_select_shared_options(problem))
     single, double = (x[name] for name in problem.display.durations)
 
     def plan(height_m: float) -> Result:
@@ -260,8 +260,8 @@ def _describe_violations(planned: Sequence[PlannedGait]) -> list[Part]:
 
 def plot_planners(name: str, problem: GaitProblem, planned: Sequence[PlannedGait]) -> Drawing:
     """Plot the energy per metre along the axis, with a colour for each planner."""
-    with style():
-        figure, axes = new_axes(6.3, 3.2)
+    with use_style():
+        figure, axes = make_axes(6.3, 3.2)
         for planner, colour in COLOURS.items():
             rows = [row for row in planned if row.planner == planner]
             for where, line in zip(PLACES, ("o-", "s--"), strict=True):
@@ -269,7 +269,7 @@ def plot_planners(name: str, problem: GaitProblem, planned: Sequence[PlannedGait
                 if points:
                     label = planner if where == "model" else None
                     axes.plot(*zip(*points, strict=True), line, color=colour, label=label, markersize=4)
-        axes.set(ylabel="energy [J/m]", xlabel=axis_label(name, units_of(problem)[name]))
+        axes.set(ylabel="energy [J/m]", xlabel=make_axis_label(name, list_units(problem)[name]))
         axes.set_ylim(bottom=0.0)
         axes.legend()
     return figure

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.simulated_gaits import compute_agreement
-from compare.analysis.units import axis_label, millimetres, name_in_words, units_of, with_unit
-from compare.drawing.figures import new_figure, style
+from compare.analysis.units import format_millimetres, list_units, make_axis_label, name_in_words, with_unit
+from compare.drawing.figures import make_figure, use_style
 from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
 from compare.questions.sweep import Axis, Sweep, mark_values
 from compare.questions.walk.cheapest_cycle import Gait, describe_end, make_gait, simulate_walk
@@ -154,7 +154,7 @@ def check_cycle(name: str) -> None:
         raise InputError(f"walk takes a walking cycle, {' or '.join(CART_TABLE_BODIES)}; got {name!r}")
 
 
-def default_speeds(problem: GaitProblem) -> str:
+def choose_speeds(problem: GaitProblem) -> str:
     """Return ten speeds as the text of an axis: NAO's, of other robots at the same Froude numbers."""
     (speed,) = (parameter.default for parameter in problem.parameters if parameter.name == SPEED)
     low, high = (speed * limit / SPEED_M_S for limit in SPEEDS_M_S)
@@ -177,9 +177,9 @@ def _report_simulations(name: str, gaits: Sequence[Gait]) -> list[Part]:
     }
     courses: dict[str, Callable[[Simulated], str]] = {
         name: lambda row: f"{row[0]:g}",
-        "walked": lambda row: millimetres(row[1].walked_m, ".0f"),
-        "of": lambda row: millimetres(row[1].planned_m, ".0f"),
-        "drift": lambda row: millimetres(row[1].drift_m),
+        "walked": lambda row: format_millimetres(row[1].walked_m, ".0f"),
+        "of": lambda row: format_millimetres(row[1].planned_m, ".0f"),
+        "drift": lambda row: format_millimetres(row[1].drift_m),
         "heading": lambda row: with_unit(row[1].heading_deg, "deg", ".2f"),
         "tilt": lambda row: with_unit(row[2].largest_tilt_deg, "deg", ".1f"),
         "tracking": lambda row: with_unit(row[2].tracking_max_rad, "rad", ".4f"),
@@ -229,8 +229,8 @@ def plot_costs(name: str, gaits: Sequence[Gait], problem: GaitProblem) -> Drawin
     """Plot cost of transport, step length and durations along the axis; infeasible points as crosses."""
     good = [gait for gait in gaits if gait.point.feasible]
     at = [gait.at for gait in good]
-    with style():
-        figure = new_figure(6.3, 5.0)
+    with use_style():
+        figure = make_figure(6.3, 5.0)
         cost, lengths, times = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
         cost.plot(at, [gait.indexes["cost_of_transport"] for gait in good], "o-", color=MODEL, label="model")
         _plot_engine_costs(cost, good)
@@ -247,7 +247,7 @@ def plot_costs(name: str, gaits: Sequence[Gait], problem: GaitProblem) -> Drawin
         times.set_ylabel("time [s]")
         times.set_ylim(bottom=0.0)
         times.legend(ncols=2)
-        times.set_xlabel(axis_label(name, units_of(problem)[name]))
+        times.set_xlabel(make_axis_label(name, list_units(problem)[name]))
     return figure
 
 
@@ -274,8 +274,8 @@ def plot_cycle(result: Result) -> Drawing:
     arrays, t, hip = signals.arrays, signals.arrays["t"], 1000.0 * signals.arrays["hip"]
     durations = [float(result.x[problem.variable_index(name)]) for name in problem.display.durations]
     switches = np.cumsum([0.0] + durations * STEPS_SHOWN)
-    with style():
-        figure = new_figure(6.3, 7.2)
+    with use_style():
+        figure = make_figure(6.3, 7.2)
         side, above, place, angles = figure.subplots(4, 1, height_ratios=(1.0, 1.2, 1.2, 1.6))
         side.sharex(above)
         for foot, colour in (("left", LEFT), ("right", RIGHT)):

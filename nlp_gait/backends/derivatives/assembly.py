@@ -13,9 +13,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.derivatives.first_order import Assembler, Glue, StagePlaces, union
+from nlp_gait.backends.derivatives.first_order import Assembler, Glue, StagePlaces, unite
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Call, DerivativePlan, Integers, PlaceBlock, Row
-from nlp_gait.backends.derivatives.structure import Structure, nonzeros
+from nlp_gait.backends.derivatives.structure import Structure, to_dense
 
 # Columns d and c, the entries for c, and places of the entry for d and of a factor.
 Products: TypeAlias = "list[tuple[Integers, Integers, Row, int, int]]"
@@ -40,7 +40,7 @@ class Hessian:
         for samples, bar in zip(reversed(stages), reversed(bars), strict=True):
             if len(samples.active) and len(samples.used):
                 self._add_samples(samples, bar, contributions)
-        keys = union(d * assembler.n + c for d, c, *_ in contributions)
+        keys = unite(d * assembler.n + c for d, c, *_ in contributions)
         self.place = plan.allocate(len(keys))
         plan.reset(SECOND, self.place, len(keys), marker)
         for d, c, row, first, second in contributions:
@@ -63,7 +63,7 @@ class Hessian:
         total = ca.dot(symbols[curved], glue.rows[curved])
         H = ca.triu(ca.hessian(total, assembler.y)[0])
         first, second = H.sparsity().get_triplet()
-        values = nonzeros(H)
+        values = to_dense(H)
         places = plan.allocate(len(first)) + np.arange(len(first))
         assembler.evaluate(SECOND, values, places, (symbols, weights))
         for i, j, place in zip(first, second, places.tolist(), strict=True):
@@ -98,7 +98,7 @@ class Hessian:
                 row = samples.rows[e][a]
                 if samples.by_column:
                     parts = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
-                    columns = union(parts)
+                    columns = unite(parts)
                     places = place + (e * ma + a) * samples.width + np.searchsorted(samples.columns[e], columns)
                     _add_outer(row, Row(columns, places), ONE, contributions)
                     continue

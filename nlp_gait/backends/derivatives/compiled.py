@@ -79,11 +79,11 @@ def write_nlp_source(found: NlpPlan) -> str:
 
 
 def _write_rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
-    text = ",\n".join(_braces(row) for row in rows)
+    text = ",\n".join(_format_braces(row) for row in rows)
     return f"static const int {name}[][{width}] = {{{text or '{0}'}}};"
 
 
-def _braces(row: Iterable[object]) -> str:
+def _format_braces(row: Iterable[object]) -> str:
     return f"{{{','.join(map(str, row))}}}"
 
 
@@ -104,7 +104,9 @@ def _write_calls(found: NlpPlan) -> str:
     ]
     rows = []
     for i, call in enumerate(found.plan.calls):
-        lines.append(write_array("Block", f"blocks_{i}", [_braces(block) for block in call.inputs + call.outputs]))
+        lines.append(
+            write_array("Block", f"blocks_{i}", [_format_braces(block) for block in call.inputs + call.outputs])
+        )
         if call.directions is not None:
             lines.append(write_array("int", f"directions_{i}", call.directions.tolist()))
         directions = "nullptr" if call.directions is None else f"directions_{i}"
@@ -166,13 +168,16 @@ class CompiledNlp:
         for _ in range(MOST_POINTS):
             w, d, weights = rng.uniform(0.0, 1.0, n), rng.uniform(-1.0, 1.0, n), rng.uniform(-1.0, 1.0, m)
             slope, other = (
-                (_numbers(machine(w + step * d, p)) - _numbers(machine(w - step * d, p))) / (2 * step)
+                (_format_numbers(machine(w + step * d, p)) - _format_numbers(machine(w - step * d, p))) / (2 * step)
                 for step in (STEP, OTHER_STEP)
             )
             if not _agree(slope, other):
                 continue
             (f, gradient), (g, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
-            pairs = [(_numbers(machine(w, p)), _numbers([f, g])), (slope, _numbers([ca.dot(gradient, d), J @ d]))]
+            pairs = [
+                (_format_numbers(machine(w, p)), _format_numbers([f, g])),
+                (slope, _format_numbers([ca.dot(gradient, d), J @ d])),
+            ]
             if "nlp_hess_l" in self.functions:
                 ahead, behind = (
                     [self.functions[name](w + step * d, p)[1] for name in ("nlp_grad_f", "nlp_jac_g")]
@@ -180,7 +185,7 @@ class CompiledNlp:
                 )
                 change = ahead[0] - behind[0] + (ahead[1] - behind[1]).T @ weights
                 H = self.functions["nlp_hess_l"](w, p, 1.0, weights)
-                pairs.append((_numbers([change / (2 * STEP)]), _numbers([ca.triu2symm(H) @ d])))
+                pairs.append((_format_numbers([change / (2 * STEP)]), _format_numbers([ca.triu2symm(H) @ d])))
             agreeing += all(_agree(expected, value) for expected, value in pairs)
             if (checked := checked + 1) == CHECK_POINTS:
                 break
@@ -201,7 +206,7 @@ def _hash_generator() -> str:
     return digest.hexdigest()
 
 
-def _numbers(parts: Any) -> Array:
+def _format_numbers(parts: Any) -> Array:
     return np.concatenate([ca.DM(part).full().ravel() for part in parts])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Call, DerivativePlan, Integers, PlaceBlock, Row
-from nlp_gait.backends.derivatives.structure import Stage, Structure, nonzeros, scalars
+from nlp_gait.backends.derivatives.structure import Stage, Structure, split_nonzeros, to_dense
 from nlp_gait.symbolic.tape import read_tape
 
 # Longest function whose derivatives are all written out, if that is cheaper than one direction after the other.
@@ -53,7 +53,7 @@ class Assembler:
         """Add rows, evaluated to places, and their derivatives with respect to y."""
         self.evaluate(VALUES, rows, places)
         J = ca.jacobian(rows, self.y)
-        values = scalars(J)
+        values = split_nonzeros(J)
         varying = [k for k, value in enumerate(values) if not value.is_constant()]
         factors = np.array([self.plan.place_constant(float(v)) if v.is_constant() else -1 for v in values], int)
         factors[varying] = self.plan.allocate(len(varying)) + np.arange(len(varying))
@@ -65,7 +65,7 @@ class Assembler:
 
     def evaluate(self, phase: int, outputs: SX, targets: Integers, *more: tuple[SX, Integers]) -> None:
         """Add expressions of y, p and more symbols; constants go into the initial values."""
-        listed = scalars(ca.densify(outputs))
+        listed = split_nonzeros(ca.densify(outputs))
         varying = [k for k, each in enumerate(listed) if not each.is_constant()]
         constants = {int(targets[k]): float(each) for k, each in enumerate(listed) if each.is_constant()}
         self.plan.initial.update(constants)
@@ -77,10 +77,10 @@ class Assembler:
 
     def columns(self, entries: list[tuple[int, int]]) -> Integers:
         """Return the variables that a row of glue depends on, ascending."""
-        return union(self.derivatives[j].columns for j, _ in entries)
+        return unite(self.derivatives[j].columns for j, _ in entries)
 
 
-def union(parts: Iterable[Integers]) -> Integers:
+def unite(parts: Iterable[Integers]) -> Integers:
     """Return all numbers of some arrays, ascending."""
     return np.unique(np.concatenate([np.zeros(0, int), *parts]))
 
@@ -115,8 +115,8 @@ def derive_sample(function: ca.Function, active: Integers, used: Integers, direc
     in_directions = first.n_instructions() + second.n_instructions()
     if value.n_instructions() <= LONGEST_WRITTEN_OUT:
         J, H = ca.jacobian(v, x), ca.triu(ca.jacobian(gradient, x))
-        all_first = ca.Function("first", [u], ca.cse([nonzeros(ca.project(J, jacobian))]))
-        all_second = ca.Function("second", [u, weights], ca.cse([gradient, nonzeros(ca.project(H, ca.triu(hessian)))]))
+        all_first = ca.Function("first", [u], ca.cse([to_dense(ca.project(J, jacobian))]))
+        all_second = ca.Function("second", [u, weights], ca.cse([gradient, to_dense(ca.project(H, ca.triu(hessian)))]))
         written_out = all_first.n_instructions() + all_second.n_instructions()
         if written_out <= MOST_GROWTH * in_directions and written_out <= in_directions * min(directions, len(active)):
             return SampleDerivatives(value, jacobian, hessian, False, all_first, all_second)
@@ -137,7 +137,7 @@ class StagePlaces:
         self.active, self.used, self.m = active, used, m
         # Derivatives of active inputs, sample by sample.
         patterns = [[assembler.columns(self.glue.entries[e * m + i]) for i in active] for e in range(count)]
-        self.columns = [union(each) for each in patterns]
+        self.columns = [unite(each) for each in patterns]
         most = max((len(each) for each in self.columns), default=0)
         self.derivatives = derive_sample(stage.function, active, used, most)
         self.by_column = self.derivatives.directional and most <= len(active)
@@ -223,7 +223,7 @@ class StagePlaces:
             for o, name in enumerate(self.used):
                 read = np.flatnonzero(at[o] >= 0)
                 rows = [self.rows[e][a] for a in read]
-                columns = union(row.columns for row in rows)
+                columns = unite(row.columns for row in rows)
                 y = self.before + e * self.outputs + name
                 if self.by_column:
                     base = place + (e * nv + o) * self.width

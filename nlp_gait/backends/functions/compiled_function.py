@@ -139,8 +139,8 @@ class CompiledFunction:
         self.argument_names = tuple(function.name_in())
         self.result_names = tuple(function.name_out())
         #: shape of one row of each argument and result: () for a scalar, (n,) for a vector, (r, c) for a matrix
-        self.argument_shapes = [_row_shape(function.size_in(i)) for i in range(function.n_in())]
-        self.result_shapes = [_row_shape(function.size_out(i)) for i in range(function.n_out())]
+        self.argument_shapes = [_find_row_shape(function.size_in(i)) for i in range(function.n_in())]
+        self.result_shapes = [_find_row_shape(function.size_out(i)) for i in range(function.n_out())]
         self.description = f"compiled by {compiler.summary}, {lanes} rows at a time"  #: in words
         self._native = library.nlp_gait_evaluate_rows
         library.nlp_gait_rows_memory.restype = ctypes.c_longlong
@@ -256,7 +256,7 @@ def _compile(function: ca.Function, threads: int, lanes: int) -> CompiledFunctio
     return compiled
 
 
-def _row_shape(size: tuple[int, int]) -> tuple[int, ...]:
+def _find_row_shape(size: tuple[int, int]) -> tuple[int, ...]:
     """Return the shape of one row: a scalar and a vector have no axis of length one."""
     return () if size == (1, 1) else (max(size),) if 1 in size else tuple(size)
 

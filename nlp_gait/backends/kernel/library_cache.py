@@ -44,7 +44,7 @@ def load_library(
     parts = (source, *compiler.command, compiler.version, *flags, *machine)
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     # The private folder counts if this process has needed one.
-    folders = [find_cache_folder(), *([private_folder()] if private_folder.cache_info().currsize else [])]
+    folders = [find_cache_folder(), *([make_private_folder()] if make_private_folder.cache_info().currsize else [])]
     for library in (file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))):
         loaded = load_if_valid(library, symbols)
         if loaded is not None:
@@ -66,7 +66,7 @@ def load_library(
 def store_library(built: Path, key: str) -> Path:
     """Copy a new library to the first folder that can be written to, and return its path."""
     name = f"{key}-{_hash(built.read_bytes())}{SUFFIX}"
-    for find_folder in (find_cache_folder, private_folder):
+    for find_folder in (find_cache_folder, make_private_folder):
         folder = find_folder()
         try:
             with tempfile.TemporaryDirectory(dir=folder, prefix="new-") as landing:
@@ -103,7 +103,7 @@ def find_cache_folder() -> Path:
         reason = str(error)
     if reason is not None:
         warn_once(f"the cache folder {base} cannot be used ({reason}); compiled code is stored for this process only")
-    return base if reason is None else private_folder()
+    return base if reason is None else make_private_folder()
 
 
 def _find_danger(status: os.stat_result, has_type: Callable[[int], bool]) -> str | None:
@@ -141,7 +141,7 @@ def _forbids_code(folder: Path) -> bool:
 
 
 @cache
-def private_folder() -> Path:
+def make_private_folder() -> Path:
     """Return a folder that only this process uses, created when it is first needed and removed at the end."""
     with convert_errors("no folder for temporary files", CompilerError, "free some disk space, or name one in TMPDIR"):
         places = [tempfile.gettempdir(), "/var/tmp", "/dev/shm"]
@@ -176,7 +176,7 @@ def load_if_valid(library: Path, symbols: Sequence[str]) -> ctypes.CDLL | None:
 def _check_library(library: Path) -> str | None:
     """Return a name that loads exactly the file that was checked; None for a file that must not be loaded."""
     if not OPEN_FILES.is_dir():
-        copy = private_folder() / library.name
+        copy = make_private_folder() / library.name
         if copy != library:
             shutil.copyfile(library, copy, follow_symlinks=False)
         is_safe = _find_danger(library.lstat(), stat.S_ISREG) is None

@@ -12,7 +12,7 @@ from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.onboard.nlp_functions import NlpFunctions
 from nlp_gait.backends.onboard.reduced_qp import LEAST_COST, LEAST_DAMPING, Step, StepSolver
 from nlp_gait.backends.optima.optimum import find_optimum
-from nlp_gait.backends.optima.sensitivities import parameter_sensitivities
+from nlp_gait.backends.optima.sensitivities import differentiate_by_parameters
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.errors import InputError
@@ -93,7 +93,7 @@ class Replanner:
         self._scale = self._exact.row_scales[: len(self._functions.model.row_names)]
         self._threads = ThreadpoolController()
         self._near, self._first = near, near
-        self._slopes = parameter_sensitivities(find_optimum(problem, near)) if predict else None
+        self._slopes = differentiate_by_parameters(find_optimum(problem, near)) if predict else None
         self.restart()
 
     def restart(self) -> None:

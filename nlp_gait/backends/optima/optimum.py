@@ -78,7 +78,7 @@ def _build(problem: GaitProblem) -> KktFunctions:
     )
 
 
-def column(value: DM) -> Array:
+def to_array(value: DM) -> Array:
     """Return a dense vector."""
     return np.array(value).ravel()
 
@@ -193,7 +193,7 @@ class Optimum:
     @lock_casadi
     def rows(self) -> tuple[Array, Array, Array]:
         """Values of all rows with their lower and upper bounds."""
-        _, values, lower, upper = (column(part) for part in self.functions.values(self.w, self.parameters))
+        _, values, lower, upper = (to_array(part) for part in self.functions.values(self.w, self.parameters))
         return values, lower, upper
 
 
@@ -218,7 +218,7 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
     """Apply Newton's method to the active rows, which change until all signs are right."""
     w, p = guess.primal.copy(), np.append(problem.p, guess.width)
     lam = np.concatenate([guess.rows, guess.bounds[: functions.model.variables]])
-    _, values, lower, upper = (column(part) for part in functions.values(w, p))
+    _, values, lower, upper = (to_array(part) for part in functions.values(w, p))
     equation = upper - lower <= 0.0
     side = np.where(lam > upper - values, 1, np.where(-lam > values - lower, -1, 0))
     side[equation] = np.where(lam[equation] >= 0.0, 1, -1)
@@ -227,7 +227,7 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
     for _ in range(ROUNDS):
         active = np.flatnonzero(side)
         lam[side == 0] = 0.0
-        gradient = column(functions.gradient(w, p, lam))
+        gradient = to_array(functions.gradient(w, p, lam))
         hessian, jacobian = (np.array(part) for part in functions.matrices(w, p, lam))
         gap = (np.where(side > 0, upper, lower) - values)[active]
         step = solve_kkt(hessian, jacobian[active], -gradient, gap, functions.model.variables)
@@ -235,14 +235,14 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
             reason = "Newton's method diverged"
             break
         w, lam[active] = w + step.w, lam[active] + step.multipliers
-        _, values, lower, upper = (column(part) for part in functions.values(w, p))
+        _, values, lower, upper = (to_array(part) for part in functions.values(w, p))
         wrong = (lam * side < -WEAK) & ~equation
         violated = np.where(values > upper + RESIDUAL, 1, np.where(values < lower - RESIDUAL, -1, 0)) * (side == 0)
         if wrong.any() or violated.any():
             side = np.where(wrong, 0, side + violated)
             continue
         gap = (np.where(side > 0, upper, lower) - values)[active]
-        slope = column(functions.gradient(w, p, lam))
+        slope = to_array(functions.gradient(w, p, lam))
         residual = max(float(np.abs(slope).max()), float(np.abs(gap).max(initial=0.0)))
         if residual <= RESIDUAL:
             reason = step.reason
@@ -281,7 +281,7 @@ def _fix_flat_lifts(found: Optimum) -> Optimum:
     if not loose.size:
         return found
     w, side = found.w.copy(), found.side.copy()
-    w[n + loose] = column(model.lift_start(w[:n], *np.split(found.parameters, [-1])))[loose]
+    w[n + loose] = to_array(model.lift_start(w[:n], *np.split(found.parameters, [-1])))[loose]
     moved = replace(found, w=w)
     values, lower, _ = moved.rows
     first, last = len(model.row_names), len(model.row_names) + len(model.tie_upper)

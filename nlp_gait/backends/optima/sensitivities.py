@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, column, find_optimum, solve_kkt
+from nlp_gait.backends.optima.optimum import WEAK, Optimum, build_kkt_functions, find_optimum, solve_kkt, to_array
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation import Array, GaitProblem
@@ -76,7 +76,7 @@ class _Change(NamedTuple):
 
 
 @lock_casadi
-def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
+def differentiate_by_parameters(optimum: Optimum) -> Sensitivities:
     """Return derivatives with respect to all parameters, in their order and units; InputError if there are none."""
     _require_derivatives(optimum)
     parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
@@ -86,7 +86,7 @@ def parameter_sensitivities(optimum: Optimum) -> Sensitivities:
 
 def tabulate_sensitivities(problem: GaitProblem, solution: Solution) -> SensitivityTable:
     """Return the derivatives of a solution's best start; InputError if it has no multipliers or there are no derivatives."""
-    found = parameter_sensitivities(find_optimum(problem, min(solution.starts, key=lambda outcome: outcome.rank)))
+    found = differentiate_by_parameters(find_optimum(problem, min(solution.starts, key=lambda outcome: outcome.rank)))
     values = np.vstack([found.objective, found.x])
     values[:, np.logical_not(found.defined)] = np.nan
     goal = problem.objective
@@ -96,7 +96,7 @@ def tabulate_sensitivities(problem: GaitProblem, solution: Solution) -> Sensitiv
 
 
 @lock_casadi
-def model_sensitivities(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
+def differentiate_by_models(optimum: Optimum, pairs: Iterable[tuple[GaitProblem, GaitProblem, float]]) -> Sensitivities:
     """Return derivatives with respect to the data of the model, for example a robot's masses.
 
     They are central differences of the Lagrangian, its gradient and the rows, at fixed x*, multipliers and parameter values: the
@@ -122,8 +122,8 @@ def _evaluate(optimum: Optimum, problem: GaitProblem) -> _Change:
     w, lam = optimum.w.copy(), optimum.multipliers.copy()
     w[:n] = (optimum.x - other.offset) / other.scale
     lam[-n:] /= ratio
-    cost, values, lower, upper = (column(part) for part in functions.values(w, optimum.parameters))
-    gradient = column(functions.gradient(w, optimum.parameters, lam))
+    cost, values, lower, upper = (to_array(part) for part in functions.values(w, optimum.parameters))
+    gradient = to_array(functions.gradient(w, optimum.parameters, lam))
     gradient[:n] *= ratio
     for part in (values, lower, upper):  # x and its bounds are the same
         part[-n:] = 0.0

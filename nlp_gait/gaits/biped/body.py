@@ -22,7 +22,7 @@ from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import mirror_sign, tree_from
+from nlp_gait.robots.tree import make_tree, mirror_sign
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler, tilt_gravity
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
@@ -133,7 +133,7 @@ class Body(ABC):
         """Return the torques of the joints above a fixed link, and the wrench on it; see ``newton_euler``."""
 
         def solve(link: str, names: Sequence[str]) -> tuple[dict[str, SX], Wrench]:
-            tree = tree_from(self.robot, link, names)
+            tree = make_tree(self.robot, link, names)
             return newton_euler(tree, q, qd, qdd, self.gravity_vector, shares, self.upright)
 
         q, qd, qdd = ({name: motion[order] for name, motion in motions.items()} for order in range(3))

@@ -85,7 +85,7 @@ class Splines:
         return start
 
 
-def hip_on_spline(
+def move_hip(
     at: InstantPoint,
     more: Mapping[str, Motion],
     along: tuple[float, float],

@@ -8,7 +8,7 @@ import casadi as ca
 from casadi import MX
 
 from nlp_gait.formulation import Objective, Parameter, Point
-from nlp_gait.gaits.biped.samples import Samples, time_mean
+from nlp_gait.gaits.biped.samples import Samples, average_over_time
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 POWER = Objective(name="power", unit="W")
@@ -23,7 +23,7 @@ PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
 def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
     """Compute the mean electrical power by the trapezoidal rule [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
     mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
-    return time_mean(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
+    return average_over_time(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +46,7 @@ class Goal:
         return power, {"power_W": power}, more
 
 
-def _mean_squared_rate(values: MX, samples: Samples) -> MX:
+def _average_squared_rate(values: MX, samples: Samples) -> MX:
     return ca.sumsqr(values[:, 1:] - values[:, :-1]) / samples.step_s**2 / samples.steps
 
 
@@ -54,15 +54,15 @@ def _mean_squared_rate(values: MX, samples: Samples) -> MX:
 INSTEAD = {
     "jerk": Goal(
         objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
-        figure=lambda samples: _mean_squared_rate(samples.qdd, samples),
+        figure=lambda samples: _average_squared_rate(samples.qdd, samples),
         reads_motion=True,
     ),
     "torque": Goal(
         objective=Objective(name="squared_torque", unit="(Nm)^2"),
-        figure=lambda samples: time_mean(ca.sum1(samples.torque**2)),
+        figure=lambda samples: average_over_time(ca.sum1(samples.torque**2)),
     ),
     "torque-smoothness": Goal(
         objective=Objective(name="torque_rate", unit="(Nm/s)^2"),
-        figure=lambda samples: _mean_squared_rate(samples.torque, samples),
+        figure=lambda samples: _average_squared_rate(samples.torque, samples),
     ),
 }

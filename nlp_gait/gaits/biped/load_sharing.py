@@ -23,7 +23,7 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
 from nlp_gait.robots import Foot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic import balance
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.kinematics import UP, axis_rotation
@@ -45,7 +45,7 @@ TorsoShare = Literal["printed", "lever", "free"]
 LOAD_DEGREE = 4
 
 
-def torso_shares(
+def share_torso(
     hip_y: SX, rule: Division, feet_y: tuple[float, float] | tuple[SX, SX] = (0.05, -0.05)
 ) -> dict[str, SX]:
     """Compute the share of the torso's mass that each leg carries from the hip's distances to the feet; both add up to 1.
@@ -83,7 +83,7 @@ class LoadSharing:
 
 
 def share_load(body: Body, rule: TorsoShare, degree: int = LOAD_DEGREE) -> LoadSharing:
-    """Return how the feet share the load: by a rule, see ``torso_shares``, or ``"free"``, see ``PlannedLoad``."""
+    """Return how the feet share the load: by a rule, see ``share_torso``, or ``"free"``, see ``PlannedLoad``."""
     return PlannedLoad(body, degree) if rule == "free" else LoadSharing(make_divided_loads(body, rule))
 
 
@@ -155,7 +155,7 @@ def load_basis(degree: int, phase: SX) -> SX:
 def make_planned_loads(body: Body) -> Loader:
     """Return a function of the torques from the left foot with the planned wrench on the right one, and the ZMP of both feet."""
     left, right = body.robot.feet["left"], body.robot.feet["right"]
-    tree = tree_from(body.robot, left.link)
+    tree = make_tree(body.robot, left.link)
 
     def loads(now: Instant) -> Instant:
         q, qd, qdd = ({name: motion[order] for name, motion in now.joints.items()} for order in range(3))
@@ -176,11 +176,11 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
     robot, weight = body.robot, body.weight
 
     def loads(now: Instant) -> Instant:
-        shares = torso_shares(now.hip[1], rule, body.feet_y)
+        shares = share_torso(now.hip[1], rule, body.feet_y)
         if now.yaw.shape[0]:  # across the mean of both feet's directions
             mean = axis_rotation(UP, -now.yaw / 2)
             hip_y, *feet_y = ((mean @ place)[1] for place in (now.hip, *now.ankles.values()))
-            shares = torso_shares(hip_y, rule, (feet_y[0], feet_y[1]))
+            shares = share_torso(hip_y, rule, (feet_y[0], feet_y[1]))
         torques: dict[str, SX] = {}
         zmps, ground_loads, wrenches = [], [], {}
         for side, name in BOTH_FEET.items():
@@ -222,7 +222,7 @@ class FootLimits(Limit):
         n, mu = samples.steps + 1, at["friction_coefficient"]
         found, loads = [], {}
         for side, foot in BOTH_FEET.items():
-            kinds = _bearing(self._feet[foot]).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
+            kinds = _make_bearing_function(self._feet[foot]).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
                 found.append(make_rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
             loads[foot] = samples.wrenches[side][2, :] / self._weight
@@ -244,7 +244,7 @@ class FootLimits(Limit):
 ROWS = (("friction", "N", CORNERS), ("pressure", "Nm", CORNERS), ("turning", "Nm", TURNS))
 
 
-def _bearing(foot: Foot) -> ca.Function:
+def _make_bearing_function(foot: Foot) -> ca.Function:
     wrench, mu = SX.sym("wrench", 6), SX.sym("mu")
     limits = balance.sole_limits(wrench, (-foot.back_m, foot.front_m), (-foot.right_m, foot.left_m), mu)
     return ca.Function("bearing", [wrench, mu], list(limits))

@@ -9,7 +9,16 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.formulation import Array, Assembly, Grid, InstantPoint, NumericPoint, Parameter, Signals, vector_columns
+from nlp_gait.formulation import (
+    Array,
+    Assembly,
+    Grid,
+    InstantPoint,
+    NumericPoint,
+    Parameter,
+    Signals,
+    make_vector_columns,
+)
 from nlp_gait.formulation.assembly import Point, RowsOverTime, Variable
 from nlp_gait.formulation.display import SIMULATED
 from nlp_gait.formulation.gait_problem import Start
@@ -17,7 +26,7 @@ from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant, Loader, Planner, Samples, Trace
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.tape import simplify, tabulate_last_input
@@ -27,13 +36,13 @@ Derivatives = Literal["analytic", "finite-difference"]
 
 # Force of the ground on each sole, and its moment about the point under the ankle.
 WRENCHES = {
-    f"{foot}_{half}": vector_columns(unit)
+    f"{foot}_{half}": make_vector_columns(unit)
     for foot in BOTH_FEET.values()
     for half, unit in (("force", "N"), ("moment", "Nm"))
 }
 COLUMNS = {
-    "zmp": vector_columns("m", "xy"),
-    **{name: vector_columns("m") for name in ("hip", "com", "left_foot", "right_foot")},
+    "zmp": make_vector_columns("m", "xy"),
+    **{name: make_vector_columns("m") for name in ("hip", "com", "left_foot", "right_foot")},
     **WRENCHES,
 }
 
@@ -143,25 +152,25 @@ class Phase:
         n = self.grid.parts + 1
         rows = [self.body.joints.index(name) for name in self.moving]
         torque, zmp, *wrenches = self._signal_loads.map(n)(q[rows, :], qd[rows, :], qdd[rows, :], hip, world)
-        com, left, right, *_ = (_numbers(part) for part in ca.vertsplit(world, 3))
-        halves = (_numbers(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
+        com, left, right, *_ = (_to_array(part) for part in ca.vertsplit(world, 3))
+        halves = (_to_array(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
-            "t": _numbers(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
-            "q": _numbers(q),
-            "qd": _numbers(qd),
-            "qdd": _numbers(qdd),
-            "tau": _numbers(torque),
-            "zmp": _numbers(zmp),
-            "hip": _numbers(hip),
+            "t": _to_array(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
+            "q": _to_array(q),
+            "qd": _to_array(qd),
+            "qdd": _to_array(qdd),
+            "tau": _to_array(torque),
+            "zmp": _to_array(zmp),
+            "hip": _to_array(hip),
             "com": com,
             "left_foot": left,
             "right_foot": right,
             **dict(zip(WRENCHES, halves, strict=True)),
         }
         if attitude.shape[0]:
-            arrays["attitude"] = _numbers(attitude)
+            arrays["attitude"] = _to_array(attitude)
         if self._exact_plan[1].yaw.shape[0]:
-            yaw = _numbers(world)[:, -1]
+            yaw = _to_array(world)[:, -1]
             arrays["feet_yaw"] = np.stack([np.zeros(n), yaw], axis=1)
         columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
         return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
@@ -262,7 +271,7 @@ class Phase:
     ) -> ca.Function:
         """One sample: motion, hip, planned angles, reach, world (mass centre, feet, planned wrench, yaw), attitude, traces."""
         planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
-        tree = tree_from(self.body.robot, self.body.robot.feet["left"].link)
+        tree = make_tree(self.body.robot, self.body.robot.feet["left"].link)
         angles = {name: joint.position for name, joint in plan.joints.items()}
         com = centre_of_mass(tree, forward_kinematics(tree, angles, plan.ankles["L"]))
         soles = [
@@ -349,5 +358,5 @@ def _stack_motions(plan: Instant, joints: Sequence[str]) -> list[SX]:
     return [ca.vertcat(*(plan.joints[name][order] for name in joints)) for order in range(3)]
 
 
-def _numbers(values: Any) -> Array:
+def _to_array(values: Any) -> Array:
     return np.ascontiguousarray(DM(values).full().T)  # in one order: sums over joints round as those of copies do

@@ -16,7 +16,7 @@ from nlp_gait.formulation import Array
 from nlp_gait.gaits.biped.body import Body, PhaseName
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.tape import simplify
 from nlp_gait.symbolic.trajectories import Motion
@@ -124,7 +124,7 @@ class FreeParts(NamedTuple):
 
 def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
     """Return the places of torso and right foot of a robot with its left ankle at ``support`` [m], from joint angles [rad]."""
-    tree = tree_from(robot, robot.feet["left"].link)
+    tree = make_tree(robot, robot.feet["left"].link)
     found = forward_kinematics(tree, q, SX(DM(support)))
     poses = {body.link.name: pose for body, pose in zip(tree, found, strict=True)}
     torso = poses[robot.root]
@@ -168,7 +168,7 @@ def make_instant_function(body: Body, loads: Loader) -> ca.Function:
     found = loads(Instant(joints=motions, hip=torso, ankles={"L": support, "R": ankle}))
     torque = ca.vertcat(*(found.torques[name] for name in joints))
     angles = dict(zip(joints, ca.vertsplit(q), strict=True))
-    tree = tree_from(body.robot, body.robot.feet["left"].link)
+    tree = make_tree(body.robot, body.robot.feet["left"].link)
     com = centre_of_mass(tree, forward_kinematics(tree, angles, support))
     outputs = [torque, found.zmp, torso, hip, ca.jtimes(hip, q, qd), ankle, ca.vec(corners), com]
     outputs += [found.wrenches[side] for side in BOTH_FEET]

@@ -73,7 +73,7 @@ class Samples:
         return ca.fmax(self.duration, LEAST_DURATION) / self.steps
 
 
-def time_mean(values: MX) -> MX:
+def average_over_time(values: MX) -> MX:
     """Compute the means of rows (m, N + 1) over equidistant samples by the trapezoidal rule."""
     n = values.shape[1]
     weights = np.full(n, 1.0 / (n - 1))

@@ -9,7 +9,7 @@ from casadi import SX
 from nlp_gait.formulation import Array, Signals
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sole, make_flat_skeleton, make_rectangle
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import forward_kinematics
 
 ON_GROUND = 1e-6  # [m]; a higher sole does not bear load
@@ -21,18 +21,18 @@ def draw_robot(robot: Robot, signals: Signals) -> Skeleton:
     arrays, at = signals.arrays, locate_links(robot, signals)
     limbs, soles = [], []
     for side in (LEFT, RIGHT):
-        leg = [at[link] for link in _chain(robot, robot.feet[side].link)]
+        leg = [at[link] for link in _list_chain(robot, robot.feet[side].link)]
         limbs.append(Limb(side=side, points=np.stack([*leg, arrays[f"{side}_foot"]], axis=1)))
         yaw = arrays["feet_yaw"][:, (LEFT, RIGHT).index(side)] if "feet_yaw" in arrays else None
         soles.append(make_level_sole(robot, side, arrays[f"{side}_foot"], yaw))
-    feet = {link for side in (LEFT, RIGHT) for link in _chain(robot, robot.feet[side].link)[1:]}
-    height = -min(float(_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
+    feet = {link for side in (LEFT, RIGHT) for link in _list_chain(robot, robot.feet[side].link)[1:]}
+    height = -min(float(_place_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
     parents = {joint.parent for joint in robot.joints.values()}
     for tip in (link for link in robot.links if link not in parents):
-        chain = _chain(robot, tip)
+        chain = _list_chain(robot, tip)
         if feet & set(chain):
             continue
-        far = _at_zero(robot, tip)
+        far = _place_at_zero(robot, tip)
         if np.linalg.norm(far) < SHORTEST_SHARE * height:
             continue
         side = TRUNK if abs(far[1]) < 0.1 * height else LEFT if far[1] > 0 else RIGHT
@@ -49,18 +49,18 @@ def make_level_sole(robot: Robot, side: str, centre: Array, yaw: Array | None = 
     return Sole(side=side, corners=centre[:, None, :] + outline, supports=centre[:, 2] <= ON_GROUND)
 
 
-def _chain(robot: Robot, link: str) -> list[str]:
+def _list_chain(robot: Robot, link: str) -> list[str]:
     return [robot.root, *(joint.child for joint in reversed(robot.path_to_root(link)))]
 
 
-def _at_zero(robot: Robot, link: str) -> Array:
+def _place_at_zero(robot: Robot, link: str) -> Array:
     """Position (3,) of a link's joint from the root at zero angles [m]."""
     return np.sum([(0.0, 0.0, 0.0), *(joint.origin_m for joint in robot.path_to_root(link))], axis=0)
 
 
 def place_links(robot: Robot, angles: Mapping[str, SX], left_ankle: SX) -> dict[str, SX]:
     """Return places (3,) of every link's joint and tip, its centre of mass, from the left ankle [m]; other joints are at zero."""
-    tree = tree_from(robot, robot.feet[LEFT].link)
+    tree = make_tree(robot, robot.feet[LEFT].link)
     places: dict[str, SX] = {}
     poses = forward_kinematics(tree, dict.fromkeys(robot.joints, SX(0)) | dict(angles), left_ankle)
     for body, pose in zip(tree, poses, strict=True):

@@ -10,7 +10,7 @@ from casadi import SX
 
 from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
-from nlp_gait.gaits.biped.curves import PhaseTrajectory, hip_on_spline
+from nlp_gait.gaits.biped.curves import PhaseTrajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, FootClearance, Margins, compute_margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
@@ -87,7 +87,7 @@ def place_soles(body: Body, step_m: float) -> dict[str, Point2]:
     return {"L": (step_m, left), "R": (2 * step_m, right)}
 
 
-def hip_ends(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
+def place_hip(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
     """Return the hip's x, from a sixth of a step ahead of the rear foot to one behind the front foot, and y, at both ends [m]."""
     (rear_x, left_y), (front_x, right_y) = soles["L"], soles["R"]
     sixth = (front_x - rear_x) / 6
@@ -110,7 +110,7 @@ def make_support_phase(
     a step ahead of the left one, to lift-off of the left one.
     """
     swings, soles, stance = name == "ssp", place_soles(body, step_m), place_stance(body, step_m)
-    hip_places = (stance.hip_x, stance.hip_y) if swings else hip_ends(body, soles)
+    hip_places = (stance.hip_x, stance.hip_y) if swings else place_hip(body, soles)
     standing = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
     sharing = sharing or LoadSharing(make_single_support_loads(body))
     splines = body.make_splines(name, trajectory)
@@ -128,7 +128,7 @@ def make_support_phase(
     def state(at: InstantPoint, s: SX) -> State:
         time = read_duration(at, name)
         more = splines.motions(at, time, s)
-        hip = hip_on_spline(at, more, *hip_places, time, s, splines.is_measured)
+        hip = move_hip(at, more, *hip_places, time, s, splines.is_measured)
         ankles = {**standing, "R": swing(at, more, body.ankle("R")[1], s)} if swings else standing
         return hip, body.angles(name, at, more, time, s), ankles
 

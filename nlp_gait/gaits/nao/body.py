@@ -17,7 +17,7 @@ from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao import joints as nao_joints
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import partner, point_masses, weld
+from nlp_gait.robots.tree import find_partner, make_point_masses, weld
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
@@ -86,7 +86,7 @@ def find_upright_links(robot: Robot) -> frozenset[str]:
     return frozenset((robot.root, *hips, *(foot.link for foot in robot.feet.values())))
 
 
-def arm_joints(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:
+def move_arms(swing: Mapping[str, tuple[float, float]], duration: SX, phase: SX) -> dict[str, Motion]:
     """Return the joint motions of both arms: those in ``swing`` as cubics from rest to rest [rad], the others held."""
     still = SX(0)
     moved = {name: cubic(SX(a), SX(b), still, still, duration, phase) for name, (a, b) in swing.items()}
@@ -112,7 +112,7 @@ class AnkleCoupling(Limit):
         found = []
         for side, sign, columns in (("L", 1.0, (1, 2)), ("R", -1.0, (2, 1))):
             pitch, roll = (angles[f"{side}{joint}"].T for joint in ("AnklePitch", "AnkleRoll"))
-            least, greatest = (sign * ankle_roll(pitch, column) for column in columns)
+            least, greatest = (sign * limit_ankle_roll(pitch, column) for column in columns)
             found += [
                 make_rows(f"{side}AnkleRoll_least", "rad", roll - least, MX(0.0), None, names, "instant"),
                 make_rows(f"{side}AnkleRoll_greatest", "rad", roll - greatest, None, MX(0.0), names, "instant"),
@@ -120,7 +120,7 @@ class AnkleCoupling(Limit):
         return found, {}
 
 
-def ankle_roll(pitch: MX, column: int) -> MX:
+def limit_ankle_roll(pitch: MX, column: int) -> MX:
     """Return the least (column 1) or greatest (2) roll of the left ankle over its pitch [rad], constant beyond the table."""
     corners = np.array(ANKLE_ROLL)
     slopes = np.diff(corners[:, column]) / np.diff(corners[:, 0])
@@ -240,10 +240,10 @@ def make_nao(robot: str, *, rotational_inertia: bool = True, motors: str = "", a
         title="NAO",
         full=load_robot(robot),
         simulated=simulated,
-        motors=parse_nao_motors(motors, simulated if rotational_inertia else point_masses(simulated)),
+        motors=parse_nao_motors(motors, simulated if rotational_inertia else make_point_masses(simulated)),
         joints=nao_joints.JOINTS,
         planned=nao_joints.PLANNED_JOINTS,
-        images=tuple(map(partner, nao_joints.JOINTS)),
+        images=tuple(map(find_partner, nao_joints.JOINTS)),
         leg_joints={side: tuple(joint for joint in nao_joints.JOINTS if joint.startswith(side)) for side in "LR"},
         coordinates=(ARM_COORDINATE,),
         upright=find_upright_links(simulated),

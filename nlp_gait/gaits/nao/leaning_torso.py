@@ -40,7 +40,7 @@ class LeaningNao(NaoBody):
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         places = {side: ankle.position for side, ankle in ankles.items()}
-        joints, reach = solve_leaning_legs(self.robot, hip, lean_of(angles), places, margin, ops)
+        joints, reach = solve_leaning_legs(self.robot, hip, read_lean(angles), places, margin, ops)
         arms = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
         arms |= {name: motion for name, motion in angles.items() if name not in LEAN}
         return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=reach)
@@ -51,7 +51,7 @@ class LeaningNao(NaoBody):
         def close(at: InstantPoint, s: SX) -> tuple[SX, SX]:
             hip, angles, ankles = state(at, s)
             places = {side: ankle.position for side, ankle in ankles.items()}
-            return close_chain(self.robot, ca.vertcat(hip.position, lean_of(angles).position), places)
+            return close_chain(self.robot, ca.vertcat(hip.position, read_lean(angles).position), places)
 
         yaw_pitch = AngleLimits("other_angle", self.robot, YAW_PITCHES[:1], lambda at, s: close(at, s)[0])
         return (*super().make_curve_limits(phase, count, state), yaw_pitch, FlatSoles(lambda at, s: close(at, s)[1]))
@@ -75,7 +75,7 @@ class FlatSoles(Limit):
         return [make_rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
 
 
-def lean_of(angles: Angles) -> Motion:
+def read_lean(angles: Angles) -> Motion:
     """Return roll and pitch of the torso (2,) [rad]."""
     # Without splines the lean is a structural zero, which the chain rule does not take.
     return Motion(*map(ca.densify, stack(*(angles[name] for name in LEAN))))
@@ -103,16 +103,16 @@ def solve_leaning_legs(
         Sole and knee have the angles of Gupta, Pratihar, Deb (2023), eqs. (5)-(14); those at the hip follow from the torso's
         turn. The formulation is this package's own.
     """
-    moved = map_motion(lambda pose: _hips(robot, pose, ankles), stack(torso, lean))
-    yaw_pitch, *sides = (_part(moved, rows) for rows in (slice(0, 1), slice(1, 6), slice(6, 11)))
+    moved = map_motion(lambda pose: _place_hips(robot, pose, ankles), stack(torso, lean))
+    yaw_pitch, *sides = (_select_rows(moved, rows) for rows in (slice(0, 1), slice(1, 6), slice(6, 11)))
     joints: dict[str, Motion] = {}
     reach: list[SX] = []
     for side, hip in zip("LR", sides, strict=True):
         geometry = measure_leg(robot, side)
         to_ankle = add_motions(Motion(ankles[side], SX(3, 1), SX(3, 1)), Motion(*(-part[:3] for part in hip)))
         leg = leg_angles(to_ankle, geometry.thigh_m, geometry.tibia_m, margin, ops)
-        _, pitch, *below = (_part(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
-        at_hip = (_part(hip, slice(3, 4)), add_motions(pitch, _part(hip, slice(4, 5))))
+        _, pitch, *below = (_select_rows(leg.joints, slice(i, i + 1)) for i in range(len(LEG_JOINTS)))
+        at_hip = (_select_rows(hip, slice(3, 4)), add_motions(pitch, _select_rows(hip, slice(4, 5))))
         joints |= {f"{side}{name}": motion for name, motion in zip(LEG_JOINTS, (*at_hip, *below), strict=True)}
         joints[f"{side}HipYawPitch"] = yaw_pitch
         reach.append(leg.reach)
@@ -122,20 +122,22 @@ def solve_leaning_legs(
 def close_chain(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> tuple[SX, SX]:
     """Return the angle of the hips' yaw-pitch and that of each sole from flat (2,) [rad] at a pose (5,) of the torso."""
     turn = _solve_turn(robot, pose, ankles)
-    return turn[1], ca.vertcat(*(_misfit(robot, side, turn, pose, ankles[side]) for side in "LR"))
+    return turn[1], ca.vertcat(*(_compute_misfit(robot, side, turn, pose, ankles[side]) for side in "LR"))
 
 
-def _part(motion: Motion, rows: slice) -> Motion:
+def _select_rows(motion: Motion, rows: slice) -> Motion:
     return Motion(*(value[rows] for value in motion))
 
 
-def _hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
+def _place_hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     """(11,) of a pose (5,): yaw-pitch, and by side the hip (3,) [m], its roll, and its pitch beyond upright [rad]."""
     turn = _solve_turn(robot, pose, ankles)
     found = [turn[1]]
     for side in "LR":
-        hip, rotation = _hip(robot, side, turn, pose)
-        rest = rotation.T @ axis_rotation(FORWARD, _plane(hip, ankles[side]))  # roll about x, then the pitch about y
+        hip, rotation = _place_hip(robot, side, turn, pose)
+        rest = rotation.T @ axis_rotation(
+            FORWARD, _compute_plane(hip, ankles[side])
+        )  # roll about x, then the pitch about y
         found += [hip, ca.atan2(rest[2, 1], rest[1, 1]), ca.atan2(rest[0, 2], rest[0, 0])]
     return ca.vertcat(*found)
 
@@ -143,7 +145,7 @@ def _hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
 def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     """Solve for the torso's yaw and the hips' yaw-pitch (2,) with flat soles [rad], by Newton's method from zero."""
     turn, at = SX.sym("turn", 2), SX.sym("pose", 5)
-    misfits = ca.vertcat(*(_misfit(robot, side, turn, at, ankles[side]) for side in "LR"))
+    misfits = ca.vertcat(*(_compute_misfit(robot, side, turn, at, ankles[side]) for side in "LR"))
     slope = ca.jacobian(misfits, turn)
     step = ca.Function("step", [turn, at], [turn - ca.inv_minor(slope) @ misfits])
     found = SX(2, 1)
@@ -152,14 +154,14 @@ def _solve_turn(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     return found
 
 
-def _misfit(robot: Robot, side: str, turn: SX, pose: SX, ankle: SX) -> SX:
+def _compute_misfit(robot: Robot, side: str, turn: SX, pose: SX, ankle: SX) -> SX:
     """Sine of the angle between the knee's axis, which a flat sole gives, and the plane across the axis of the hip's roll."""
-    hip, rotation = _hip(robot, side, turn, pose)
-    plane = _plane(hip, ankle)
+    hip, rotation = _place_hip(robot, side, turn, pose)
+    plane = _compute_plane(hip, ankle)
     return ca.cos(plane) * rotation[1, 0] + ca.sin(plane) * rotation[2, 0]
 
 
-def _hip(robot: Robot, side: str, turn: SX, pose: SX) -> tuple[SX, SX]:
+def _place_hip(robot: Robot, side: str, turn: SX, pose: SX) -> tuple[SX, SX]:
     """Hip joint (3,) [m] and rotation (3, 3) of the link above the hip's roll, in the world."""
     yaw, roll = robot.joint(f"{side}HipYawPitch"), robot.joint(f"{side}HipRoll")
     axes = (UP, TO_THE_LEFT, FORWARD)
@@ -169,6 +171,6 @@ def _hip(robot: Robot, side: str, turn: SX, pose: SX) -> tuple[SX, SX]:
     return pose[:3] + torso @ DM(yaw.origin_m) + pelvis @ DM(roll.origin_m), pelvis
 
 
-def _plane(hip: SX, ankle: SX) -> SX:
+def _compute_plane(hip: SX, ankle: SX) -> SX:
     """Roll of a leg's plane against upright, from hip and ankle (3,) [rad] (see ``leg_angles``)."""
     return ca.atan2(ankle[1] - hip[1], hip[2] - ankle[2])

@@ -26,14 +26,14 @@ from nlp_gait.gaits.biped.recorded_cycle import (
     make_refinable,
 )
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, RecordedMotion, make_places_function
-from nlp_gait.gaits.biped.support_phases import hip_ends, make_support_phase, place_soles, place_stance
+from nlp_gait.gaits.biped.support_phases import make_support_phase, place_hip, place_soles, place_stance
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
 from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES, check_step_length
 from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
-from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, power_form_maker
-from nlp_gait.gaits.nao.least_power.power_instants import double_support_instants, single_support_instants
+from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, make_power_form_maker
+from nlp_gait.gaits.nao.least_power.power_instants import make_double_support, make_single_support
 
 
 @maker
@@ -60,7 +60,7 @@ def nao_ssp(
     power_form = None
     if (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS and samples_per_interval < 2:
         places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
-        power_form = power_form_maker(body.robot, partial(single_support_instants, *places))
+        power_form = make_power_form_maker(body.robot, partial(make_single_support, *places))
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
     phase = make_support_phase(body, "ssp", step_length_m, trajectory, grid, goal, derivatives=derivatives)
     return replace(make_phase_problem("ssp", SINGLE_SUPPORT, phase), power_form=power_form)
@@ -100,8 +100,8 @@ def nao_dsp(
     paper = (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS
     if paper and samples_per_interval < 2 and torso_share != "free":
         soles = place_soles(body, step_length_m)
-        places = (soles, hip_ends(body, soles), ARM_SWING["dsp"])
-        power_form = power_form_maker(body.robot, partial(double_support_instants, body.robot, *places, torso_share))
+        places = (soles, place_hip(body, soles), ARM_SWING["dsp"])
+        power_form = make_power_form_maker(body.robot, partial(make_double_support, body.robot, *places, torso_share))
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
     phase = make_support_phase(body, "dsp", step_length_m, trajectory, grid, goal, sharing, derivatives)
@@ -239,7 +239,7 @@ def nao_dsp_free(
 GAITS = ("nao-ssp", "nao-dsp", "nao-cycle")
 
 
-def motion_of(angles: JointAngles, body: Body) -> RecordedMotion:
+def read_motion(angles: JointAngles, body: Body) -> RecordedMotion:
     """Return the motion of a robot on its left foot; mirrored if the right one stands. Arms that are missing are held.
 
     Raises InputError if a joint of the legs is missing, or times or angles are missing or out of order.
@@ -285,7 +285,7 @@ def make_recorded_gait(
         raise InputError(f"a motion is judged by the limits of {', '.join(GAITS)}, got {gait!r}")
     cycles = make_nao_cycles(robot, intervals)
     body = cycles.body
-    motion = motion_of(angles, body)
+    motion = read_motion(angles, body)
     phases: dict[PhaseName, tuple[float, float]]
     if touch_down_s is None and gait in ("nao-ssp", "nao-dsp"):
         phases = {"ssp" if gait == "nao-ssp" else "dsp": (0.0, motion.duration_s)}
@@ -316,11 +316,11 @@ def make_recorded_gait(
         motion=motion,
         step_m=step,
         lean_deg=float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))),
-        make_planned=partial(_planned_problem, found, problem, x, step),
+        make_planned=partial(_load_planned, found, problem, x, step),
     )
 
 
-def _planned_problem(gait: str, recorded: GaitProblem, x: Sequence[float], step_m: float) -> GaitProblem:
+def _load_planned(gait: str, recorded: GaitProblem, x: Sequence[float], step_m: float) -> GaitProblem:
     options = {key: recorded.options[key] for key in ("robot", "intervals")}
     problem = load(gait, **options) if gait == "nao-cycle" else load(gait, step_length_m=step_m, **options)
     fixed = dict(zip(recorded.names, x, strict=True))

@@ -12,7 +12,7 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED, solve_legs_by_network
-from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, posture, stair_height
+from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_posture, compute_stair_height
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic import quantised
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -126,7 +126,7 @@ class ClosedLoop:
         constants = ca.vertcat(size, *(point[name] for name in (*contact, "gravity_compensation", "disturbance_Nm")))
         acted = slice(1, None) if self.scheme == "implicit" else slice(None, -1)
         if self.base == "stance-foot":
-            ahead = biped.toe_foot_biped().foot_m * (self.base_point == "T'")
+            ahead = biped.load_toe_foot_biped().foot_m * (self.base_point == "T'")
             place, speed = MX(DM([[ahead] * (self.quanta + 1), [0] * (self.quanta + 1)])), MX(2, self.quanta + 1)
         base = ca.vertcat(place[:, :-1], speed[:, acted], (speed[:, 1:] - speed[:, :-1]) / QUANTUM)
         on_slope = ca.fmax(DM(times[None, 1:]) < point["t2_s"], point["slope_in_single_support"])
@@ -153,7 +153,7 @@ class ClosedLoop:
     def find_stance_ankle(self, rollout: Rollout) -> MX:
         """Return its place (2, m) in a rollout [m]."""
         q, place = SX.sym("q", N), SX.sym("place", 2)
-        found = biped.points(q, place, self.base_point)["A'"]
+        found = biped.locate_points(q, place, self.base_point)["A'"]
         return ca.Function("ankle", [q, place], [found]).map(self.quanta)(rollout.state[:N, :], rollout.place)
 
     @cached_property
@@ -169,13 +169,15 @@ class ClosedLoop:
         """Return the equations of the acceleration within one quantum."""
         q, v = state
         place, speed, push = ca.vertsplit(parts["base"], [0, 2, 4, 6])
-        found = biped.points(q, place, self.base_point)
-        motion = biped.biped_dynamics(q, v, q, self.base_point)
-        momentum = sum((biped.rod(link).mass_kg * middle for link, middle in biped.centres(found).items()), SX(2, 1))
+        found = biped.locate_points(q, place, self.base_point)
+        motion = biped.make_dynamics(q, v, q, self.base_point)
+        momentum = sum(
+            (biped.get_rod(link).mass_kg * middle for link, middle in biped.locate_centres(found).items()), SX(2, 1)
+        )
         stair = Stair(parts["size"][0], parts["size"][1])
 
         def touch(point: SX) -> Contact:
-            height = point[1] - stair_height(point[0], stair, SETBACK, EDGE_WIDTH, self.kind)
+            height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH, self.kind)
             return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
 
         contacts = [touch(found[name]) for name in CONTACTS if name != self.base_point]
@@ -191,24 +193,24 @@ class ClosedLoop:
         """Function of (state, next state, given, tuned) to torques (9,) and ZMP, with a quantum's mean acceleration."""
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
-        G = biped.biped_dynamics(state.q, state.v, state.q, self.base_point).G
+        G = biped.make_dynamics(state.q, state.v, state.q, self.base_point).G
         acted = following if self.scheme == "implicit" else state
         torque = quantised.controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
         place, push = parts["base"][:2], parts["base"][4:]
-        for link, middle in biped.centres(biped.points(state.q, place, self.base_point)).items():
-            mass = biped.rod(link).mass_kg
+        for link, middle in biped.locate_centres(biped.locate_points(state.q, place, self.base_point)).items():
+            mass = biped.get_rod(link).mass_kg
             velocity = ca.jtimes(middle, state.q, state.v)
             a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
             spin = parts["spin"] * acceleration[biped.LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
             weight += mass * (a[1] + biped.GRAVITY)
             pull += mass * a[0]
             moment += (
-                mass * (middle[0] * (a[1] + biped.GRAVITY) - middle[1] * a[0]) - biped.rod(link).inertia_kgm2 * spin
+                mass * (middle[0] * (a[1] + biped.GRAVITY) - middle[1] * a[0]) - biped.get_rod(link).inertia_kgm2 * spin
             )
-        least = biped.LEAST_LOAD * biped.toe_foot_biped().mass_kg * biped.GRAVITY
+        least = biped.LEAST_LOAD * biped.load_toe_foot_biped().mass_kg * biped.GRAVITY
         zmp = moment / ca.fmax(weight - parts["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
             "outcome",
@@ -236,7 +238,7 @@ def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)
-    step = posture(plan, Stair(size[0], size[1]), s, passing / plan.durations, margin, ops, kind)
+    step = compute_posture(plan, Stair(size[0], size[1]), s, passing / plan.durations, margin, ops, kind)
     given = ca.vertcat(values, size, margin)
     angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
     motion = [*angles, step.hip.position, step.hip.velocity]

@@ -42,17 +42,17 @@ MODEL_JOINT = {
 
 
 @cache
-def rigid_bodies() -> Robot:
+def make_rigid_bodies() -> Robot:
     """Return the tree from the torso, whose frame is at the hip; in the zero pose it stands upright with straight legs."""
-    paper = biped.toe_foot_biped()
-    levers = {"Hip": biped.rod("HK").length_m + biped.rod("KA").length_m, "Knee": biped.rod("KA").length_m}
+    paper = biped.load_toe_foot_biped()
+    levers = {"Hip": biped.get_rod("HK").length_m + biped.get_rod("KA").length_m, "Knee": biped.get_rod("KA").length_m}
     levers |= {"Ankle": paper.foot_m, "Toe": paper.toe_m}
-    links = {TORSO: _link(TORSO, biped.rod("UH"), (0.0, 0.0, 1.0))}
+    links = {TORSO: _link(TORSO, biped.get_rod("UH"), (0.0, 0.0, 1.0))}
     joints, feet, toes = {}, {}, {}
     for letter, (side, _) in SIDES.items():
         parent, origin = TORSO, (0.0, 0.0, 0.0)
         for joint, (part, paper_name) in LEG.items():
-            link, name = biped.rod(paper_name), f"{side} {part}"
+            link, name = biped.get_rod(paper_name), f"{side} {part}"
             along: Vector = (0.0, 0.0, -1.0) if joint in ("Hip", "Knee") else (1.0, 0.0, 0.0)
             links[name] = _link(name, link, along)
             torque = paper.mass_kg * biped.GRAVITY * levers[joint]
@@ -61,7 +61,7 @@ def rigid_bodies() -> Robot:
             )
             parent, origin = name, (link.length_m * along[0], link.length_m * along[1], link.length_m * along[2])
         feet[side], toes[side] = (
-            _plate(f"{side} {part}", biped.rod(of).length_m) for part, of in (LEG["Ankle"], LEG["Toe"])
+            _make_plate(f"{side} {part}", biped.get_rod(of).length_m) for part, of in (LEG["Ankle"], LEG["Toe"])
         )
     return Robot(
         name=paper.name,
@@ -75,9 +75,9 @@ def rigid_bodies() -> Robot:
     )
 
 
-def joint_angles(q: Array, *, rates: bool = False) -> Array:
+def compute_joint_angles(q: Array, *, rates: bool = False) -> Array:
     """Return joint angles (T, 8) from absolute link angles (T, 9) in the order of ``LINKS``; with ``rates``, rates."""
-    turned = _forward_turns(q, 0.0 if rates else 1.0)
+    turned = _compute_turns(q, 0.0 if rates else 1.0)
     columns = []
     for _, mark in SIDES.values():
         before = "UH"
@@ -88,13 +88,13 @@ def joint_angles(q: Array, *, rates: bool = False) -> Array:
     return np.stack(columns, axis=1)
 
 
-def joint_torques(model: Array, stance_toe: Array) -> Array:
+def compute_joint_torques(model: Array, stance_toe: Array) -> Array:
     """Return joint torques (T, 8) from ``loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
     found = {name: sense * model[:, biped.JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
     return np.stack([found.get(name, stance_toe) for name in JOINTS], axis=1)
 
 
-def _forward_turns(q: Array, share: float) -> dict[str, Array]:
+def _compute_turns(q: Array, share: float) -> dict[str, Array]:
     """Return the rotation of every link about the axis to the left from the zero pose; ``share`` 0 for rates."""
     upright = share * np.pi / 2
     zero = {"UH": -upright, "AS": 0.0, "ST": 0.0}
@@ -113,31 +113,31 @@ def _link(name: str, rod: biped.PlanarLink, along: Vector) -> Link:
     return Link(name=name, mass_kg=rod.mass_kg, com_m=(x, y, z), inertia_com_kgm2=tensor)
 
 
-def _plate(link: str, length: float) -> Foot:
+def _make_plate(link: str, length: float) -> Foot:
     half = FOOT_HALF_WIDTH
     return Foot(link=link, ankle_height_m=0.0, front_m=length, back_m=0.0, left_m=half, right_m=half)
 
 
-def skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+def make_skeleton(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
     """Return the skeleton of the robot on its stair."""
     history = signals.arrays.get("link_q", signals.arrays["q"])  # absolute angles of the moving links, or of all
     samples = len(signals.arrays["t"])
     if history.shape[1] == len(biped.MOVING):
         history = np.hstack([history, signals.arrays.get("stance_foot", np.zeros((samples, 2)))])
     at = _locate_points(history, signals.arrays.get("stance_ankle", np.zeros((samples, 2))))
-    tread, rise = _stair(parameters)
+    tread, rise = _measure_stair(parameters)
     first, second = -SETBACK, tread - SETBACK
     edges = [(-1.6 * tread, -1), (first, -1), (first, 0), (second, 0), (second, 1), (1.8 * tread, 1)]
     ground = np.array([(x, level * rise) for x, level in edges])
     zmp = signals.arrays.get("zmp")
     if zmp is not None:
-        zmp = _sagittal(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)]))
-    lines = {side: np.stack([_sagittal(at[name]) for name in names], axis=1) for side, names in LINES.items()}
+        zmp = _make_spatial(np.column_stack([zmp.reshape(samples, -1)[:, 0], np.zeros(samples)]))
+    lines = {side: np.stack([_make_spatial(at[name]) for name in names], axis=1) for side, names in LINES.items()}
     limbs = tuple(Limb(side=side, points=points) for side, points in lines.items())
     return Skeleton(t=signals.arrays["t"], limbs=limbs, soles=(), ground=ground, com=None, zmp=zmp, planar=True)
 
 
-def _sagittal(points: Array) -> Array:
+def _make_spatial(points: Array) -> Array:
     """(T, 3) from (T, 2) of x and z."""
     return np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
 
@@ -154,19 +154,21 @@ class StepMotion(NamedTuple):
     double_support_s: float  # duration of load on the rear foot, finally on its toe
 
 
-def simulation_model(step_motion: Callable[[NumericPoint], StepMotion], *, repeats: bool = False) -> SimulationModel:
+def make_simulation_model(
+    step_motion: Callable[[NumericPoint], StepMotion], *, repeats: bool = False
+) -> SimulationModel:
     """Return the engine's model of a step; one that repeats ends as it began, one step up and with the legs exchanged."""
 
     def motion(at: NumericPoint, steps: int) -> Signals:
-        _, rise = _stair(at)
-        return repeat_steps(_signals(step_motion(at), rise), rigid_bodies(), steps, rise_m=rise)
+        _, rise = _measure_stair(at)
+        return repeat_steps(_make_signals(step_motion(at), rise), make_rigid_bodies(), steps, rise_m=rise)
 
     def ground(at: NumericPoint, steps: int) -> tuple[Tread, ...]:
-        tread, rise = _stair(at)
+        tread, rise = _measure_stair(at)
         return tuple(Tread(edge_m=k * tread - SETBACK, height_m=(k + 1) * rise) for k in range(steps + 1))
 
     return SimulationModel(
-        robot=rigid_bodies(), gravity=biped.GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True
+        robot=make_rigid_bodies(), gravity=biped.GRAVITY, repeats=repeats, motion=motion, ground=ground, planar=True
     )
 
 
@@ -181,7 +183,7 @@ def make_standing_step(
     at = _locate_points(q)
     carried = stance[:, 1] * pressure[:, 0] + toe[:, 1] * at["T"][:, 0] + sole[:, 1] * at["S"][:, 0]
     whole = stance[:, 1] + toe[:, 1] + sole[:, 1]
-    tau = joint_torques(torque, _stance_toe_torque(stance[:, 1], pressure[:, 0]))
+    tau = compute_joint_torques(torque, _compute_stance_toe_torque(stance[:, 1], pressure[:, 0]))
     return StepMotion(t, q, qd, qdd, tau, carried / whole, double_support_s)
 
 
@@ -199,13 +201,13 @@ def make_driven_step(t: Array, state: Array, torque: Array, pressure: Array, dou
     """
     q, qd = np.split(state, 2, axis=1)
     between = torque[:, : len(biped.MOVING)] @ np.linalg.inv(biped.JOINT_RATES)
-    tau = joint_torques(between, torque[:, biped.LINKS.index("S'T'")])
+    tau = compute_joint_torques(between, torque[:, biped.LINKS.index("S'T'")])
     return StepMotion(t - t[0], q, qd, np.gradient(qd, t, axis=0), tau, pressure, double_support_s - t[0])
 
 
-def _signals(step: StepMotion, rise: float) -> Signals:
+def _make_signals(step: StepMotion, rise: float) -> Signals:
     at = _locate_points(step.q)
-    lean = _forward_turns(step.q, 1.0)["UH"]  # from upright, forward
+    lean = _compute_turns(step.q, 1.0)["UH"]  # from upright, forward
     still = np.zeros_like(lean)
     rear = (step.t <= step.double_support_s) | (step.t == step.t[-1])  # it lands at the end
 
@@ -215,9 +217,9 @@ def _signals(step: StepMotion, rise: float) -> Signals:
 
     arrays = {
         "t": step.t,
-        "q": joint_angles(step.q),
-        "qd": joint_angles(step.qd, rates=True),
-        "qdd": joint_angles(step.qdd, rates=True),
+        "q": compute_joint_angles(step.q),
+        "qd": compute_joint_angles(step.qd, rates=True),
+        "qdd": compute_joint_angles(step.qdd, rates=True),
         "tau": step.tau,
         "zmp": np.column_stack([step.pressure, still]),
         "hip": lift(at["H"]),
@@ -230,14 +232,14 @@ def _signals(step: StepMotion, rise: float) -> Signals:
     return Signals(joints=JOINTS, arrays=arrays, columns=SIMULATED)
 
 
-def _stance_toe_torque(load: Array, pressure: Array) -> Array:
+def _compute_stance_toe_torque(load: Array, pressure: Array) -> Array:
     """(T,) torque of the standing toe from the foot's load [N] and its centre from the ankle [m]; none behind the joint."""
-    paper = biped.toe_foot_biped()
+    paper = biped.load_toe_foot_biped()
     weight = paper.link("ST").mass_kg * biped.GRAVITY * paper.toe_m / 2
     return np.maximum(load * (pressure - paper.sole_m) - weight, 0.0)
 
 
-def _stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float]:
+def _measure_stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float]:
     """Tread and rise [m]."""
     tread = float(at["stair_length_m"]) / 2
     return tread, tread * float(at["rise_run_ratio"])
@@ -246,7 +248,7 @@ def _stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float]:
 def _locate_points(q: Array, stance_ankle: Array | None = None) -> dict[str, Array]:
     """Return the places (T, 2) of joints and ends by name [m], for angles (T, 9); from the stance ankle, or from its place."""
     angles, ankle = SX.sym("q", len(biped.LINKS)), SX.sym("ankle", 2)
-    found = biped.points(angles, ankle)
+    found = biped.locate_points(angles, ankle)
     base = np.zeros((len(q), 2)) if stance_ankle is None else stance_ankle
     places = ca.Function("points", [angles, ankle], list(found.values())).map(len(q))(q.T, base.T)
     return {name: np.array(place.full().T) for name, place in zip(found, places, strict=True)}

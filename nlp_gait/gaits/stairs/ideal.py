@@ -17,9 +17,9 @@ from nlp_gait.formulation.assembly import Assembly, Constraint, NumericPoint, Ob
 from nlp_gait.formulation.blocks import Block, Layout
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
-from nlp_gait.gaits.stairs.display import StepMotion, make_standing_step, simulation_model, skeleton
+from nlp_gait.gaits.stairs.display import StepMotion, make_simulation_model, make_skeleton, make_standing_step
 from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING, StanceLoads
-from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, posture, stair_height
+from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, compute_posture, compute_stair_height
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 Ends = Literal["rest", "moving"]
@@ -85,7 +85,7 @@ def stairs_ideal(
         raise InputError(f"times must satisfy 0 < sole_off_s < toe_off_s < {STEP_TIME}, got {sole_off_s}, {toe_off_s}")
     sole_off, toe_off = (max(1, round(time / STEP_TIME * intervals)) for time in (sole_off_s, toe_off_s))
     step = IdealStep(intervals=intervals, sole_off=sole_off, toe_off=toe_off, ends=ends)
-    model = simulation_model(step.simulate, repeats=ends == "rest")
+    model = make_simulation_model(step.simulate, repeats=ends == "rest")
     return GaitProblem(
         name="stairs-ideal",
         title="Stairs, full trajectory optimisation: least effort",
@@ -94,7 +94,7 @@ def stairs_ideal(
         objective=Objective(name="effort", unit="1"),
         assemble=step.assemble,
         grid=Grid(intervals=intervals),
-        display=Display(motion=step.compute_signals, skeleton=skeleton, simulation_model=model),
+        display=Display(motion=step.compute_signals, skeleton=make_skeleton, simulation_model=model),
         hints=SolverHints(start=step.start, starts=3, searchable=False),
     )
 
@@ -141,12 +141,12 @@ class IdealStep:
             constraints=(
                 *self._motion(x, step),
                 *self._feet(x, point),
-                stair.grip("friction_toe", x["toe_force"], point["friction"]),
-                stair.grip("friction_sole", x["sole_force"], point["friction"]),
-                stair.grip("friction_stance", stance, point["stance_friction"]),
-                stair.stance_load(point, stance),
-                stair.stance_zmp(point, pressure),
-                stair.knee_limits("knee", x["angle"]),
+                stair.limit_grip("friction_toe", x["toe_force"], point["friction"]),
+                stair.limit_grip("friction_sole", x["sole_force"], point["friction"]),
+                stair.limit_grip("friction_stance", stance, point["stance_friction"]),
+                stair.limit_stance_load(point, stance),
+                stair.limit_stance_zmp(point, pressure),
+                stair.limit_knees("knee", x["angle"]),
             ),
             indexes={
                 "energy_J": step * ca.sum1(ca.fabs(ca.vec(torque * rate))),
@@ -165,7 +165,7 @@ class IdealStep:
             joints=JOINTS,
             arrays={
                 "t": np.linspace(0.0, float(at["step_time_s"]), self.intervals + 1),
-                **stair.joint_signals(values["angle"].T, values["rate"].T, acceleration),
+                **stair.make_joint_signals(values["angle"].T, values["rate"].T, acceleration),
                 "tau": torque,
                 "stance_force": force,
                 "zmp": pressure[:, 0],
@@ -206,7 +206,7 @@ class IdealStep:
         times = np.linspace(0.0, ends[-1], self.intervals + 1)
         fractions = np.clip((times - ends[:-1, None]) / np.diff(ends)[:, None], 0.0, 1.0)
         size = np.tile([[tread], [values["rise_run_ratio"] * tread]], self.intervals + 1)
-        angle = np.array(_angles().map(self.intervals + 1)(size, fractions))
+        angle = np.array(_make_angles_function().map(self.intervals + 1)(size, fractions))
         angle += NOISE * rng.standard_normal(angle.shape)
         step = values["step_time_s"] / self.intervals
         rate = np.gradient(angle, step, axis=1)
@@ -230,10 +230,10 @@ class IdealStep:
     def _instant(self) -> ca.Function:
         """Swing toe, sole, ankle and hip (2,) from the stance ankle, and heights (3,) of the first three above the stair [m]."""
         q, size = SX.sym("q", len(MOVING)), SX.sym("size", 2)
-        found = biped.points(biped.link_angles(q), SX(2, 1))
+        found = biped.locate_points(biped.link_angles(q), SX(2, 1))
         toe, sole, ankle, hip = (found[name] for name in "TSAH")
         on = Stair(size[0], size[1])
-        heights = [p[1] - stair_height(p[0], on, stair.SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
+        heights = [p[1] - compute_stair_height(p[0], on, stair.SETBACK, EDGE_WIDTH) for p in (toe, sole, ankle)]
         return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
 
     def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
@@ -244,13 +244,13 @@ class IdealStep:
         angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
         steps = range(1, n + 1)
         torso = v[MOVING.index("UH"), 1:n]
-        rest = _equal("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
-        still = _equal("torso_starts_still", v[MOVING.index("UH"), 0], ("UH",), (0,), "rad/s", 1.0)
+        rest = _make_equal_rows("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
+        still = _make_equal_rows("torso_starts_still", v[MOVING.index("UH"), 0], ("UH",), (0,), "rad/s", 1.0)
         return (
-            _equal("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
-            _equal("angle_continuity", angles, MOVING, steps, "rad", 0.1),
+            _make_equal_rows("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
+            _make_equal_rows("angle_continuity", angles, MOVING, steps, "rad", 0.1),
             rest if self.ends == "rest" else still,
-            _equal("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
+            _make_equal_rows("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
         )
 
     def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
@@ -260,40 +260,42 @@ class IdealStep:
         q = x["angle"]
         swing_toe, _, ankle, hip, heights = self._instant.map(n + 1)(q, ca.repmat(size, 1, n + 1))
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
-        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.toe_foot_biped().foot_m, 0) - size, 1, lift)
+        toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - size, 1, lift)
         ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
         flat_at = [0, n]
         if self.ends == "moving":
-            ends[:, 1] = swing_toe[:, n] - ca.vertcat(biped.toe_foot_biped().foot_m, 0) - size
+            ends[:, 1] = swing_toe[:, n] - ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - size
             flat_at = [0]
         advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
         def above(name: str, heights: MX, points: tuple[str, ...], instants: range) -> Constraint:
-            return stair.rows(name, heights, points, "m", 0.01, lower=point["clearance_m"], columns=instants)
+            return stair.make_rows(name, heights, points, "m", 0.01, lower=point["clearance_m"], columns=instants)
 
         return (
-            _equal("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
-            _equal("toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1),
-            _equal("foot_flat", flat[:, flat_at], ("AS", "ST"), tuple(flat_at), "rad", 0.1),
-            _equal("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
-            _equal("hip_advance", advance, AXES, (n,), "m", 0.01),
+            _make_equal_rows("toe_stands", toe, AXES, range(1, lift + 1), "m", 0.01),
+            _make_equal_rows(
+                "toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1
+            ),
+            _make_equal_rows("foot_flat", flat[:, flat_at], ("AS", "ST"), tuple(flat_at), "rad", 0.1),
+            _make_equal_rows("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
+            _make_equal_rows("hip_advance", advance, AXES, (n,), "m", 0.01),
             above("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), in_support),
             above("clearance_in_swing", heights[:, lift + 1 :], ("toe", "sole", "ankle"), in_swing),
         )
 
 
-def _equal(
+def _make_equal_rows(
     name: str, value: MX, of: tuple[str, ...], columns: range | tuple[int, ...], unit: str, scale: float
 ) -> Constraint:
     """Return rows value == 0."""
-    return stair.rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)
+    return stair.make_rows(name, value, of, unit, scale, lower=0.0, upper=0.0, columns=columns)
 
 
 @cache
-def _angles() -> ca.Function:
+def _make_angles_function() -> ca.Function:
     """Function (tread and rise (2,), fractions of the phases (4,)) to link angles (7,)."""
     size, s = SX.sym("size", 2), SX.sym("s", 4)
     plan = StairPlan(hip_start=size[0] / 2 - HIP_BEHIND, **{name: SX(value) for name, value in PLAN.items()})
-    found = posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
+    found = compute_posture(plan, Stair(size[0], size[1]), s, SX(4, 1), SX(REACH_MARGIN), Exact())
     return ca.Function("angles", [size, s], [found.q.position])

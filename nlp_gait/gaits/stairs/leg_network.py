@@ -15,12 +15,12 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.planar_biped import LINKS, rod
+from nlp_gait.gaits.stairs.planar_biped import LINKS, get_rod
 
 LEAST_KNEE_SINE = 1e-3
 
 
-def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
+def compute_leg_vector(angles: SX, thigh: float, shank: float) -> SX:
     """Return (2,) from hip to ankle, forward and up [m]; angles (2,) of thigh and shank are clockwise from forward [rad]."""
     forward = thigh * ca.cos(angles[0]) + shank * ca.cos(angles[1])  # (eq. 27)
     return ca.vertcat(forward, -thigh * ca.sin(angles[0]) - shank * ca.sin(angles[1]))  # (eq. 28)
@@ -29,14 +29,14 @@ def leg_vector(angles: SX, thigh: float, shank: float) -> SX:
 def compute_leg_rates(angles: SX, velocity: SX, thigh: float, shank: float) -> SX:
     """Return (2,) rates of thigh and shank [rad/s] for an ankle's velocity (2,) from the hip [m/s], damped at a straight knee."""
     (a, b), (c, d) = (
-        ca.vertsplit(row) for row in ca.horzsplit(ca.jacobian(leg_vector(angles, thigh, shank), angles).T)
+        ca.vertsplit(row) for row in ca.horzsplit(ca.jacobian(compute_leg_vector(angles, thigh, shank), angles).T)
     )
     determinant = a * d - b * c
     damped = determinant / (determinant**2 + (LEAST_KNEE_SINE * thigh * shank) ** 2)
     return damped * ca.vertcat(d * velocity[0] - b * velocity[1], a * velocity[1] - c * velocity[0])
 
 
-def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[SX, SX]:
+def compute_network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[SX, SX]:
     """Return angles (2,) of thigh and shank [rad] by one hidden layer, and the ankle's squared distance from a target (2,).
 
     The weights (4 h,) of h hidden nodes are those of the inputs (h, 2), then those of the outputs (2, h), by columns.
@@ -45,7 +45,7 @@ def network_error(weights: SX, target: SX, thigh: float, shank: float) -> tuple[
     inner, outer = ca.reshape(weights[: 2 * nodes], nodes, 2), ca.reshape(weights[2 * nodes :], 2, nodes)
     hip, knee = ca.vertsplit(outer @ (1 / (1 + ca.exp(-(inner @ target)))))
     angles = ca.vertcat(hip, hip + knee)
-    return angles, ca.sumsqr(leg_vector(angles, thigh, shank) - target)  # (eq. 29)
+    return angles, ca.sumsqr(compute_leg_vector(angles, thigh, shank) - target)  # (eq. 29)
 
 
 Rule = Literal["gradient", "adam"]
@@ -77,7 +77,7 @@ class NetworkSettings:
 
     @property
     def first_weights(self) -> Array:
-        """Normally distributed weights (4 h,) for ``network_error``."""
+        """Normally distributed weights (4 h,) for ``compute_network_error``."""
         rng = np.random.default_rng(self.seed)
         inner, outer = rng.standard_normal((self.hidden, 2)), rng.standard_normal((2, self.hidden))
         return np.concatenate([inner.ravel(order="F"), outer.ravel(order="F")])
@@ -99,9 +99,9 @@ class NetworkPath(NamedTuple):
     time_s: Array  # (m,) wall time
 
 
-def network_angles(hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings) -> NetworkPath:
+def train_angles(hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings) -> NetworkPath:
     """Return leg angles along a path (m, 2) from hip to ankle [m] (Algorithm 1); each pose starts from the last one's weights."""
-    training = _training(settings.hidden, thigh, shank)
+    training = _make_training_function(settings.hidden, thigh, shank)
     weights = settings.first_weights
     step = _Adam(settings.rate) if settings.rule == "adam" else lambda gradient: settings.rate * gradient
     rows = []
@@ -125,11 +125,11 @@ def solve_legs_by_network(desired: MX, settings: NetworkSettings) -> MX:
     columns = desired.shape[1]
     rows = ca.vertsplit(desired)
     for thigh, shank in LEGS:
-        lengths = rod(thigh).length_m, rod(shank).length_m
+        lengths = get_rod(thigh).length_m, get_rod(shank).length_m
         at = [LINKS.index(thigh), LINKS.index(shank)]
         at += [len(LINKS) + i for i in at]
         q, v, velocity = SX.sym("q", 2), SX.sym("v", 2), SX.sym("velocity", 2)
-        reached = leg_vector(q, *lengths)
+        reached = compute_leg_vector(q, *lengths)
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
         rates = ca.Function("rates", [q, velocity], [compute_leg_rates(q, velocity, *lengths)]).map(columns)
         targets, velocities = follow(ca.vertcat(*(rows[i] for i in at[:2])), ca.vertcat(*(rows[i] for i in at[2:])))
@@ -145,7 +145,7 @@ def _make_training_path(settings: NetworkSettings, thigh: float, shank: float, p
     Each pose starts from the weights of the last one and is trained by gradient steps until the ankle is near (Algorithm 1).
     """
     weights, target = SX.sym("weights", 4 * settings.hidden), SX.sym("target", 2)
-    angles, error = network_error(weights, target, thigh, shank)
+    angles, error = compute_network_error(weights, target, thigh, shank)
     trained = weights - settings.rate * (error > settings.tolerance_m2) * ca.gradient(error, weights)  # (eq. 30)
     step = ca.Function("step", [weights, target], [ca.cse(trained)])
     answer = ca.Function("answer", [weights, target], [angles])
@@ -160,10 +160,10 @@ def _make_training_path(settings: NetworkSettings, thigh: float, shank: float, p
 
 
 @cache
-def _training(nodes: int, thigh: float, shank: float) -> ca.Function:
+def _make_training_function(nodes: int, thigh: float, shank: float) -> ca.Function:
     """(weights, target) to the angles, the error and its gradient by the weights."""
     weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
-    angles, error = network_error(weights, target, thigh, shank)
+    angles, error = compute_network_error(weights, target, thigh, shank)
     return ca.Function("training", [weights, target], ca.cse([angles, error, ca.gradient(error, weights)]))
 
 

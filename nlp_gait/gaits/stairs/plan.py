@@ -16,19 +16,19 @@ from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import (
     StepMotion,
     compute_ground_force,
+    make_simulation_model,
+    make_skeleton,
     make_standing_step,
-    simulation_model,
-    skeleton,
 )
 from nlp_gait.gaits.stairs.plan_samples import (
     GROUND_SHARE,
     BalanceRule,
     PlannedStep,
     PlanSamples,
-    grid_at,
-    reach_function,
+    make_grid_at,
+    make_reach_function,
 )
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -115,7 +115,7 @@ def stairs_plan(
     def motion(at: NumericPoint) -> Signals:
         samples = planned.samples(at, Exact())
         arrays = {name: np.array(ca.evalf(value)).T for name, value in samples._asdict().items()}
-        moving = stair.joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
+        moving = stair.make_joint_signals(*(arrays.pop(name) for name in ("q", "qd", "qdd")))
         renamed = {"t": arrays.pop("time")[:, 0], "tau": arrays.pop("torque")}
         renamed["power"] = arrays.pop("power")[:, : len(JOINTS)]
         return Signals(joints=JOINTS, arrays={**renamed, **moving, **arrays}, columns=stair.COLUMNS)
@@ -130,7 +130,7 @@ def stairs_plan(
         toe = compute_ground_force(q, qd, qdd) - stance
         return make_standing_step(t[:, 0], q, qd, qdd, toe, np.zeros_like(toe), float(at["t2_s"]))
 
-    model = simulation_model(step_motion) if step == "next" and balance == "feet" else None
+    model = make_simulation_model(step_motion) if step == "next" and balance == "feet" else None
     return GaitProblem(
         name="stairs-plan",
         title="Stairs, planned step: least energy or jerk",
@@ -139,61 +139,64 @@ def stairs_plan(
         objective=OBJECTIVES[minimise],
         assemble=assemble,
         grid=Grid(intervals=intervals, refined_by="intervals"),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=model),
+        display=Display(motion=motion, skeleton=make_skeleton, simulation_model=model),
         hints=SolverHints(start=partial(_start, step, variables)),
         rows_over_time=tuple(
             RowsOverTime(
-                name=name, assemble=partial(_at_phases, planned, i), times=partial(_phase_times, i), means=("energy_J",)
+                name=name,
+                assemble=partial(_assemble_phase, planned, i),
+                times=partial(_find_phase_times, i),
+                means=("energy_J",),
             )
             for i, name in enumerate(PHASES)
         ),
     )
 
 
-def _phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]:
+def _find_phase_times(phase: int, values: Mapping[str, float]) -> tuple[float, float]:
     """Return the start and end of a phase [s]; the step begins at zero."""
     times = [0.0, *(values[name] for name in PHASE_ENDS)]
     return times[phase], times[phase + 1]
 
 
-def _at_phases(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: Nonsmooth) -> Assembly:
+def _assemble_phase(step: PlannedStep, phase: int, point: Point, fractions: MX, ops: Nonsmooth) -> Assembly:
     """Return the rows of one phase at fractions (1, k) of it; clearance has no reserve for the motion between samples here."""
-    grid = grid_at(phase, fractions)
+    grid = make_grid_at(phase, fractions)
     samples = step.samples(point, ops, grid)
     start, end = [MX(0), *(point[name] for name in PHASE_ENDS)][phase : phase + 2]
     share = {2: lambda s: GROUND_SHARE + (1 - GROUND_SHARE) * s, 3: lambda s: (1 - GROUND_SHARE) * s}.get(phase)
     clear: tuple[Constraint, ...] = ()
     if share is not None:
-        heights = step.clearances(point, ops, grid_at(phase, share(fractions)))
-        clear = (_clearance(heights, point["clearance_m"]),)
+        heights = step.clearances(point, ops, make_grid_at(phase, share(fractions)))
+        clear = (_limit_clearance(heights, point["clearance_m"]),)
     energy = (end - start) * ca.sum1(ca.sum2(ca.fabs(samples.power))) / fractions.shape[1]
     return Assembly(
-        objective=energy, constraints=(*_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
+        objective=energy, constraints=(*_make_rows_at(point, samples, step), *clear), indexes={"energy_J": energy}
     )
 
 
-def _clearance(heights: MX, least: MX) -> Constraint:
-    return stair.rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
+def _limit_clearance(heights: MX, least: MX) -> Constraint:
+    return stair.make_rows("clearance", heights, ("toe", "sole", "ankle"), "m", 0.01, lower=least)
 
 
-def _rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tuple[Constraint, ...]:
+def _make_rows_at(point: Point, samples: PlanSamples, step: PlannedStep) -> tuple[Constraint, ...]:
     """Return rows of reach, link angles, knees, accelerations and ground at every sample."""
     m = samples.q.shape[1]
     lower, upper = (MX(DM([stair.ANGLE_LIMITS[link][i] for link in MOVING] * m)) for i in range(2))
     most = point["acceleration_limit_rad_s2"]
-    links = stair.rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper)
+    links = stair.make_rows("link_angle", samples.q, MOVING, "rad", 0.1, lower=lower, upper=upper)
     if step.balance == "feet":
-        balance = stair.stance_zmp(point, samples.stance_pressure)
+        balance = stair.limit_stance_zmp(point, samples.stance_pressure)
     else:  # the ZMP of (49) between the outer contact points
         rear, front = ca.vertsplit(samples.support)
         ahead = ca.vertcat(samples.zmp - rear, front - samples.zmp)
-        balance = stair.rows("zmp", ahead, ("rear", "front"), "m", 0.01, lower=point["zmp_margin_m"])
+        balance = stair.make_rows("zmp", ahead, ("rear", "front"), "m", 0.01, lower=point["zmp_margin_m"])
     return (
-        stair.rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
-        *((links, stair.knee_limits("knee_angle", samples.q)) if step.angle_limits else ()),
-        stair.rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
-        stair.stance_load(point, samples.stance_force),
-        stair.grip("friction", samples.stance_force, point["friction"]),
+        stair.make_rows("reach", samples.reach, ("swing", "stance"), "1", 0.1, upper=1 - point["reach_margin"]),
+        *((links, stair.limit_knees("knee_angle", samples.q)) if step.angle_limits else ()),
+        stair.make_rows("link_acceleration", samples.qdd, MOVING, "rad/s^2", 10.0, lower=-most, upper=most),
+        stair.limit_stance_load(point, samples.stance_force),
+        stair.limit_grip("friction", samples.stance_force, point["friction"]),
         balance,
     )
 
@@ -202,22 +205,26 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     samples = step.samples(point, ops)
     jerk = step.jerk(samples, point["quantum_s"])
     exact = Exact()
-    pressure, rear, front = samples.stance_pressure.T, MX(0), MX(toe_foot_biped().foot_m)
+    pressure, rear, front = samples.stance_pressure.T, MX(0), MX(load_toe_foot_biped().foot_m)
     if step.balance == "polygon":
         pressure, rear, front = samples.zmp.T, samples.support[0, :].T, samples.support[1, :].T
     least_clearance = point["clearance_m"] + SAMPLING_RESERVE / step.per_phase**2
     ends = ca.vertcat(0, *(point[name] for name in PHASE_ENDS))
     durations, least = ends[1:] - ends[:-1], point["least_phase_s"]
     leaning = samples.qd[MOVING.index("K'A'"), 0]
-    rest = (stair.rows("rest", leaning, ("K'A'",), "rad/s", 0.1, lower=0.0, upper=0.0),) if step.kind == "first" else ()
+    rest = (
+        (stair.make_rows("rest", leaning, ("K'A'",), "rad/s", 0.1, lower=0.0, upper=0.0),)
+        if step.kind == "first"
+        else ()
+    )
     at_knots = step.jerk(samples, point["quantum_s"], knots=True)
     return Assembly(
         objective=step.energy(samples, ops)
         if minimise == "energy"
         else ops.largest(jerk if minimise == "jerk" else at_knots),
         constraints=(
-            *_rows_at(point, samples, step),
-            _clearance(step.clearances(point, ops), least_clearance),
+            *_make_rows_at(point, samples, step),
+            _limit_clearance(step.clearances(point, ops), least_clearance),
             Constraint(name="phase_duration", labels=PHASES, unit="s", scale=0.1, value=durations, lower=least),
             *rest,
         ),
@@ -250,7 +257,7 @@ def _start(
         plan = np.concatenate([x[: len(stair.GOVERNING_VARIABLES)], given])
         named = dict(zip(stair.GOVERNING, plan, strict=True))
         durations = np.diff([0.0, *(named[name] for name in PHASE_ENDS)])
-        out_of_reach = np.array(reach_function(PARTS_AT_START, kind)(plan, size, margin)) - (1 - margin)
+        out_of_reach = np.array(make_reach_function(PARTS_AT_START, kind)(plan, size, margin)) - (1 - margin)
         too_short = parameters["least_phase_s"] - durations
         violation = float(np.maximum(too_short, 0.0).sum() + np.maximum(out_of_reach, 0.0).sum())
         if not best.size or violation < least:

@@ -71,25 +71,25 @@ class PlannedStep:
     @cached_property
     def grid(self) -> tuple[DM, Array]:
         """Fractions of the phases and the current phase, (4, m) each, at the samples."""
-        return phase_grid([np.linspace(0.0, 1.0, self.per_phase + 1)] * len(PHASES))
+        return make_phase_grid([np.linspace(0.0, 1.0, self.per_phase + 1)] * len(PHASES))
 
     @cached_property
     def clearance_grid(self) -> tuple[DM, Array]:
         """The same for checks of the swing foot against the stair."""
         fine = np.linspace(GROUND_SHARE, 1.0, CLEARANCE_DENSITY * self.per_phase + 1)
-        return phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
+        return make_phase_grid([np.empty(0), np.empty(0), fine, 1.0 - fine[::-1]])
 
     def samples(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> PlanSamples:
         """Return the step at all samples, or at those of another grid."""
         s, passing = grid or self.grid
         if self.balance == "polygon":
-            return PlanSamples(*self._map_samples(balanced_function(ops, self.kind), point, s, passing))
+            return PlanSamples(*self._map_samples(make_balanced_function(ops, self.kind), point, s, passing))
         function = sample_function(ops, self.kind)
         return PlanSamples(*self._map_samples(function, point, s, passing, point["rear_share"]))
 
     def clearances(self, point: Point, ops: Nonsmooth, grid: tuple[MX | DM, Array] | None = None) -> MX:
         """Return heights (3, m) of toe, sole and ankle of the swing foot above the stair [m]."""
-        return self._map_samples(clearance_function(ops, self.kind), point, *(grid or self.clearance_grid))
+        return self._map_samples(make_clearance_function(ops, self.kind), point, *(grid or self.clearance_grid))
 
     def energy(self, samples: PlanSamples, ops: Nonsmooth) -> MX:
         """Return the integral of sum |torque x rate| by the trapezoidal rule, phase by phase [J]."""
@@ -124,17 +124,17 @@ class PlannedStep:
         return function.map(columns)(s, DM(passing), *repeated)
 
 
-def grid_at(phase: int, fractions: MX | DM) -> tuple[MX | DM, Array]:
-    """Return the grid of ``phase_grid`` at fractions (1, k) of one phase."""
+def make_grid_at(phase: int, fractions: MX | DM) -> tuple[MX | DM, Array]:
+    """Return the grid of ``make_phase_grid`` at fractions (1, k) of one phase."""
     k = int(fractions.shape[1])
     parts: list[MX | DM] = [DM.ones(1, k) * float(j < phase) for j in range(len(PHASES))]
     parts[phase] = fractions
     return ca.vertcat(*parts), np.repeat(np.eye(len(PHASES))[:, [phase]], k, axis=1)
 
 
-def phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
+def make_phase_grid(fractions: list[Array]) -> tuple[DM, Array]:
     """Return s (4, m) of all phases from the fractions to sample in each, and the current phase as columns (4, m) of 0 and 1."""
-    s, passing = zip(*(grid_at(i, DM(part).T) for i, part in enumerate(fractions)), strict=True)
+    s, passing = zip(*(make_grid_at(i, DM(part).T) for i, part in enumerate(fractions)), strict=True)
     return ca.horzcat(*s), np.hstack(passing)
 
 
@@ -152,7 +152,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     share = rear_share * (1 - support**2 * (3 - 2 * support))
     _, force, whole = dynamics(*step.q, SX(2, 1))
     torque, stance_force, pressure = dynamics(*step.q, share * force)
-    slope = _slope(stair, kind)
+    slope = _compute_slope(stair, kind)
     # The whole ground force acts along a line through the stance foot's level at ``whole``; where it meets the slope.
     zmp = whole * force[1] / (force[1] - slope * force[0])  # (eq. 49)
     power = torque * (DM(biped.JOINT_RATES) @ step.q.velocity)
@@ -160,11 +160,11 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     return ca.Function("sample", [*inputs, rear_share], ca.cse(outputs))
 
 
-def balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+def make_balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
     inputs, plan, stair, step = _make_symbols(ops, kind)
     s, passing, *_ = inputs
-    torque, power, *ground = compute_balance(step, plan, s, passing, _slope(stair, kind), kind)
+    torque, power, *ground = compute_balance(step, plan, s, passing, _compute_slope(stair, kind), kind)
     outputs = _list_outputs(inputs, plan, step, torque[: len(biped.JOINTS)], power, *ground)
     return ca.Function("sample", inputs, ca.cse(outputs))
 
@@ -179,17 +179,18 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     the forces on them are parallel. In the first step the swing foot carries nothing.
     """
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
-    place = biped.points(q, step.stance_ankle.position)
-    middles, accelerations = biped.centres(place), _accelerate_centres(Motion(q, v, a), step.stance_ankle)
+    place = biped.locate_points(q, step.stance_ankle.position)
+    middles, accelerations = biped.locate_centres(place), _accelerate_centres(Motion(q, v, a), step.stance_ankle)
     push = {
-        link: biped.rod(link).mass_kg * (accelerations[link] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS
+        link: biped.get_rod(link).mass_kg * (accelerations[link] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS
     }
     turn = {
-        link: biped.rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1) for i, link in enumerate(biped.LINKS)
+        link: biped.get_rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1)
+        for i, link in enumerate(biped.LINKS)
     }
     force = sum(push.values(), SX(2, 1))
-    load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.toe_foot_biped().mass_kg)
-    points = sum((_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
+    load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.load_toe_foot_biped().mass_kg)
+    points = sum((_compute_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
     moment = points + sum(turn.values(), SX(0))
 
     sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
@@ -197,20 +198,20 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     rear = rear_toe[0] + passing[0] * (rear_sole[0] - rear_toe[0])
     heel = SX(0)
     if kind == "landing":
-        on = planned.landing_share(plan, s)
+        on = planned.compute_landing_share(plan, s)
         heel = double * ((on > 1) * toe[0] + (on > 0) * (on <= 1) * sole[0])
     front = ca.fmin(ca.fmax(moment / load, heel), toe[0])
     back = ca.vertcat(ca.fmin(ca.fmax(moment / load, rear), rear_toe[0]), rear_toe[1])
-    arm = ca.fmin(_moment(back, force) - front * load, -LEAST_ARM)
+    arm = ca.fmin(_compute_moment(back, force) - front * load, -LEAST_ARM)
     share = SX(0) if kind == "first" else double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
 
     torque, rate = [], []
     for joint, links, sense, between in JOINT_SIDES.values():
-        total = sum((_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0))
-        torque.append(-sense * (total - share * _moment(back - place[joint], force)))
+        total = sum((_compute_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0))
+        torque.append(-sense * (total - share * _compute_moment(back - place[joint], force)))
         first, second = (v[biped.LINKS.index(link)] for link in between)
         rate.append(first + second if "UH" in between else first - second)
-    pressure = (moment - share * _moment(back, force)) / ca.fmax((1 - share) * load, biped.LEAST_LOAD * load)
+    pressure = (moment - share * _compute_moment(back, force)) / ca.fmax((1 - share) * load, biped.LEAST_LOAD * load)
     behind = heel if kind == "first" else double * rear
     zmp = points / ca.fmax(force[1] - slope * force[0], biped.LEAST_LOAD * load)  # (eq. 49)
     power = ca.vertcat(*torque) * ca.vertcat(*rate)
@@ -222,13 +223,13 @@ def _accelerate_centres(q: Motion, ankle: Motion) -> dict[str, SX]:
 
     def acceleration(link: str) -> SX:
         angle, rate, change = (part[biped.LINKS.index(link)] for part in q)
-        normal = biped.direction(link, angle + ca.pi / 2)
-        return biped.rod(link).length_m * (change * normal - rate**2 * biped.direction(link, angle))
+        normal = biped.compute_direction(link, angle + ca.pi / 2)
+        return biped.get_rod(link).length_m * (change * normal - rate**2 * biped.compute_direction(link, angle))
 
-    return biped.centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
+    return biped.locate_centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
 
 
-def _moment(at: SX, force: SX) -> SX:
+def _compute_moment(at: SX, force: SX) -> SX:
     """Moment of a force about the origin, counter-clockwise [N m]."""
     return at[0] * force[1] - at[1] * force[0]
 
@@ -238,23 +239,24 @@ def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) 
     return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
 
 
-def _slope(stair: Stair[SX], kind: StepKind) -> SX:
+def _compute_slope(stair: Stair[SX], kind: StepKind) -> SX:
     """Slope k of (49); the hip does not rise in the first step."""
     return SX(0) if kind == "first" else stair.rise / stair.tread
 
 
-def clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
-    """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``balanced_function``."""
+def make_clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
+    """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``make_balanced_function``."""
     inputs, _, stair, step = _make_symbols(ops, kind)
-    found = biped.points(biped.link_angles(step.q.position), step.stance_ankle.position)
+    found = biped.locate_points(biped.link_angles(step.q.position), step.stance_ankle.position)
     heights = [
-        found[name][1] - planned.stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind) for name in "TSA"
+        found[name][1] - planned.compute_stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind)
+        for name in "TSA"
     ]
     return ca.Function("clearance", inputs, [ca.cse(ca.vertcat(*heights))])
 
 
 @cache
-def reach_function(per_phase: int, kind: StepKind) -> ca.Function:
+def make_reach_function(per_phase: int, kind: StepKind) -> ca.Function:
     """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
     inputs, _, _, step = _make_symbols(Exact(), kind)
     s, passing = PlannedStep(per_phase=per_phase).grid
@@ -271,5 +273,5 @@ def _make_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, 
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = make_stair_plan(values), Stair(size[0], size[1])
     rates = passing / plan.durations
-    step = planned.posture(plan, stair, s, rates, margin, ops, kind)
+    step = planned.compute_posture(plan, stair, s, rates, margin, ops, kind)
     return [s, passing, values, size, margin], plan, stair, step

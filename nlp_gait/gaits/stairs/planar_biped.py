@@ -112,25 +112,27 @@ class ToeFootBiped:
 
 
 @cache
-def toe_foot_biped(path: str = "") -> ToeFootBiped:
+def load_toe_foot_biped(path: str = "") -> ToeFootBiped:
     """Read a robot from a JSON file with the fields of ``ToeFootBiped``, by default the paper's; raises RobotDataError."""
     return read_dataclass(ToeFootBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)
 
 
-def rod(link: str) -> PlanarLink:
+def get_rod(link: str) -> PlanarLink:
     """Return a link of the paper's robot."""
-    return toe_foot_biped().link(link)
+    return load_toe_foot_biped().link(link)
 
 
-def direction(link: str, angle: SX) -> SX:
+def compute_direction(link: str, angle: SX) -> SX:
     """(2,) unit vector along a link, from its first end to its second; z up."""
     upward = 1 if link == "UH" else -1
     return ca.vertcat(ca.cos(angle), upward * ca.sin(angle))
 
 
-def points(q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
+def locate_points(q: Sequence[SX] | SX, place: SX, base: str = "A'") -> dict[str, SX]:
     """Return joints and ends by name, (2,) each [m], from nine angles [rad] and the place (2,) of a base: A', toe T' or hip H."""
-    return sum_along_links(base, place, lambda link: rod(link).length_m * direction(link, q[LINKS.index(link)]))
+    return sum_along_links(
+        base, place, lambda link: get_rod(link).length_m * compute_direction(link, q[LINKS.index(link)])
+    )
 
 
 def sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str, V]:
@@ -142,32 +144,32 @@ def sum_along_links(base: str, place: V, along: Callable[[str], V]) -> dict[str,
     return found
 
 
-def _couplings(base: str) -> np.ndarray:
+def _compute_couplings(base: str) -> np.ndarray:
     """(9, 9) W [kg m^2]: the links' centres move with K = sum_ij W_ij (du_i/dt . du_j/dt) / 2, where u_i are the directions."""
     unit = dict(zip(LINKS, np.eye(len(LINKS)), strict=True))
-    arms = sum_along_links(base, np.zeros(len(LINKS)), lambda link: rod(link).length_m * unit[link])
+    arms = sum_along_links(base, np.zeros(len(LINKS)), lambda link: get_rod(link).length_m * unit[link])
     middles = np.array([(arms[a] + arms[b]) / 2 for a, b in ENDS.values()])
-    return middles.T @ np.diag([rod(link).mass_kg for link in LINKS]) @ middles
+    return middles.T @ np.diag([get_rod(link).mass_kg for link in LINKS]) @ middles
 
 
-def centres(found: Mapping[str, SX]) -> dict[str, SX]:
+def locate_centres(found: Mapping[str, SX]) -> dict[str, SX]:
     """Centres of mass by link, (2,) each [m], from the points."""
     return {link: (found[a] + found[b]) / 2 for link, (a, b) in ENDS.items()}
 
 
-def biped_dynamics(q: SX, qd: SX, angles: SX, base: str = "A'") -> EquationsOfMotion:
-    """Return the equations of motion about a fixed base (``points``), with link angles (9,) [rad] as a function of q (n,)."""
+def make_dynamics(q: SX, qd: SX, angles: SX, base: str = "A'") -> EquationsOfMotion:
+    """Return the equations of motion about a fixed base (``locate_points``); link angles (9,) [rad] are functions of q (n,)."""
     spins = ca.jtimes(angles, q, qd)
-    velocities = [ca.jtimes(direction(link, angles[i]), q, qd) for i, link in enumerate(LINKS)]
-    middles = centres(points(angles, SX(2, 1), base))
-    kinetic, potential, couplings = SX(0), SX(0), _couplings(base)
+    velocities = [ca.jtimes(compute_direction(link, angles[i]), q, qd) for i, link in enumerate(LINKS)]
+    middles = locate_centres(locate_points(angles, SX(2, 1), base))
+    kinetic, potential, couplings = SX(0), SX(0), _compute_couplings(base)
     for i, link in enumerate(LINKS):
         moving = 0.5 * couplings[i, i] * ca.sumsqr(velocities[i])
-        kinetic += 0.5 * rod(link).inertia_kgm2 * spins[i] ** 2 + moving  # (eqs. 36, 37)
+        kinetic += 0.5 * get_rod(link).inertia_kgm2 * spins[i] ** 2 + moving  # (eqs. 36, 37)
         for j in range(i):
             if couplings[i, j] != 0.0:
                 kinetic += couplings[i, j] * ca.dot(velocities[i], velocities[j])
-        potential += rod(link).mass_kg * GRAVITY * middles[link][1]  # (eq. 38)
+        potential += get_rod(link).mass_kg * GRAVITY * middles[link][1]  # (eq. 38)
     return equations_of_motion(kinetic, potential, q, qd)
 
 
@@ -207,32 +209,32 @@ def link_angles(q: SX) -> SX:
     return ca.vertcat(q, 0, 0)
 
 
-def loads(q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
+def compute_loads(q: SX, qd: SX, qdd: SX, rear: Mapping[str, SX]) -> StanceLoads[SX]:
     """Return the inverse dynamics of the moving links, q (7,) [rad], with given forces (2,) [N] on points of the rear foot.
 
     Derivatives are taken with respect to q and qd, which are symbols. The centre of pressure follows from the moment balance of
     the flat stance foot.
     """
-    motion = biped_dynamics(q, qd, link_angles(q))
-    found = points(link_angles(q), SX(2, 1))
+    motion = make_dynamics(q, qd, link_angles(q))
+    found = locate_points(link_angles(q), SX(2, 1))
     generalised = motion.M @ qdd + motion.C @ qd + motion.G  # (eq. 42)
     for point, force in rear.items():
         generalised -= ca.jacobian(found[point], q).T @ force  # (eq. 35)
     torque = DM(np.linalg.inv(JOINT_RATES.T)) @ generalised
 
-    middles = centres(found)
-    weight = toe_foot_biped().mass_kg * GRAVITY
-    momentum = sum((rod(link).mass_kg * ca.jtimes(middles[link], q, qd) for link in LINKS), SX(2, 1))
+    middles = locate_centres(found)
+    weight = load_toe_foot_biped().mass_kg * GRAVITY
+    momentum = sum((get_rod(link).mass_kg * ca.jtimes(middles[link], q, qd) for link in LINKS), SX(2, 1))
     force = ca.jtimes(momentum, q, qd) + ca.jtimes(momentum, qd, qdd) + ca.vertcat(0, weight)
     stance = force - sum(rear.values(), SX(2, 1))
-    foot = sum((rod(link).mass_kg * GRAVITY * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
+    foot = sum((get_rod(link).mass_kg * GRAVITY * middles[link][0] for link in ("A'S'", "S'T'")), SX(0))
     load = ca.fmax(stance[1], LEAST_LOAD * weight)
     return StanceLoads(torque, stance, (foot - torque[0]) / load)
 
 
 @cache
 def make_loads(*rear: str) -> ca.Function:
-    """Return the function of q, qd, qdd (7,) and forces (2,) on points of the rear foot, T or S, to ``loads``."""
+    """Return the function of q, qd, qdd (7,) and forces (2,) on points of the rear foot, T or S, to ``compute_loads``."""
     q, qd, qdd = (SX.sym(name, len(MOVING)) for name in ("q", "qd", "qdd"))
     forces = {point: SX.sym({"T": "toe", "S": "sole"}[point], 2) for point in rear}
-    return ca.Function("loads", [q, qd, qdd, *forces.values()], ca.cse([*loads(q, qd, qdd, forces)]))
+    return ca.Function("loads", [q, qd, qdd, *forces.values()], ca.cse([*compute_loads(q, qd, qdd, forces)]))

@@ -5,7 +5,7 @@ from typing import Generic, Literal, NamedTuple, TypeVar
 import casadi as ca
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, rod
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, get_rod
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, stack
@@ -58,7 +58,7 @@ class StairPlan(NamedTuple):
         return ca.fmax(ends[1:] - ends[:-1], LEAST_DURATION)
 
 
-def stair_height(x: SX, stair: Stair[SX], setback: float, width: float, step: StepKind = "next") -> SX:
+def compute_stair_height(x: SX, stair: Stair[SX], setback: float, width: float, step: StepKind = "next") -> SX:
     """Return the height of the ground under a point at x, relative to the stance ankle [m].
 
     The edge of each step is ``setback`` behind the ankle that stands on it; half of its rise happens within 2.2 widths [m].
@@ -73,7 +73,7 @@ def stair_height(x: SX, stair: Stair[SX], setback: float, width: float, step: St
     return stair.rise * (edge(0.0) + edge(stair.tread) - 1)
 
 
-def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
+def compute_foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     """Angles of sole and toe, theta_6 and theta_7 [rad], from the fractions s (4,) of the phases.
 
     In the air the foot straightens and pitches up by ``foot_pitch``, and lands as it left: toe first.
@@ -89,28 +89,28 @@ def foot_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
     return sole - straight * plan.foot_pitch, toe - straight * (plan.toe_angle + plan.foot_pitch)
 
 
-def ankle_on_toe(sole: SX, toe: SX) -> SX:
+def locate_ankle_on_toe(sole: SX, toe: SX) -> SX:
     """Return the ankle (2,) relative to its position with a flat foot [m], while the tip of the toe stands still."""
-    sole_m, toe_m = rod("AS").length_m, rod("ST").length_m
+    sole_m, toe_m = get_rod("AS").length_m, get_rod("ST").length_m
     ahead = sole_m * (1 - ca.cos(sole)) + toe_m * (1 - ca.cos(toe))  # (eq. 1)
     return ca.vertcat(ahead, sole_m * ca.sin(sole) + toe_m * ca.sin(toe))  # (eq. 2)
 
 
-def landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
-    """Return angles of sole and toe of the foot that landed last [rad]: the rear foot's motion backwards (``ankle_on_toe``)."""
+def compute_landed_angles(plan: StairPlan, s: SX) -> tuple[SX, SX]:
+    """Return angles of sole and toe of the landed foot [rad]: the rear one's motion backwards (``locate_ankle_on_toe``)."""
     first, second = ca.vertsplit(plan.durations[:2])
-    remaining = landing_share(plan, s) * first
+    remaining = compute_landing_share(plan, s) * first
     back = ca.vertcat(ca.fmin(remaining / first, 1), ca.fmax((remaining - first) / second, 0), 0, 0)
-    return foot_angles(plan, back)
+    return compute_foot_angles(plan, back)
 
 
-def landing_share(plan: StairPlan, s: SX) -> SX:
+def compute_landing_share(plan: StairPlan, s: SX) -> SX:
     """Return the time until the landed foot is flat as a share of t1: above 1 it stands on its toe, then on its sole."""
     first, second = ca.vertsplit(plan.durations[:2])
     return (first * (1 - s[0]) + second * (1 - s[1])) / first
 
 
-def ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
+def locate_ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
     """(2,) position of the swing ankle [m], from the fractions s (4,) of the phases.
 
     Source:
@@ -119,13 +119,13 @@ def ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
         cycloid ends so far ahead that the foot, once flat, stands exactly two treads on. Where pi r is less than the distance
         the printed foot slides along the ground first, into the edge of the step; here the cycloid is stretched instead.
     """
-    rising = ankle_on_toe(*foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
-    lift_off = ankle_on_toe(SX(0), plan.toe_angle)
+    rising = locate_ankle_on_toe(*compute_foot_angles(plan, ca.vertcat(s[:2], 0, 0)))
+    lift_off = locate_ankle_on_toe(SX(0), plan.toe_angle)
     radius = stair.rise  # half of the double rise
     distance = 2 * stair.tread
     # A stair flatter than 2 / pi stretches the cycloid over the whole distance.
     width = ca.fmax(radius, distance / ca.pi)
-    first = _first_cycloid_angle(ca.pi - distance / width)
+    first = _find_cycloid_angle(ca.pi - distance / width)
     caught = first + 2 * plan.catch_angle
 
     def cycloid(angle: SX) -> SX:
@@ -147,7 +147,7 @@ def ankle(plan: StairPlan, stair: Stair[SX], s: SX) -> SX:
     return rising + (bridge - p1) + (cycloid(angle) - p4)
 
 
-def hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next") -> SX:
+def locate_hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next") -> SX:
     """(2,) position of the hip [m], from the fractions s (4,) of the phases.
 
     In the first step it stays level ("no change in hip altitude"), starts above the planned ZMP, where it can stand still,
@@ -184,7 +184,7 @@ def hip(plan: StairPlan, stair: Stair[SX], s: SX, step: StepKind = "next") -> SX
     return ca.vertcat(x, plan.hip_height + radius - root)  # (eq. 25)
 
 
-def in_time(position: SX, s: SX, rates: SX) -> Motion:
+def move_in_time(position: SX, s: SX, rates: SX) -> Motion:
     """Motion of a position that depends on the fractions s (4,), which pass at constant ``rates`` (4,) [1/s]."""
     velocity = ca.jtimes(position, s, rates)
     return Motion(position, velocity, ca.jtimes(velocity, s, rates))
@@ -195,7 +195,7 @@ def _smooth(s: SX) -> SX:
     return s**2 * (3 - 2 * s)
 
 
-def _first_cycloid_angle(m: SX) -> SX:
+def _find_cycloid_angle(m: SX) -> SX:
     """Root of theta - sin theta = m by Newton's method; all but 0 where m is negative (eq. 7)."""
     m = ca.fmax(m, _LEAST_CYCLOID_ARGUMENT)
     theta = (6 * m) ** (1 / 3)
@@ -215,7 +215,7 @@ class Posture(NamedTuple):
     stance_ankle: Motion  # (2,) [m]
 
 
-def posture(
+def compute_posture(
     plan: StairPlan, stair: Stair[SX], s: SX, rates: SX, margin: SX, ops: Nonsmooth, step: StepKind = "next"
 ) -> Posture:
     """Return the posture at symbols s (4,), shares of the phases with rates 1 / duration or 0; margin of a knee's cosine."""
@@ -223,25 +223,25 @@ def posture(
     climbed = stair  # half of the swing foot's way
     if step == "first":
         stance, climbed = SX(2, 1), Stair(stair.tread / 2, stair.rise / 2)
-    at_hip = in_time(hip(plan, stair, s, step) - stance, s, rates)
-    at_ankle = in_time(ankle(plan, climbed, s) - stance, s, rates)
+    at_hip = move_in_time(locate_hip(plan, stair, s, step) - stance, s, rates)
+    at_ankle = move_in_time(locate_ankle(plan, climbed, s) - stance, s, rates)
     stance_foot = stance_ankle = Motion(SX(2, 1), SX(2, 1), SX(2, 1))
     if step == "landing":
-        stance_foot = in_time(ca.vertcat(*landed_angles(plan, s)), s, rates)
-        stance_ankle = in_time(ankle_on_toe(*landed_angles(plan, s)), s, rates)
-    swing, swing_reach = _leg(at_hip, at_ankle, margin, ops)
-    support, support_reach = _leg(at_hip, stance_ankle, margin, ops)
-    feet = in_time(ca.vertcat(*foot_angles(plan, s)), s, rates)
+        stance_foot = move_in_time(ca.vertcat(*compute_landed_angles(plan, s)), s, rates)
+        stance_ankle = move_in_time(locate_ankle_on_toe(*compute_landed_angles(plan, s)), s, rates)
+    swing, swing_reach = _solve_leg(at_hip, at_ankle, margin, ops)
+    support, support_reach = _solve_leg(at_hip, stance_ankle, margin, ops)
+    feet = move_in_time(ca.vertcat(*compute_foot_angles(plan, s)), s, rates)
     torso = constant_motion(0.0)._replace(position=plan.torso_pitch)
     reach = ca.vertcat(swing_reach, support_reach)
     return Posture(stack(swing, support, torso, feet), reach, at_hip, at_ankle, stance_foot, stance_ankle)
 
 
-def _leg(at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:
+def _solve_leg(at_hip: Motion, at_ankle: Motion, margin: SX, ops: Nonsmooth) -> tuple[Motion, SX]:
     """Absolute angles of thigh and shank, and the cosine of the knee."""
     forward_up = (ankle_part - hip_part for ankle_part, hip_part in zip(at_ankle, at_hip, strict=True))
     hip_to_ankle = Motion(*(ca.vertcat(part[0], 0, part[1]) for part in forward_up))
-    leg = leg_angles(hip_to_ankle, rod("HK").length_m, rod("KA").length_m, margin, ops)
+    leg = leg_angles(hip_to_ankle, get_rod("HK").length_m, get_rod("KA").length_m, margin, ops)
     _, pitch, knee, _, _ = (Motion(*(part[i] for part in leg.joints)) for i in range(5))
     upright = constant_motion(ca.pi / 2)  # a leg that hangs down
     return stack(add_motions(pitch, upright), add_motions(add_motions(pitch, knee), upright)), leg.reach

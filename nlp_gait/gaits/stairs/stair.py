@@ -7,9 +7,9 @@ from math import inf
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, parameters, vector_columns
+from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, make_vector_columns, parameters
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
 
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
@@ -38,9 +38,9 @@ COLUMNS = {
     "link_qdd": Columns(unit="rad/s^2", labels=MOVING),
     "power": Columns(unit="W", labels=JOINTS),
     "reach": Columns(unit="1", labels=("swing knee", "stance knee")),
-    "stance_force": vector_columns("N", "xz"),
-    **{name: vector_columns("m", "x") for name in ("stance_pressure", "zmp")},
-    **{name: vector_columns("m", "xz") for name in ("hip", "ankle", "stance_ankle")},
+    "stance_force": make_vector_columns("N", "xz"),
+    **{name: make_vector_columns("m", "x") for name in ("stance_pressure", "zmp")},
+    **{name: make_vector_columns("m", "xz") for name in ("hip", "ankle", "stance_ankle")},
     "stance_foot": Columns(unit="rad", labels=("A'S'", "S'T'")),
     "support": Columns(unit="m", labels=("rear", "front")),
 }
@@ -65,14 +65,14 @@ def read_stair(point: Point) -> Stair[MX]:
     return Stair(tread, point["rise_run_ratio"] * tread)
 
 
-def joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
+def make_joint_signals(q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
     """Return histories of joints, differences of links' absolute angles (``JOINT_RATES``), and of links (m rows, as MOVING)."""
     links = {"q": q, "qd": qd, "qdd": qdd}
     joints = {name: value @ JOINT_RATES.T for name, value in links.items()}
     return {**joints, **{f"link_{name}": value for name, value in links.items()}}
 
 
-def rows(
+def make_rows(
     name: str,
     value: MX,
     of: Sequence[str],
@@ -92,29 +92,29 @@ def rows(
     )
 
 
-def knee_limits(name: str, q: MX) -> Constraint:
+def limit_knees(name: str, q: MX) -> Constraint:
     """Return rows for the limits of both knees; q (7, m) are link angles [rad]."""
     knees = (q[MOVING.index(shank), :] - q[MOVING.index(thigh), :] for thigh, shank in KNEES.values())
-    return rows(name, ca.vertcat(*knees), tuple(KNEES), "rad", 0.1, lower=KNEE_LIMITS[0], upper=KNEE_LIMITS[1])
+    return make_rows(name, ca.vertcat(*knees), tuple(KNEES), "rad", 0.1, lower=KNEE_LIMITS[0], upper=KNEE_LIMITS[1])
 
 
-def grip(name: str, force: MX, friction: MX) -> Constraint:
+def limit_grip(name: str, force: MX, friction: MX) -> Constraint:
     """Return |F_x| <= mu F_z of forces (2, m) [N], as two rows each."""
     limit = friction * force[1, :]
     both = ca.vertcat(limit - force[0, :], limit + force[0, :])
-    return rows(name, both, ("forward", "backward"), "N", 100.0, lower=0.0)
+    return make_rows(name, both, ("forward", "backward"), "N", 100.0, lower=0.0)
 
 
-def stance_load(point: Point, force: MX) -> Constraint:
+def limit_stance_load(point: Point, force: MX) -> Constraint:
     """Return rows for the least load of the stance foot, with forces (2, m) [N]."""
-    return rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
+    return make_rows("stance_load", force[1, :], ("z",), "N", 100.0, lower=point["least_stance_force_N"])
 
 
-def stance_zmp(point: Point, pressure: MX) -> Constraint:
+def limit_stance_zmp(point: Point, pressure: MX) -> Constraint:
     """Return rows for the centre of pressure (1, m) [m] within the stance foot, with the margin parameter."""
     margin = point["zmp_margin_m"]
-    front = toe_foot_biped().foot_m - margin
-    return rows("stance_zmp", pressure, ("x",), "m", 0.01, lower=margin, upper=front)
+    front = load_toe_foot_biped().foot_m - margin
+    return make_rows("stance_zmp", pressure, ("x",), "m", 0.01, lower=margin, upper=front)
 
 
 # Name, unit, description; bounds; minimum and maximum, beyond which no plan makes sense and numbers may overflow.

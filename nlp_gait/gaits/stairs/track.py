@@ -12,8 +12,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Columns, Display, GaitProblem, Objective, Signals, SolverHints, maker
 from nlp_gait.formulation.assembly import NumericPoint, Point, Variable, parameters
 from nlp_gait.gaits.stairs import closed_loop, stair
-from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, simulation_model, skeleton
-from nlp_gait.gaits.stairs.planar_biped import LINKS, toe_foot_biped
+from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, make_simulation_model, make_skeleton
+from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import StepKind
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -154,7 +154,7 @@ def stairs_track(
         on_links = arrays["tau"] @ loop.joints.full()
         return make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
 
-    model = simulation_model(step_motion) if step == "next" else None
+    model = make_simulation_model(step_motion) if step == "next" else None
     return GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
@@ -162,7 +162,7 @@ def stairs_track(
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
         assemble=lambda point, ops: _assemble(point, rollout(point, ops), loop, zmp, tracking_limit, ops),
-        display=Display(motion=motion, skeleton=skeleton, simulation_model=model),
+        display=Display(motion=motion, skeleton=make_skeleton, simulation_model=model),
         hints=SolverHints(start=start, starts=1, amplifies_rounding=True),
     )
 
@@ -179,22 +179,24 @@ def _assemble(
     quanta, zmp = loop.quanta, rollout.zmp.T
     errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
     power = rollout.torque * (loop.joints @ rollout.state[closed_loop.N :, :])
-    rear, front = support_polygon(point, loop)
+    rear, front = compute_support(point, loop)
     exact = Exact()
     tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
     if rule == "penalty":  # the mean distance of the ZMP from the support polygon [m]
         distances = ca.vertcat(rear - zmp, zmp - front)
         balance = ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
     else:
-        balance = -_margin(zmp, rear, front, ops)
+        balance = -_compute_margin(zmp, rear, front, ops)
     instants, constraints = range(1, quanta + 1), []
     if rule == "limits":  # (Algorithm 3)
-        constraints.append(stair.rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants))
+        constraints.append(
+            stair.make_rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants)
+        )
     if tracking_limit:
         most = point["tracking_tolerance_rad"]
         names = tuple(closed_loop.ANGLES[loop.coordinates])
         limited = errors[: closed_loop.N, :]
-        row = stair.rows("tracking", limited, names, "rad", 0.1, lower=-most, upper=most, columns=instants)
+        row = stair.make_rows("tracking", limited, names, "rad", 0.1, lower=-most, upper=most, columns=instants)
         constraints.append(row)
     finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
     return Assembly(
@@ -206,25 +208,25 @@ def _assemble(
             "energy_J": ca.sum1(exact.abs(ca.vec(power))) * closed_loop.QUANTUM,
             "largest_error_rad": exact.largest(ca.vec(errors[: closed_loop.N, :])),
             "peak_torque_Nm": exact.largest(ca.vec(rollout.torque)),
-            "zmp_margin_min_m": _margin(zmp, rear, front, exact),
+            "zmp_margin_min_m": _compute_margin(zmp, rear, front, exact),
             "quanta_before_divergence": ca.sum2(finite),
         },
     )
 
 
-def support_polygon(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]:
+def compute_support(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]:
     """Return the rear and front end of the support polygon at the end of each quantum, (m, 1) ahead of the stance ankle [m].
 
     The polygon reaches from the rear toe in double support, and from the stance ankle in single support, to the stance toe. In
     the first step both feet begin side by side.
     """
-    foot = toe_foot_biped().foot_m
+    foot = load_toe_foot_biped().foot_m
     times = DM(np.arange(1, loop.quanta + 1) * closed_loop.QUANTUM)
     behind = 0 if loop.kind == "first" else foot - point["stair_length_m"] / 2
     return (times < point["t2_s"]) * behind, MX(DM([foot] * loop.quanta))
 
 
-def _margin(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
+def _compute_margin(zmp: MX, rear: MX, front: MX, ops: Nonsmooth) -> MX:
     """Return the least distance of the ZMP (m, 1) from the ends of the support polygon [m]; negative outside."""
     off, half = zmp - (front + rear) / 2, (front - rear) / 2
     widest = half[0]  # the polygon never grows

@@ -18,7 +18,7 @@ from nlp_gait.gaits.walk12.walk12_model import GRAVITY, PointMassBiped, Zmp
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS, compute_steps_at
 from nlp_gait.robots import Foot, Link, Robot
 from nlp_gait.robots.robot import Vector, make_free_joint
-from nlp_gait.robots.tree import inertia_moments, point_inertia, tree_from
+from nlp_gait.robots.tree import compute_point_inertia, list_moments, make_tree
 from nlp_gait.symbolic.dynamics import newton_euler
 
 SPHERE_RADIUS = 0.02  # of a mass [m]: half the width of NAO's limbs
@@ -113,9 +113,9 @@ def _make_link(name: str, held: Sequence[tuple[float, Vector]]) -> Link:
     com = masses @ places / total
     tensor = 0.4 * total * SPHERE_RADIUS**2 * np.eye(3)
     for mass, place in zip(masses.tolist(), places, strict=True):
-        tensor += point_inertia(mass, place - com)
+        tensor += compute_point_inertia(mass, place - com)
     x, y, z = com.tolist()
-    return Link(name=name, mass_kg=total, com_m=(x, y, z), inertia_com_kgm2=inertia_moments(tensor))
+    return Link(name=name, mass_kg=total, com_m=(x, y, z), inertia_com_kgm2=list_moments(tensor))
 
 
 def _follow_steps(walked: Mapping[str, Array], turn: float) -> tuple[Flags, Array]:
@@ -128,7 +128,7 @@ def _follow_steps(walked: Mapping[str, Array], turn: float) -> tuple[Flags, Arra
 def _make_inverse_dynamics(bodies: Robot, side: str) -> ca.Function:
     motion = [SX.sym(name, len(JOINTS)) for name in ("q", "qd", "qdd")]
     q, qd, qdd = (dict(zip(JOINTS, ca.vertsplit(part), strict=True)) for part in motion)
-    torques, _ = newton_euler(tree_from(bodies, bodies.feet[side].link), q, qd, qdd, GRAVITY)
+    torques, _ = newton_euler(make_tree(bodies, bodies.feet[side].link), q, qd, qdd, GRAVITY)
     return ca.Function("torques", motion, [ca.cse(ca.vertcat(*(torques[name] for name in JOINTS)))])
 
 

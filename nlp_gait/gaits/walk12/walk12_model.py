@@ -113,7 +113,7 @@ def compute_legs(
     """Return stance and swing leg at a phase t / T, the swing leg yawed at its hip by ``turn``, K [rad], positive to the left."""
     swing_ankle, hip = compute_ankle_and_hip(x, Motion(phase * step_time, SX(1), SX(0)), step_time, robot)
     stance_ankle = stack(constant_motion(0.0), constant_motion(0.0), constant_motion(0.0))
-    swing_hip = hip._replace(position=hip.position + _across(robot))
+    swing_hip = hip._replace(position=hip.position + _measure_across(robot))
     stance = _solve_leg(stance_ankle, hip, margin, robot, ops)
     swing = _solve_leg(swing_ankle, swing_hip, margin, robot, ops)
     heading = axis_rotation((0.0, 0.0, 1.0), turn)
@@ -124,7 +124,7 @@ def compute_legs(
 def compute_knee_cosines(x: SX, phase: SX, robot: PointMassBiped) -> SX:
     """Return (2,) cosines of the stance and the swing knee, without the angles: cheap rows for a constraint."""
     ankle, hip = compute_ankle_and_hip(x, Motion(phase, SX(1), SX(0)), SX(1), robot)
-    swing = ankle.position - hip.position - _across(robot)
+    swing = ankle.position - hip.position - _measure_across(robot)
     return ca.vertcat(*(knee_cosine(ca.sumsqr(v), robot.thigh_m, robot.shank_m) for v in (hip.position, swing)))
 
 
@@ -151,7 +151,7 @@ def place_on_exact_shank(leg: Walk12Leg, heights: DM) -> Motion:
         roll, pitch = angles[0], angles[1]
         return ca.vertcat(ca.sin(pitch), ca.cos(pitch) * ca.sin(roll), ca.cos(pitch) * ca.cos(roll)) @ heights
 
-    return map_motion(points, _ankle_angles(leg))
+    return map_motion(points, _compute_ankle_angles(leg))
 
 
 def place_on_appendix_shank(leg: Walk12Leg, heights: DM) -> Motion:
@@ -164,7 +164,7 @@ def place_on_appendix_shank(leg: Walk12Leg, heights: DM) -> Motion:
         forward, side = ca.sin(bend) * ca.cos(roll), ca.cos(bend) * ca.sin(roll)
         return ca.vertcat(forward, side, ca.cos(roll) * ca.cos(pitch)) @ heights  # (eqs. A3-A6)
 
-    return map_motion(points, stack(_ankle_angles(leg), lean))
+    return map_motion(points, stack(_compute_ankle_angles(leg), lean))
 
 
 def compute_zmp(stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, reading: Zmp) -> SX:
@@ -188,7 +188,7 @@ def compute_zmp(stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, read
     return point + (printed - motion.position[:2, :]) @ m / float(ca.sum1(m))
 
 
-def _across(robot: PointMassBiped) -> DM:
+def _measure_across(robot: PointMassBiped) -> DM:
     return DM([0.0, -robot.hip_distance_m, 0.0])
 
 
@@ -206,5 +206,5 @@ def _shift_to_ankle(leg: Walk12Leg, points: Motion) -> Motion:
     return Motion(*(ca.repmat(ankle, 1, 2) + leg.heading @ offsets for ankle, offsets in pairs))
 
 
-def _ankle_angles(leg: Walk12Leg) -> Motion:
+def _compute_ankle_angles(leg: Walk12Leg) -> Motion:
     return Motion(*(part[:2] for part in leg.joints))

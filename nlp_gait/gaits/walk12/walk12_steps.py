@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, vector_columns
+from nlp_gait.formulation import Array, Columns, NumericPoint, Signals, make_vector_columns
 from nlp_gait.gaits.walk12 import walk12_model
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -23,8 +23,8 @@ JOINTS = tuple(f"theta_{i}" for i in range(1, 13))
 COLUMNS = {"left": [0, 1, 2, 4, 5], "right": [11, 10, 9, 7, 6]}
 YAW_COLUMN = {"left": 3, "right": 8}
 COLUMNS_OF = {
-    **{name: vector_columns("m", "xy") for name in ("zmp", "zmp_foot")},
-    **{name: vector_columns("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
+    **{name: make_vector_columns("m", "xy") for name in ("zmp", "zmp_foot")},
+    **{name: make_vector_columns("m") for name in ("waist", "com", "left_ankle", "right_ankle")},
     "left_stance": Columns(unit="1"),
 }
 MIRRORED_ROLLS = np.array([-1.0, 1.0, 1.0, 1.0, -1.0])

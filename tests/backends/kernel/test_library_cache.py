@@ -27,7 +27,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     private = tmp_path / "private"
     private.mkdir()
     monkeypatch.setenv(library_cache.FOLDER_VARIABLE, str(folder))
-    monkeypatch.setattr(library_cache, "private_folder", functools.cache(lambda: private))
+    monkeypatch.setattr(library_cache, "make_private_folder", functools.cache(lambda: private))
     library_cache.warn_once.cache_clear()
     return folder
 

@@ -12,7 +12,7 @@ from casadi import MX
 from nlp_gait import load, solve
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
-from nlp_gait.backends.optima.sensitivities import model_sensitivities, parameter_sensitivities
+from nlp_gait.backends.optima.sensitivities import differentiate_by_models, differentiate_by_parameters
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Constraint, GaitProblem
@@ -56,7 +56,7 @@ def slope(problem: GaitProblem, near: Outcome, name: str) -> tuple[float, np.nda
 def test_a_corner_of_absolute_values_moves_with_its_limit() -> None:
     """3 (limit - 1) at (limit, limit)."""
     at = found(toy(corner, limit=1.5))
-    answer = parameter_sensitivities(at)
+    answer = differentiate_by_parameters(at)
     assert at.objective == pytest.approx(1.5)
     np.testing.assert_allclose(answer.objective, [3.0, 0.0, 0.0, 0.0, 0.0], atol=1e-8)
     np.testing.assert_allclose(answer.x[:, 0], [1.0, 1.0], atol=1e-8)
@@ -66,7 +66,7 @@ def test_a_corner_of_absolute_values_moves_with_its_limit() -> None:
 
 def test_a_limit_that_does_not_bind_costs_nothing() -> None:
     at = found(toy(corner, limit=0.5))
-    answer = parameter_sensitivities(at)
+    answer = differentiate_by_parameters(at)
     np.testing.assert_allclose(answer.objective, 0.0, atol=1e-8)
     np.testing.assert_allclose(answer.x, 0.0, atol=1e-8)
     assert answer.reach[1, 0] == pytest.approx(0.5)
@@ -78,7 +78,7 @@ def test_a_maximised_objective_keeps_its_sign() -> None:
 
     problem = toy(hill, sense="maximise", limit=1.0)
     at = found(problem)
-    answer = parameter_sensitivities(at)
+    answer = differentiate_by_parameters(at)
     # y* = 1 - x / 2 at x = limit, so that the objective is -(3/4) limit^2 - limit.
     assert answer.objective[0] == pytest.approx(-2.5, abs=1e-8)
     np.testing.assert_allclose(answer.x[:, 0], [1.0, -0.5], atol=1e-8)
@@ -89,7 +89,7 @@ def test_rows_that_say_the_same_are_counted_and_harmless() -> None:
         return x**2 + y**2, (row(x, lower=limit), row(2 * x, lower=2 * limit))
 
     at = found(toy(twice))
-    answer = parameter_sensitivities(at)
+    answer = differentiate_by_parameters(at)
     assert at.dependent == 1
     assert answer.defined.all()
     assert answer.objective[0] == pytest.approx(1.0, abs=1e-7)
@@ -99,7 +99,7 @@ def test_rows_that_part_when_the_limit_moves_have_no_derivative() -> None:
     def contrary(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
         return x**2 + y**2, (row(x, lower=limit), row(x, lower=1 - limit))
 
-    answer = parameter_sensitivities(found(toy(contrary, limit=0.5)))
+    answer = differentiate_by_parameters(found(toy(contrary, limit=0.5)))
     assert not answer.defined[0]
     assert answer.defined[1:].all()
 
@@ -111,7 +111,7 @@ def test_a_flat_optimum_is_refused_with_the_reason() -> None:
     at = found(toy(valley))
     assert at.reason is not None and "isolated" in at.reason
     with pytest.raises(InputError, match="no sensitivities"):
-        parameter_sensitivities(at)
+        differentiate_by_parameters(at)
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_slopes_are_those_of_solving_again(name: str, parameters: tuple[str, ...
     problem = load(name, intervals=5) if name == "nao-dsp" else load(name)
     near, at = solved(problem)
     assert at.residual < 1e-12
-    answer = parameter_sensitivities(at)
+    answer = differentiate_by_parameters(at)
     names = [parameter.name for parameter in problem.parameters]
     for parameter in parameters:
         i = names.index(parameter)
@@ -161,7 +161,7 @@ def test_casadis_own_sensitivities_agree() -> None:
     )["jac_x_p"]
     own = len(problem.own_parameters)  # the bounds of x are no parameters to CasADi
     expected = model.scale[:, None] * np.array(by_casadi)[:, :own]
-    np.testing.assert_allclose(parameter_sensitivities(at).x[:, :own], expected, atol=1e-6)
+    np.testing.assert_allclose(differentiate_by_parameters(at).x[:, :own], expected, atol=1e-6)
 
 
 @pytest.mark.slow
@@ -171,7 +171,7 @@ def test_a_heavier_robot_by_evaluating_it_is_as_by_solving_it() -> None:
     heavier, lighter = (
         load("nao-dsp", intervals=5, robot=f"nao-v5@torso.mass={factor!r}") for factor in (1 + STEP, 1 - STEP)
     )
-    answer = model_sensitivities(at, [(heavier, lighter, 2 * STEP)])
+    answer = differentiate_by_models(at, [(heavier, lighter, 2 * STEP)])
     ends = [sharp(p, near) for p in (heavier, lighter)]
     assert answer.objective[0] == pytest.approx((ends[0].cost - ends[1].cost) / (2 * STEP), rel=RESOLVED)
     np.testing.assert_allclose(answer.x[:, 0], (ends[0].x - ends[1].x) / (2 * STEP), atol=RESOLVED_X)
@@ -181,7 +181,7 @@ def test_a_model_with_other_rows_is_refused() -> None:
     at = found(load("walk12"))
     other = load("walk12", intervals=10)
     with pytest.raises(InputError, match="other constraints"):
-        model_sensitivities(at, [(other, other, 1.0)])
+        differentiate_by_models(at, [(other, other, 1.0)])
 
 
 def test_a_solution_lists_its_derivatives_with_units(tmp_path: Path) -> None:

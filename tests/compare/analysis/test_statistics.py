@@ -10,24 +10,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from compare.analysis.best_known import relative_gap
+from compare.analysis.best_known import compute_gap
 from compare.analysis.record_statistics import (
     ECDF_TARGETS,
     TARGETS,
     Curve,
     Weighting,
-    a12,
+    approximate_rank_sum,
     bootstrap_interval,
+    compute_a12,
     compute_band,
-    ecdf,
-    expected_running_time,
+    compute_ecdf,
+    compute_profiles,
+    compute_rank_sum,
+    compute_running_time,
+    compute_signed_rank,
+    correct_by_holm,
     find_best_known,
-    holm,
     make_curve,
-    performance_profile,
-    rank_sum,
-    rank_sum_normal,
-    signed_rank,
 )
 from nlp_gait.formulation import Objective
 from tests.compare.records import record
@@ -45,18 +45,18 @@ def test_weighting_charges_derivatives_as_finite_differences() -> None:
 
 def test_expected_running_time() -> None:
     # Two successes after 30 and 50, a failure that cost 100: 180 / 2.
-    assert expected_running_time([30.0, math.inf, 50.0], [100.0, 100.0, 100.0]) == 90.0
-    assert expected_running_time([math.inf], [100.0]) == math.inf
-    assert expected_running_time([7.0], [100.0]) == 7.0
+    assert compute_running_time([30.0, math.inf, 50.0], [100.0, 100.0, 100.0]) == 90.0
+    assert compute_running_time([math.inf], [100.0]) == math.inf
+    assert compute_running_time([7.0], [100.0]) == 7.0
 
 
 def test_gap_is_relative_to_the_reference_and_positive_if_worse() -> None:
-    assert relative_gap(11.0, 10.0, POWER) == pytest.approx(0.1)
+    assert compute_gap(11.0, 10.0, POWER) == pytest.approx(0.1)
     stability = Objective(name="margin", unit="m", sense="maximise")
-    assert relative_gap(0.09, 0.1, stability) == pytest.approx(0.1)
-    assert relative_gap(0.25, 0.0, POWER) == 0.25
-    assert relative_gap(-9.0, -10.0, POWER) == pytest.approx(0.1)
-    assert relative_gap(math.nan, 10.0, POWER) == math.inf
+    assert compute_gap(0.09, 0.1, stability) == pytest.approx(0.1)
+    assert compute_gap(0.25, 0.0, POWER) == 0.25
+    assert compute_gap(-9.0, -10.0, POWER) == pytest.approx(0.1)
+    assert compute_gap(math.nan, 10.0, POWER) == math.inf
 
 
 def test_curve_of_a_search_and_of_a_gradient_method() -> None:
@@ -76,13 +76,13 @@ def test_an_infeasible_run_reaches_no_target() -> None:
 
 
 def test_ecdf_counts_unsolved_pairs() -> None:
-    at, share = ecdf(np.array([5.0, 2.0, np.inf, 5.0]))
+    at, share = compute_ecdf(np.array([5.0, 2.0, np.inf, 5.0]))
     assert at.tolist() == [2.0, 5.0] and share.tolist() == [0.25, 0.75]
-    assert ecdf(np.array([np.inf]))[0].size == 0
+    assert compute_ecdf(np.array([np.inf]))[0].size == 0
 
 
 def test_performance_profile() -> None:
-    profile = performance_profile({"a": [10.0, 40.0, math.inf], "b": [20.0, 10.0, math.inf]})
+    profile = compute_profiles({"a": [10.0, 40.0, math.inf], "b": [20.0, 10.0, math.inf]})
     assert [v.tolist() for v in profile["a"]] == [[1.0, 4.0], pytest.approx([1 / 3, 2 / 3])]
     assert [v.tolist() for v in profile["b"]] == [[1.0, 2.0], pytest.approx([1 / 3, 2 / 3])]
 
@@ -102,55 +102,55 @@ def test_rank_sum_of_the_samples_that_the_paper_prints() -> None:
     second = [11, 12, 13, 14, *range(16, 23)]
     from scipy.stats import norm
 
-    assert rank_sum(first, second) == pytest.approx(2 * norm.sf(3.677), rel=2e-3)
+    assert compute_rank_sum(first, second) == pytest.approx(2 * norm.sf(3.677), rel=2e-3)
 
 
 def test_rank_sum_by_counting() -> None:
     # Complete separation of 3 and 3: 2 of the 20 arrangements are as extreme.
-    assert rank_sum([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]) == pytest.approx(0.1)
-    assert rank_sum([1.0, 1.0], [1.0, 1.0]) == 1.0
-    assert rank_sum([math.inf] * 3, [math.inf] * 3) == 1.0
+    assert compute_rank_sum([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]) == pytest.approx(0.1)
+    assert compute_rank_sum([1.0, 1.0], [1.0, 1.0]) == 1.0
+    assert compute_rank_sum([math.inf] * 3, [math.inf] * 3) == 1.0
 
 
 def test_signed_rank_by_counting() -> None:
     # All five differences have one sign: 2 of the 32 sign patterns are as extreme.
     a, b = [1.0, 2.0, 3.0, 4.0, 5.0], [2.0, 4.0, 6.0, 8.0, 10.0]
-    assert signed_rank(a, b) == pytest.approx(2 / 32)
-    assert signed_rank(a, a) == 1.0
+    assert compute_signed_rank(a, b) == pytest.approx(2 / 32)
+    assert compute_signed_rank(a, a) == 1.0
     # An infeasible run is further away than anything; two infeasible ones are equal.
-    assert signed_rank([*a, math.inf], [*b, math.inf]) == pytest.approx(2 / 32)
-    assert signed_rank([*a, 0.0], [*b, math.inf]) == pytest.approx(2 / 64)
+    assert compute_signed_rank([*a, math.inf], [*b, math.inf]) == pytest.approx(2 / 32)
+    assert compute_signed_rank([*a, 0.0], [*b, math.inf]) == pytest.approx(2 / 64)
 
 
 def test_holm_by_hand() -> None:
-    assert holm([0.01, 0.04, 0.03]).tolist() == pytest.approx([0.03, 0.06, 0.06])
-    assert holm([0.5, 0.6]).tolist() == pytest.approx([1.0, 1.0])
-    assert holm([]).tolist() == []
+    assert correct_by_holm([0.01, 0.04, 0.03]).tolist() == pytest.approx([0.03, 0.06, 0.06])
+    assert correct_by_holm([0.5, 0.6]).tolist() == pytest.approx([1.0, 1.0])
+    assert correct_by_holm([]).tolist() == []
 
 
 @settings(derandomize=True, deadline=None)
 @given(p=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=10))
 def test_holm_lies_between_none_and_bonferroni_and_keeps_the_order(p: list[float]) -> None:
-    adjusted = holm(p)
+    adjusted = correct_by_holm(p)
     assert (adjusted >= np.array(p)).all() and (adjusted <= np.minimum(len(p) * np.array(p), 1.0) + 1e-15).all()
     assert (np.diff(adjusted[np.argsort(p, kind="stable")]) >= 0.0).all()
 
 
 def test_a12_by_hand() -> None:
-    assert a12([1.0, 2.0], [3.0, 4.0]) == 1.0
-    assert a12([1.0, 3.0], [2.0, 3.0]) == (1 + 1 + 0 + 0.5) / 4
-    assert a12([math.inf], [math.inf]) == 0.5
+    assert compute_a12([1.0, 2.0], [3.0, 4.0]) == 1.0
+    assert compute_a12([1.0, 3.0], [2.0, 3.0]) == (1 + 1 + 0 + 0.5) / 4
+    assert compute_a12([math.inf], [math.inf]) == 0.5
 
 
 @pytest.mark.slow
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(a=costs, b=costs)
 def test_effect_size_and_tests_are_symmetric(a: list[float], b: list[float]) -> None:
-    assert a12(a, b) == pytest.approx(1.0 - a12(b, a))
-    assert rank_sum(a, b) == pytest.approx(rank_sum(b, a))
-    assert 0.0 <= rank_sum(a, b) <= 1.0
+    assert compute_a12(a, b) == pytest.approx(1.0 - compute_a12(b, a))
+    assert compute_rank_sum(a, b) == pytest.approx(compute_rank_sum(b, a))
+    assert 0.0 <= compute_rank_sum(a, b) <= 1.0
     size = min(len(a), len(b))
-    assert signed_rank(a[:size], b[:size]) == pytest.approx(signed_rank(b[:size], a[:size]))
+    assert compute_signed_rank(a[:size], b[:size]) == pytest.approx(compute_signed_rank(b[:size], a[:size]))
 
 
 def test_bootstrap_interval() -> None:
@@ -201,7 +201,7 @@ def test_a_history_of_nothing_feasible_is_a_curve_without_a_gap() -> None:
 
 def test_statistics_are_frozen_and_take_keywords_only() -> None:
     found = make_curve(record("pso", 0, [(10, 11.0)]), POWER, 10.0, Weighting())
-    test = rank_sum_normal([1.0], [2.0])
+    test = approximate_rank_sum([1.0], [2.0])
     for value, name in ((Weighting(), "f"), (found, "gap"), (test, "z")):
         with pytest.raises(FrozenInstanceError):
             setattr(value, name, 0.0)
@@ -215,20 +215,20 @@ def test_statistics_are_frozen_and_take_keywords_only() -> None:
 
 def test_unequal_lengths_are_refused() -> None:
     with pytest.raises(ValueError, match="zip"):
-        expected_running_time([1.0, 2.0], [1.0])
+        compute_running_time([1.0, 2.0], [1.0])
     with pytest.raises(ValueError, match="zip"):
         compute_band([np.array([1.0])], [np.array([1.0])] * 2, np.array([1.0]))
 
 
 def test_the_share_of_no_pairs_is_empty() -> None:
-    at, share = ecdf(np.array([]))
+    at, share = compute_ecdf(np.array([]))
     assert at.size == share.size == 0
-    one, half = ecdf(np.array([1.0])), ecdf(np.array([1.0, np.inf]))
+    one, half = compute_ecdf(np.array([1.0])), compute_ecdf(np.array([1.0, np.inf]))
     assert (one[1].tolist(), half[1].tolist()) == ([1.0], [0.5])
 
 
 def test_performance_profile_takes_whole_numbers_and_each_instance_has_its_own_cheapest() -> None:
-    profile = performance_profile({"a": [1, 100], "b": [2, 50]})
+    profile = compute_profiles({"a": [1, 100], "b": [2, 50]})
     assert [v.tolist() for v in profile["a"]] == [[1.0, 2.0], [0.5, 1.0]]
     assert [v.tolist() for v in profile["b"]] == [[1.0, 2.0], [0.5, 1.0]]
 
@@ -245,9 +245,9 @@ def test_a_run_without_a_feasible_point_is_worse_than_any_difference() -> None:
         a = [shift + value for value in (0.0, 1.0, 2.0, 3.0, 4.0)]
         b = [shift + value for value in (5.0, 3.0, 4.5, 6.25, 4.125)]
         # Ranks of the finite differences by size; the infeasible run of a outranks them all with the other sign: W = 6.
-        assert signed_rank([*a, math.inf], [*b, shift]) == pytest.approx(wilcoxon_p(6, 6))
+        assert compute_signed_rank([*a, math.inf], [*b, shift]) == pytest.approx(wilcoxon_p(6, 6))
         # A pair that differs by the whole spread still ranks below it.
-        assert signed_rank([shift, shift, math.inf], [shift + 9.0, shift + 1.0, shift]) == pytest.approx(
+        assert compute_signed_rank([shift, shift, math.inf], [shift + 9.0, shift + 1.0, shift]) == pytest.approx(
             wilcoxon_p(3, 3)
         )
 
@@ -260,33 +260,33 @@ def wilcoxon_p(rank_total: int, n: int) -> float:
 
 
 def test_rank_sum_of_values_that_are_equal_but_for_one() -> None:
-    assert rank_sum([1.0, 1.0, 1.0], [1.0, 1.0, 2.0]) == pytest.approx(
+    assert compute_rank_sum([1.0, 1.0, 1.0], [1.0, 1.0, 2.0]) == pytest.approx(
         0.5, abs=0.02
     )  # of 6 places of the 2, 3 are in b
-    assert rank_sum([2.0, 1.0], [1.0, 1.0]) < 1.0
+    assert compute_rank_sum([2.0, 1.0], [1.0, 1.0]) < 1.0
 
 
 def test_rank_sum_is_two_sided() -> None:
     """Of 70 arrangements of 4 and 4, one at either end."""
     first, second = [1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]
-    assert rank_sum(first, second) == rank_sum(second, first) == pytest.approx(2 / 70)
+    assert compute_rank_sum(first, second) == compute_rank_sum(second, first) == pytest.approx(2 / 70)
 
 
 def test_holm_takes_whole_numbers_and_keeps_the_order_of_ties() -> None:
-    assert holm([1, 0]).tolist() == [1.0, 0.0] and holm([1, 0]).dtype == float
-    assert holm([0.02] * 40).tolist() == pytest.approx([0.8] * 40)
+    assert correct_by_holm([1, 0]).tolist() == [1.0, 0.0] and correct_by_holm([1, 0]).dtype == float
+    assert correct_by_holm([0.02] * 40).tolist() == pytest.approx([0.8] * 40)
 
 
 def test_an_infeasible_run_is_worse_among_costs_that_hardly_differ() -> None:
     # Two differences of one sign: 2 of the 4 sign patterns are as extreme.
-    assert signed_rank([1.0, math.inf, 1.2], [1.0, 1.0, 1.1]) == pytest.approx(0.5)
-    assert signed_rank([1.1, 1.0, 1.0], [1.2, math.inf, 1.0]) == pytest.approx(0.5)
+    assert compute_signed_rank([1.0, math.inf, 1.2], [1.0, 1.0, 1.1]) == pytest.approx(0.5)
+    assert compute_signed_rank([1.1, 1.0, 1.0], [1.2, math.inf, 1.0]) == pytest.approx(0.5)
     # Beside the worst of the others it still differs by more than any two of them: ranks 2 and 1 against 3.
-    assert signed_rank([0.0, 0.0, math.inf], [9.0, 1.0, 9.0]) == pytest.approx(1.0)
+    assert compute_signed_rank([0.0, 0.0, math.inf], [9.0, 1.0, 9.0]) == pytest.approx(1.0)
 
 
 def test_rank_sum_by_the_normal_approximation_of_equal_values() -> None:
-    assert rank_sum_normal([1.0, 1.0], [1.0]).p_less == 0.5
+    assert approximate_rank_sum([1.0, 1.0], [1.0]).p_less == 0.5
 
 
 def test_bootstrap_interval_is_a_quantile_of_the_resamples() -> None:

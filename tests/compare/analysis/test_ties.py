@@ -8,10 +8,10 @@ import re
 
 import pytest
 
-from compare.analysis.best_known import ZERO, relative_gap
+from compare.analysis.best_known import ZERO, compute_gap
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import tie
-from compare.analysis.units import percent, with_unit
+from compare.analysis.units import format_percent, with_unit
 from compare.analysis.verdict import compare_pairs, write_verdict
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Objective
@@ -57,7 +57,7 @@ def test_near_zero_the_verdict_has_absolute_gaps(best: float) -> None:
     assert re.search(r"a below 1e-08, b below 1e-08 and c 0\.025 W", sentences[1]), sentences[1]
     assert "never by c" in sentences[2] and "a 10 evaluations" in sentences[2]
     assert not re.search(r"\d{7}", " ".join(sentences))
-    assert relative_gap(best + 0.5, best, POWER) == pytest.approx(0.5)
+    assert compute_gap(best + 0.5, best, POWER) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("gap", [3.6e-12, 2e-11, 9.9e-7, -4e-7, 1.1e-6, 3e-4])
@@ -69,8 +69,8 @@ def test_gaps_within_the_tolerance_are_no_gaps_in_text(gap: float) -> None:
 
 
 def test_relative_gaps_begin_at_the_floor() -> None:
-    assert relative_gap(3 * ZERO, 2 * ZERO, POWER) == pytest.approx(0.5)
-    assert relative_gap(1.5 * ZERO, 0.5 * ZERO, POWER) == pytest.approx(ZERO)
+    assert compute_gap(3 * ZERO, 2 * ZERO, POWER) == pytest.approx(0.5)
+    assert compute_gap(1.5 * ZERO, 0.5 * ZERO, POWER) == pytest.approx(ZERO)
 
 
 def test_ties_keep_the_order_of_all_other_values() -> None:
@@ -95,4 +95,4 @@ def test_values_near_zero_and_huge_ones_have_digits_that_mean_something(value: f
 
 
 def test_percent_of_nothing() -> None:
-    assert percent(None) == percent(math.inf) == "-"
+    assert format_percent(None) == format_percent(math.inf) == "-"

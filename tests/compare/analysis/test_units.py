@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from compare.analysis.units import millimetres, number, seconds, with_unit
+from compare.analysis.units import format_millimetres, format_number, format_seconds, with_unit
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ from compare.analysis.units import millimetres, number, seconds, with_unit
     ],
 )
 def test_what_is_rounded_to_zero_has_no_sign(value: float, digits: str, shown: str) -> None:
-    assert number(value, digits) == shown
+    assert format_number(value, digits) == shown
 
 
 def test_units_follow_numbers() -> None:
@@ -33,5 +33,5 @@ def test_units_follow_numbers() -> None:
         and with_unit(-1e-9, "W") == "-1e-09 W"
         and with_unit(-1e-9, "1", "g") == "-1e-09"
     )
-    assert millimetres(-1e-6) == "0.0 mm" and millimetres(None) == "-"
-    assert seconds(-0.0) == "0.000 s" and seconds(math.nan) == "-"
+    assert format_millimetres(-1e-6) == "0.0 mm" and format_millimetres(None) == "-"
+    assert format_seconds(-0.0) == "0.000 s" and format_seconds(math.nan) == "-"

@@ -93,7 +93,7 @@ def test_a_problem_by_name_a_solution_in_one_line_and_its_x_wherever_one_is_take
 def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):
     monkeypatch.setattr(printing, "LOG_PERIOD_S", 0.0)
     monkeypatch.setattr(printing, "stderr", PlainConsole(stderr=True, highlight=False, markup=False))
-    with printing.progress_bar("starts", 2) as advance:
+    with printing.show_progress("starts", 2) as advance:
         advance("0.53 W")
         advance("0.54 W")
     assert re.fullmatch(

@@ -95,7 +95,7 @@ def test_search_stops_for_the_requested_reason_and_polishes() -> None:
 def test_all_are_those_that_can_use_up_the_budget(
     algorithms: str, evaluations: int, takes_part: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys.modules[choose_solvers.__module__], "installed_algorithms", lambda: ("pso", "bayes"))
+    monkeypatch.setattr(sys.modules[choose_solvers.__module__], "list_installed_algorithms", lambda: ("pso", "bayes"))
     solvers = choose_solvers(algorithms, 5, SearchOptions(evaluations=evaluations))
     names = [solver.name for solver in solvers]
     assert ("bayes" in names) == takes_part and {"ipopt", "pso"} <= set(names)

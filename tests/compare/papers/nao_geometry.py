@@ -11,7 +11,7 @@ import numpy as np
 
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics
 
 POSTURES = 20
@@ -40,7 +40,7 @@ def compare_geometry(robot: str) -> dict[str, float]:
 
 def _make_placement(robot: Robot, link: str) -> ca.Function:
     """Return the frame (4, 4) of a link in the torso's axes [mm], of a foot that of its sole, as a function of all angles."""
-    tree, q = tree_from(robot, robot.root), ca.SX.sym("q", len(robot.joints))
+    tree, q = make_tree(robot, robot.root), ca.SX.sym("q", len(robot.joints))
     poses = forward_kinematics(tree, dict(zip(robot.joints, ca.vertsplit(q), strict=True)), ca.SX(3, 1))
     pose = poses[[body.link.name for body in tree].index(link)]
     heights = [foot.ankle_height_m for foot in robot.feet.values() if foot.link == link]

@@ -20,7 +20,7 @@ from compare.papers.nao_walk.nao_walk_runs import (
     sum_energy,
 )
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.simulation.measurements import planned_distance, predict_power
+from nlp_gait.simulation.measurements import measure_planned_distance, predict_power
 from nlp_gait.simulation.plan import make_plan
 from tests.compare.papers.finished import check_report, recompute, reproduce
 
@@ -93,8 +93,8 @@ def test_the_robots_own_walk_has_the_documented_speed_and_its_energy_splits_by_j
     indexes = build_exact_model(walk.problem).at(walk.x, walk.problem.p).indexes
     assert indexes["speed_m_s"] == pytest.approx(SPEED_M_S, rel=1e-12)
     found, plan = simulate_joints("torque", "", {}, 2), make_plan(walk, 2)
-    assert found["fell_at_s"] is None and found["walked_m"] == pytest.approx(planned_distance(plan), rel=0.02)
-    whole = predict_power(plan).total_W * plan.duration_s / planned_distance(plan)
+    assert found["fell_at_s"] is None and found["walked_m"] == pytest.approx(measure_planned_distance(plan), rel=0.02)
+    whole = predict_power(plan).total_W * plan.duration_s / measure_planned_distance(plan)
     assert sum_energy(found["model"].values(), "paper") == pytest.approx(whole, rel=1e-12)
     assert sum_energy(found["engine"].values(), "paper") == pytest.approx(whole, rel=0.05)
     # Heat by the data sheet is 14 to 33 times that of the paper in the legs; each hip yaw-pitch motor turns two joints.

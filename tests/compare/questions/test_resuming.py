@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import nlp_gait
 from compare.cli import app
 from compare.questions import local_optima, real_motors
-from compare.study.store import Store, parse_outcome, plain_outcome, store_runs
+from compare.study.store import Store, encode_outcome, parse_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.solve import run_starts
 from nlp_gait.backends.solvers.ipopt import Ipopt
@@ -166,7 +166,7 @@ def test_a_stored_outcome_has_every_bit() -> None:
     (outcome,) = nlp_gait.solve(problem).starts
     strange = replace(outcome, objective=math.nan, violation=math.inf, cost=-0.0, history=(Best(3, None, 0.5),))
     for whole in (outcome, strange, replace(outcome, guess=None)):
-        back = parse_outcome(json.loads(json.dumps(plain_outcome(whole), allow_nan=False)))
+        back = parse_outcome(json.loads(json.dumps(encode_outcome(whole), allow_nan=False)))
         for field in fields(Outcome):
             if field.name != "guess":
                 assert repr(getattr(back, field.name)) == repr(getattr(whole, field.name))

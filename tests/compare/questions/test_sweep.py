@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.analysis.units import axis_label, quantity
+from compare.analysis.units import format_quantity, make_axis_label
 from compare.questions.question import Work, find
 from compare.questions.sweep import Axis, Sweep, SweepPoint, parse_axis, plot_sweep
 from compare.report.document import Table
@@ -137,7 +137,7 @@ def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
 
 
 def test_labels() -> None:
-    assert axis_label("hip_vx_start_m_s", "m/s") == "hip vx start [m/s]"
-    assert axis_label("reach_margin", "1") == "reach margin"
-    assert axis_label("hip_height_m.upper", "m") == "upper bound of hip height [m]"
-    assert quantity("hip_height_m", "m", 0.31) == "hip height = 0.31 m"
+    assert make_axis_label("hip_vx_start_m_s", "m/s") == "hip vx start [m/s]"
+    assert make_axis_label("reach_margin", "1") == "reach margin"
+    assert make_axis_label("hip_height_m.upper", "m") == "upper bound of hip height [m]"
+    assert format_quantity("hip_height_m", "m", 0.31) == "hip height = 0.31 m"

@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 from compare.cli import app
 from compare.cli.questions.output import Output
 from compare.cli.simulate import DriveOptions
-from compare.drawing.figures import new_figure
+from compare.drawing.figures import make_figure
 from compare.questions.question import Work, find
 from compare.questions.sweep import Sweep, SweepPoint, parse_axis
 from compare.questions.walk import planners
 from compare.questions.walk import walk as module
 from compare.questions.walk.cheapest_cycle import Gait
 from compare.questions.walk.planners import PLANNERS
-from compare.questions.walk.walk import INDEXES, CheapestWalk, FoundGaits, default_speeds
+from compare.questions.walk.walk import INDEXES, CheapestWalk, FoundGaits, choose_speeds
 from compare.report.document import Figure
 from compare.study.store import Store
 from nlp_gait import load
@@ -51,7 +51,7 @@ def question() -> CheapestWalk:
 @pytest.fixture
 def no_cycle_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw an empty figure instead of the cycle, for tests that look at no figure."""
-    monkeypatch.setattr(module, "plot_cycle", lambda _: new_figure())
+    monkeypatch.setattr(module, "plot_cycle", lambda _: make_figure())
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_a_humanoid_walks_by_the_textbook_on_its_own_legs(tmp_path: Path, monkey
     pytest.importorskip("urdf_parser_py")
     robot = crooked(tmp_path)
     problem = load("humanoid-cycle", robot=robot, objective="power", intervals=2)
-    assert default_speeds(problem) == "speed_m_s=0.0141:0.141:10"  # NAO's times the root of 0.40452 m / 0.2029 m
+    assert choose_speeds(problem) == "speed_m_s=0.0141:0.141:10"  # NAO's times the root of 0.40452 m / 0.2029 m
     x = (problem.lower + problem.upper) / 2
     x[[problem.variable_index(name) for name in problem.display.durations]] = 0.8, 0.6
     point = SweepPoint(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.drawing.figures import new_figure
+from compare.drawing.figures import make_figure
 from compare.papers.reproduction import fill_template
 from compare.report.document import Document, Figure, Prose, Section, Table
 from compare.report.writing import write_document, write_parts
@@ -47,7 +47,7 @@ def made() -> Document:
         TEXT,
         values={"count": 3, "low": 0.125, "third": "feasible"},
         tables={"powers": POWERS.rows},
-        figures={"empty": new_figure(1.0, 1.0)},
+        figures={"empty": make_figure(1.0, 1.0)},
     )
 
 

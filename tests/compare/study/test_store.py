@@ -14,7 +14,7 @@ import pytest
 
 import nlp_gait
 from compare.study import store as module
-from compare.study.store import Computation, Store, as_json
+from compare.study.store import Computation, Store, pass_through_json
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.errors import OutputError
 
@@ -115,7 +115,7 @@ def test_what_json_cannot_represent_is_not_stored(number: float, tmp_path: Path)
         Store(tmp_path).compute("one", {}, lambda: [number])
     assert not list((tmp_path / "store").iterdir())
     with pytest.raises(ValueError, match="not JSON compliant"):
-        as_json([number])
+        pass_through_json([number])
 
 
 def test_the_reason_of_a_recomputation_is_reported(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
-from nlp_gait.gaits.biped.load_sharing import TorsoShare, torso_shares
+from nlp_gait.gaits.biped.load_sharing import TorsoShare, share_torso
 from tests.evaluation import evaluated
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[2] / "golden" / "nao.json").read_text(encoding="utf-8"))
@@ -92,7 +92,7 @@ def test_the_leg_under_the_hip_carries_nothing_as_printed_and_all_by_the_lever_r
 ) -> None:
     rules: dict[TorsoShare, float] = {"printed": printed_left, "lever": lever_left}
     for rule, left in rules.items():
-        shares = torso_shares(SX(hip_y), rule)
+        shares = share_torso(SX(hip_y), rule)
         assert (float(shares["L"]), float(shares["R"])) == pytest.approx((left, 1 - left))
 
 

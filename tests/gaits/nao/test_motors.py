@@ -14,7 +14,7 @@ from scipy.integrate import trapezoid
 
 from nlp_gait import IpoptSettings, load, solve
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.gaits.nao.body import ANKLE_ROLL, ankle_roll
+from nlp_gait.gaits.nao.body import ANKLE_ROLL, limit_ankle_roll
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 
@@ -89,7 +89,7 @@ def test_a_flat_battery_binds() -> None:
 def test_the_ankles_roll_follows_the_table() -> None:
     pitch = MX.sym("pitch")
     for column in (1, 2):
-        line = Function("line", [pitch], [ankle_roll(pitch, column)])
+        line = Function("line", [pitch], [limit_ankle_roll(pitch, column)])
         for row in ANKLE_ROLL:
             assert float(line(row[0])) == pytest.approx(row[column], abs=1e-9)
         middle = (ANKLE_ROLL[2][0] + ANKLE_ROLL[3][0]) / 2

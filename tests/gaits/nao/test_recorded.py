@@ -20,7 +20,7 @@ from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.joints import JOINTS
 from nlp_gait.gaits.nao.problems import make_recorded_gait
 from nlp_gait.robots import load_robot
-from nlp_gait.robots.tree import mirror_sign, partner
+from nlp_gait.robots.tree import find_partner, mirror_sign
 from tests.pinocchio_oracle import floating_model, stand
 
 ROBOT = load_robot("nao-v5")
@@ -89,8 +89,8 @@ def angles_of(path: Path) -> JointAngles:
 @pytest.mark.slow
 def test_a_motion_on_the_right_foot_is_its_mirror_image(tmp_path: Path) -> None:
     angles = angles_of(written(tmp_path, "nao-ssp"))
-    columns = [angles.joints.index(partner(name)) for name in angles.joints]
-    signs = np.array([mirror_sign(ROBOT, name, partner(name)) for name in angles.joints])
+    columns = [angles.joints.index(find_partner(name)) for name in angles.joints]
+    signs = np.array([mirror_sign(ROBOT, name, find_partner(name)) for name in angles.joints])
     turned = JointAngles(owner="turned", joints=angles.joints, t=angles.t + 3.0, q=signs * angles.q[:, columns])
     gait, straight = make_recorded_gait(turned), make_recorded_gait(angles)
     assert gait.motion.mirrored and gait.gait == "nao-ssp"

@@ -9,8 +9,8 @@ from casadi import SX
 
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joints import ARM_JOINTS
-from nlp_gait.gaits.nao.least_power.world_frame import leg_rates
-from nlp_gait.robots.tree import tree_from
+from nlp_gait.gaits.nao.least_power.world_frame import compute_leg_rates
+from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -37,7 +37,7 @@ def test_torques_and_wrench_are_the_recursions(robot: str, share: float) -> None
     stance = Motion(SX.sym("stance", 3), SX(3, 1), SX(3, 1))
     arms = {f"{side}{name}": moving(f"{side}{name}", 1) for side in "LR" for name in ARM_JOINTS}
     ankles = {"L": stance, "R": swing}
-    tree, shares = tree_from(model, model.feet["left"].link), {model.root: SX(share)}
+    tree, shares = make_tree(model, model.feet["left"].link), {model.root: SX(share)}
     plan = body.plan(hip, arms, ankles, SX(0.01), Exact())
     q, qd, qdd = ({name: joint[order] for name, joint in plan.joints.items()} for order in range(3))
     expected = newton_euler(tree, q, qd, qdd, GRAVITY, shares)
@@ -60,7 +60,7 @@ def test_rates_of_a_leg_are_those_of_its_angles() -> None:
     thigh, tibia = 0.1, 0.1029
     apart = moving("apart", 3)
     angles = leg_angles(apart, thigh, tibia, SX(0.01), Exact())
-    rates, distance_squared = leg_rates(apart, thigh, tibia, 0.99)
+    rates, distance_squared = compute_leg_rates(apart, thigh, tibia, 0.99)
     both = ca.Function("both", [*apart], [angles.joints.velocity, ca.vertcat(*rates), distance_squared])
     rng = np.random.default_rng(SEED)
     for _ in range(20):

@@ -16,14 +16,14 @@ from casadi import DM, SX
 import nlp_gait
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench.facts import load_facts
-from nlp_gait.gaits.biped.curves import HIP_CURVES, hip_on_spline
+from nlp_gait.gaits.biped.curves import HIP_CURVES, move_hip
 from nlp_gait.gaits.biped.support_phases import place_stance, swing_foot
-from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, arm_joints, find_upright_links, make_nao
+from nlp_gait.gaits.nao.body import ARM_SWING, GRAVITY, find_upright_links, make_nao, move_arms
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, JOINTS, LEG_JOINTS, measure_leg
-from nlp_gait.gaits.nao.least_power.world_frame import Frame, chain_frames, leg_frames, upright
+from nlp_gait.gaits.nao.least_power.world_frame import Frame, make_chain_frames, make_leg_frames, make_upright_frame
 from nlp_gait.proofs.affine import AffineFunction
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import TreeBody, tree_from
+from nlp_gait.robots.tree import TreeBody, make_tree
 from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -47,15 +47,19 @@ def upright_frames(
     arms: Mapping[str, Motion],
     largest_cosine: float = 1.0,
 ) -> dict[str, Frame]:
-    """Return the frames of all links in the motion that ``NaoBody`` plans; see ``leg_frames``."""
-    frames = {robot.root: upright(hip)}
+    """Return the frames of all links in the motion that ``NaoBody`` plans; see ``make_leg_frames``."""
+    frames = {robot.root: make_upright_frame(hip)}
     for side, ankle in ankles.items():
         geometry, pelvis = measure_leg(robot, side), robot.joint(f"{side}HipYawPitch")
         at_hip, at_pelvis = (add_motions(hip, resting_point(place)) for place in (geometry.hip_m, pelvis.origin_m))
-        leg = leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, largest_cosine)
+        leg = make_leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, largest_cosine)
         *turning, foot = (robot.joint(f"{side}{name}").child for name in LEG_JOINTS)
-        frames |= {pelvis.child: upright(at_pelvis), **dict(zip(turning, leg, strict=True)), foot: upright(ankle)}
-        frames |= chain_frames([robot.joint(f"{side}{name}") for name in ARM_JOINTS], arms, hip)
+        frames |= {
+            pelvis.child: make_upright_frame(at_pelvis),
+            **dict(zip(turning, leg, strict=True)),
+            foot: make_upright_frame(ankle),
+        }
+        frames |= make_chain_frames([robot.joint(f"{side}{name}") for name in ARM_JOINTS], arms, hip)
     return frames
 
 
@@ -152,7 +156,7 @@ def enclose_sample(edge: float) -> tuple[Errors, Errors]:
 def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
     body = make_nao("nao-v5")
     robot = body.robot
-    stance, foot, tree = place_stance(body, STEP_M), robot.feet["left"], tree_from(robot, robot.feet["left"].link)
+    stance, foot, tree = place_stance(body, STEP_M), robot.feet["left"], make_tree(robot, robot.feet["left"].link)
     z = SX.sym("z", len(names))
     time, phase = z[-1], SX(PHASE)
     sums = [part / time for k in (1, 3, 5) for part in (z[k] + z[k + 1], z[k] - z[k + 1])]
@@ -165,11 +169,11 @@ def _sample(in_world: bool, names: tuple[str, ...]) -> ca.Function:
         hip = stack(parts[1], parts[2], parts[0])
     else:
         still = dict.fromkeys(HIP_CURVES, constant_motion(0.0))
-        hip = hip_on_spline(at, still, stance.hip_x, stance.hip_y, time, phase)
+        hip = move_hip(at, still, stance.hip_x, stance.hip_y, time, phase)
     path = (SX(end) for end in stance.swing_x)
     swing = swing_foot(*path, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], time, phase)
     ankles = {"L": resting_point((*stance.support_xy, foot.ankle_height_m)), "R": swing}
-    arms = arm_joints(ARM_SWING["ssp"], time, phase)
+    arms = move_arms(ARM_SWING["ssp"], time, phase)
     if in_world:
         frames = upright_frames(robot, hip, ankles, arms, 1 - REACH_MARGIN)
         torques, wrench = world_frame_dynamics(tree, frames, {}, GRAVITY)

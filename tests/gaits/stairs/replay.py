@@ -10,7 +10,7 @@ import numpy as np
 from casadi import MX, SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.planar_biped import MOVING, biped_dynamics, link_angles
+from nlp_gait.gaits.stairs.planar_biped import MOVING, link_angles, make_dynamics
 
 STEP_S = 1e-3
 N = len(MOVING)
@@ -44,7 +44,7 @@ def replay(arrays: Mapping[str, Array], gains: tuple[float, float]) -> tuple[Arr
 def _step() -> ca.Function:
     """(state, planned angles, rates and accelerations with the time since then, gains) to the state a step later."""
     q, v, planned, gains = SX.sym("q", N), SX.sym("v", N), SX.sym("planned", 3 * N + 1), SX.sym("gains", 2)
-    motion = biped_dynamics(q, v, link_angles(q))
+    motion = make_dynamics(q, v, link_angles(q))
     dynamics = ca.Function("dynamics", [q, v], ca.cse([motion.M, motion.C @ v + motion.G]))
     q0, v0, a, time = ca.vertsplit(planned, [0, N, 2 * N, 3 * N, 3 * N + 1])
     now_q, now_v = q0 + v0 * time + a * time**2 / 2, v0 + a * time

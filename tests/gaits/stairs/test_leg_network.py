@@ -9,7 +9,7 @@ from casadi import SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.leg_network import NetworkSettings, compute_leg_rates, leg_vector, network_angles
+from nlp_gait.gaits.stairs.leg_network import NetworkSettings, compute_leg_rates, compute_leg_vector, train_angles
 
 THIGH = SHANK = 0.4
 # A millimetre at the ankle, on a knee bent by at least 0.5 rad.
@@ -31,22 +31,22 @@ def path() -> tuple[Array, Array]:
 @pytest.mark.parametrize("settings", [NetworkSettings(), NetworkSettings(rule="gradient", rate=0.3)])
 def test_every_pose_is_learned(path: tuple[Array, Array], settings: NetworkSettings) -> None:
     angles, ankle = path
-    found = network_angles(ankle, THIGH, SHANK, settings)
+    found = train_angles(ankle, THIGH, SHANK, settings)
     assert (found.error_m2 <= settings.tolerance_m2).all()
     assert np.abs(found.angles - angles).max() < ANGLE_TOLERANCE
     assert found.iterations[0] > found.iterations[1:].mean()  # the first pose takes longest
 
 
 def test_the_printed_rate_does_not_converge(path: tuple[Array, Array]) -> None:
-    found = network_angles(path[1][:5], THIGH, SHANK, NetworkSettings(rule="gradient", rate=1e-4, iterations=500))
+    found = train_angles(path[1][:5], THIGH, SHANK, NetworkSettings(rule="gradient", rate=1e-4, iterations=500))
     assert (found.error_m2 > 1e-6).sum() >= 4
 
 
 def test_gradients_by_weights_are_those_of_the_error() -> None:
     """Against CasADi's derivatives, through one gradient step."""
     rate, target = 1e-3, np.array([0.1, -0.6])
-    before = network_angles(target[None], THIGH, SHANK, NetworkSettings(rule="gradient", rate=1e-12, iterations=1))
-    after = network_angles(target[None], THIGH, SHANK, NetworkSettings(rule="gradient", rate=rate, iterations=1))
+    before = train_angles(target[None], THIGH, SHANK, NetworkSettings(rule="gradient", rate=1e-12, iterations=1))
+    after = train_angles(target[None], THIGH, SHANK, NetworkSettings(rule="gradient", rate=rate, iterations=1))
     rng = np.random.default_rng(0)
     inner, outer = ca.MX.sym("inner", 10, 2), ca.MX.sym("outer", 2, 10)
     hip, knee = ca.vertsplit(outer @ (1 / (1 + ca.exp(-(inner @ ca.DM(target))))))
@@ -65,7 +65,7 @@ def test_gradients_by_weights_are_those_of_the_error() -> None:
 def test_rates_of_the_leg_move_its_ankle_as_requested() -> None:
     angles, velocity = SX.sym("angles", 2), SX.sym("velocity", 2)
     rates = compute_leg_rates(angles, velocity, THIGH, 1.2 * SHANK)
-    moved = ca.jtimes(leg_vector(angles, THIGH, 1.2 * SHANK), angles, rates)
+    moved = ca.jtimes(compute_leg_vector(angles, THIGH, 1.2 * SHANK), angles, rates)
     at = ca.Function("moved", [angles, velocity], [moved, rates])
     assert at([1.2, 2.0], [0.3, -0.7])[0].full().ravel() == pytest.approx([0.3, -0.7], rel=1e-5)
     assert np.isfinite(at([1.2, 1.2], [0.3, -0.7])[1].full()).all()  # a straight knee

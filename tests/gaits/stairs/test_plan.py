@@ -14,7 +14,7 @@ from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.stairs.planar_biped import toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import load_toe_foot_biped
 from nlp_gait.gaits.stairs.stair import CASES, PAPER_TIMES
 
 # Best of 20 starts, case 2 of Table IV.
@@ -60,7 +60,7 @@ def test_limits_and_scales_of_rows(problem: GaitProblem) -> None:
     assert limits == LIMITS
     assert {row: scale for row, _, _, _, _, scale in found if row != "bounds"} == SCALES
     (zmp,) = {(low, high) for row, _, _, low, high, _ in found if row == "stance_zmp"}
-    assert zmp == pytest.approx((0.01, toe_foot_biped().foot_m - 0.01))
+    assert zmp == pytest.approx((0.01, load_toe_foot_biped().foot_m - 0.01))
 
 
 @pytest.mark.slow

@@ -8,8 +8,15 @@ import pytest
 from casadi import SX
 
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.stairs.planar_biped import ENDS, LINKS, link_angles, loads, points, toe_foot_biped
-from nlp_gait.gaits.stairs.planned_motion import StairPlan, foot_angles
+from nlp_gait.gaits.stairs.planar_biped import (
+    ENDS,
+    LINKS,
+    compute_loads,
+    link_angles,
+    load_toe_foot_biped,
+    locate_points,
+)
+from nlp_gait.gaits.stairs.planned_motion import StairPlan, compute_foot_angles
 
 GRAVITY, STEP = 9.81, 1e-4
 # Differences of positions along a parabola: the third derivative and rounding remain.
@@ -18,7 +25,7 @@ TOLERANCE = 1e-5
 
 def positions() -> ca.Function:
     q = SX.sym("q", 7)
-    found = points(link_angles(q), SX(2, 1))
+    found = locate_points(link_angles(q), SX(2, 1))
     return ca.Function("ends", [q], [ca.horzcat(*(ca.horzcat(found[a], found[b]) for a, b in ENDS.values()))])
 
 
@@ -27,7 +34,7 @@ def momenta(ends: ca.Function, q: Array, v: Array) -> tuple[Array, float, float]
     before, now, later = (np.array(ends(q + sign * STEP * v)) for sign in (-1, 0, 1))
     momentum, spin, weight = np.zeros(2), 0.0, 0.0
     for k, link in enumerate(ENDS):
-        rod = toe_foot_biped().link(link)
+        rod = load_toe_foot_biped().link(link)
         middles = [(at[:, 2 * k] + at[:, 2 * k + 1]) / 2 for at in (before, now, later)]
         angles = [np.arctan2(*(at[:, 2 * k + 1] - at[:, 2 * k])[::-1]) for at in (before, later)]
         rate = (middles[2] - middles[0]) / (2 * STEP)
@@ -44,9 +51,9 @@ def test_force_and_pressure_balance_all_momenta(moving: float) -> None:
     q = np.array([1.4, 1.9, 1.5, 1.4, 1.2, 0.1, 0.2])[: len(LINKS) - 2] + rng.uniform(-0.1, 0.1, 7)
     v, a = moving * rng.uniform(-1, 1, 7), moving * rng.uniform(-1, 1, 7)
     symbols = [SX.sym(name, 7) for name in ("q", "v", "a")]
-    found = loads(*symbols, {})
+    found = compute_loads(*symbols, {})
     force, pressure = map(np.array, ca.Function("loads", symbols, [found.stance_force, found.stance_pressure])(q, v, a))
-    ends, mass = positions(), toe_foot_biped().mass_kg
+    ends, mass = positions(), load_toe_foot_biped().mass_kg
     early, late = (momenta(ends, q + sign * STEP * v + a * STEP**2 / 2, v + sign * STEP * a) for sign in (-1, 1))
     _, _, weight = momenta(ends, q, v)
     assert force.ravel() == pytest.approx(
@@ -69,5 +76,5 @@ def test_the_foot_lifts_its_sole_then_its_toe_straightens_and_lands_as_it_left()
         (1, 1, 1, 1): (0.0, 0.7),
     }
     for shares, expected in angles.items():
-        found = [float(ca.evalf(angle)) for angle in foot_angles(plan, ca.SX(shares))]
+        found = [float(ca.evalf(angle)) for angle in compute_foot_angles(plan, ca.SX(shares))]
         assert found == pytest.approx(expected, abs=1e-12)

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, link_angles, points
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, link_angles, locate_points
 from nlp_gait.gaits.stairs.planned_motion import (
     Stair,
     StairPlan,
-    ankle,
-    ankle_on_toe,
-    hip,
-    in_time,
-    landed_angles,
-    posture,
-    stair_height,
+    compute_landed_angles,
+    compute_posture,
+    compute_stair_height,
+    locate_ankle,
+    locate_ankle_on_toe,
+    locate_hip,
+    move_in_time,
 )
 from nlp_gait.gaits.stairs.stair import CASES
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -53,7 +53,7 @@ def step(case: int) -> Stair[SX]:
 @pytest.fixture(params=CASES)
 def ankle_motion(request: pytest.FixtureRequest) -> ca.Function:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
-    motion = in_time(ankle(plan(), step(request.param), s), s, passing / plan().durations)
+    motion = move_in_time(locate_ankle(plan(), step(request.param), s), s, passing / plan().durations)
     return ca.Function("ankle", [s, passing], list(motion))
 
 
@@ -66,8 +66,8 @@ def test_ankle_velocity_is_continuous_at_every_knot(ankle_motion: ca.Function) -
 @pytest.mark.parametrize("case", CASES)
 def test_the_foot_lands_so_that_it_will_stand_two_steps_on(case: int) -> None:
     s = SX.sym("s", 4)
-    landing = ca.Function("landing", [s], [ankle(plan(), step(case), s)])([1, 1, 1, 1])
-    after = ca.Function("landed", [s], [ankle_on_toe(*landed_angles(plan(), s))])
+    landing = ca.Function("landing", [s], [locate_ankle(plan(), step(case), s)])([1, 1, 1, 1])
+    after = ca.Function("landed", [s], [locate_ankle_on_toe(*compute_landed_angles(plan(), s))])
     length, ratio = CASES[case]
     end = np.array([length, ratio * length])
     assert np.array(landing).ravel() == pytest.approx(end + np.array(after([0, 0, 0, 0])).ravel(), abs=1e-12)
@@ -77,7 +77,7 @@ def test_the_foot_lands_so_that_it_will_stand_two_steps_on(case: int) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_hip_advances_one_step_and_rises_with_it(case: int) -> None:
     s = SX.sym("s", 4)
-    at = ca.Function("hip", [s], [hip(plan(), step(case), s)])
+    at = ca.Function("hip", [s], [locate_hip(plan(), step(case), s)])
     first, last = (np.array(at(end)).ravel() for end in ([0, 0, 0, 0], [1, 1, 1, 1]))
     assert first == pytest.approx([PLAN["hip_start"], PLAN["hip_height"]], abs=1e-12)
     assert last - first == pytest.approx([float(size) for size in step(case)], abs=1e-12)
@@ -90,7 +90,7 @@ def test_the_hip_is_a_pendulum_over_the_planned_zmp(phase: int, speed: float) ->
     times = {name: PLAN[name] / speed for name in ("t1", "t2", "t_bc", "t3")}
     fast, stair = StairPlan(**{name: SX(value) for name, value in {**PLAN, **times}.items()}), step(2)
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
-    motion = in_time(hip(fast, stair, s), s, passing / fast.durations)
+    motion = move_in_time(locate_hip(fast, stair, s), s, passing / fast.durations)
     at = ca.Function("hip", [s, passing], [motion.position[0], motion.acceleration[0], ca.dot(fast.durations, s)])
     x, acceleration, t = (float(part) for part in at([1.0] * phase + [0.3] + [0.0] * (3 - phase), np.eye(4)[phase]))
     way, passed = float(stair.tread) + PLAN["zmp_end"] - PLAN["zmp_start"], t / times["t3"]
@@ -102,8 +102,8 @@ def test_the_hip_is_a_pendulum_over_the_planned_zmp(phase: int, speed: float) ->
 
 def test_forward_kinematics_of_the_posture_meets_hip_and_ankle() -> None:
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
-    found = posture(plan(), step(2), s, passing / plan().durations, SX(0.005), Exact())
-    placed = points(link_angles(found.q.position), SX(2, 1))
+    found = compute_posture(plan(), step(2), s, passing / plan().durations, SX(0.005), Exact())
+    placed = locate_points(link_angles(found.q.position), SX(2, 1))
     errors = ca.vertcat(placed["H"] - found.hip.position, placed["A"] - found.ankle.position)
     rate_error = ca.jtimes(found.q.position, s, passing / plan().durations) - found.q.velocity
     check = ca.Function("check", [s, passing], [errors, rate_error, found.reach])
@@ -118,6 +118,6 @@ def test_forward_kinematics_of_the_posture_meets_hip_and_ankle() -> None:
 
 def test_stair_profile_has_two_edges() -> None:
     x, stair = SX.sym("x"), Stair(SX(0.25), SX(0.17))
-    height = ca.Function("height", [x], [stair_height(x, stair, 0.06, 0.003)])
+    height = ca.Function("height", [x], [compute_stair_height(x, stair, 0.06, 0.003)])
     assert [float(height(at)) for at in (-0.2, 0.0, 0.1, 0.25)] == pytest.approx([-0.17, 0.0, 0.0, 0.17], abs=1e-6)
     assert float(height(-0.06)) == pytest.approx(-0.085)

@@ -1,4 +1,4 @@
-"""Balance with the load on both feet: against ``loads`` on a flat stance foot, and while that foot lands on its toe."""
+"""Balance with the load on both feet: against ``compute_loads`` on a flat stance foot, and while that foot lands on its toe."""
 
 from __future__ import annotations
 
@@ -11,10 +11,16 @@ import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Signals
 from nlp_gait.gaits.stairs.plan_samples import PlannedStep
-from nlp_gait.gaits.stairs.planar_biped import GRAVITY, centres, loads, points, toe_foot_biped
+from nlp_gait.gaits.stairs.planar_biped import (
+    GRAVITY,
+    compute_loads,
+    load_toe_foot_biped,
+    locate_centres,
+    locate_points,
+)
 from nlp_gait.symbolic.nonsmooth import Exact
 
-FOOT, TREAD = toe_foot_biped().foot_m, 0.254
+FOOT, TREAD = load_toe_foot_biped().foot_m, 0.254
 NEAR_BEST = (0.69, 0.09, 0.24, 0.09, 0.7, 1.45, 0.58, 0.8, 1.3, 0.32)
 FIRST = (0.70, 0.13, 0.07, 0.10, 0.5, 1.45, 0.58, 1.2, 2.0, 0.32)
 
@@ -32,7 +38,7 @@ def test_torques_and_pressure_are_those_of_the_flat_stance_foot() -> None:
     behind = (*NEAR_BEST[:2], 0.2, *NEAR_BEST[3:])  # the ZMP starts near the rear foot
     arrays = move("next", behind).arrays
     q, v, a, force = (SX.sym(name, size) for name, size in (("q", 7), ("v", 7), ("a", 7), ("force", 2)))
-    found = loads(q, v, a, {"T": force})
+    found = compute_loads(q, v, a, {"T": force})
     at = ca.Function("loads", [q, v, a, force], [found.torque, found.stance_force, found.stance_pressure])
     shares = []
     for k in range(len(arrays["t"])):
@@ -61,7 +67,7 @@ def test_the_printed_zmp_differs_by_the_spin_of_links_only() -> None:
 def test_the_landing_foot_turns_about_its_toe() -> None:
     arrays = move("landing", NEAR_BEST).arrays
     q, foot, ankle = SX.sym("q", 7), SX.sym("foot", 2), SX.sym("ankle", 2)
-    found = points(ca.vertcat(q, foot), ankle)
+    found = locate_points(ca.vertcat(q, foot), ankle)
     at = ca.Function("points", [q, foot, ankle], [found["T'"], found["H"], found["A"]])
     for k in range(len(arrays["t"])):
         toe, hip, swing = (
@@ -88,10 +94,10 @@ def test_power_of_all_joints_is_the_change_of_mechanical_energy() -> None:
     fields = (samples.time, samples.power, samples.q, samples.stance_foot, samples.stance_ankle)
     time, power, q, foot, place = (np.array(ca.evalf(part)) for part in fields)
     angles, ankle = SX.sym("q", 9), SX.sym("ankle", 2)
-    middles = centres(points(angles, ankle))
+    middles = locate_centres(locate_points(angles, ankle))
     centre = ca.Function("centres", [angles, ankle], [ca.vertcat(*middles.values())])
     masses, spins = (
-        np.array([getattr(link, name) for link in toe_foot_biped().links]) for name in ("mass_kg", "inertia_kgm2")
+        np.array([getattr(link, name) for link in load_toe_foot_biped().links]) for name in ("mass_kg", "inertia_kgm2")
     )
     checked = 0
     for phase in range(4):

@@ -26,8 +26,10 @@ FORM_OPTIONS = ("analytic", "cubic", "power", "", "carried")
 STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 
 
-def power_form_maker(robot: Robot, make_phase: Callable[[float], PowerPhase]) -> Callable[[GaitProblem], PowerForm]:
-    """Return the maker of a phase's power form; ``make_phase`` takes the knee's largest cosine, see ``leg_frames``."""
+def make_power_form_maker(
+    robot: Robot, make_phase: Callable[[float], PowerPhase]
+) -> Callable[[GaitProblem], PowerForm]:
+    """Return the maker of a phase's power form; ``make_phase`` takes the knee's largest cosine, see ``make_leg_frames``."""
 
     def make(problem: GaitProblem) -> PowerForm:
         margin = problem.value("reach_margin")
@@ -45,7 +47,7 @@ def to_z(x: Array) -> Array:
     return z
 
 
-def _box_of_z(problem: GaitProblem) -> Array:
+def _make_box_of_z(problem: GaitProblem) -> Array:
     box = np.stack([problem.lower, problem.upper], axis=-1)
     times = box[-1]
     for k in PAIRS:
@@ -134,7 +136,7 @@ def _make_power_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> P
     indexes = {f"dbm_{axis}_mean_m": mean for axis, mean in means.items()}
     indexes["torque_change_Nm"] = ca.mmax(ca.fabs(ca.vertcat(*changes)))
     indexes["power_W"] = power / z[-1] + sum((loss * out.expressions[heat] for heat, loss in out.heats), SX(0))
-    box = _box_of_z(problem)
+    box = _make_box_of_z(problem)
     poses = [out.expressions[out.rows[k][0]] for k in out.pose_rows]
     return PowerForm(
         to_z=to_z,

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.biped.load_sharing import Division, torso_shares
+from nlp_gait.gaits.biped.load_sharing import Division, share_torso
 from nlp_gait.gaits.biped.support_phases import Point2, Stance, make_support_box, swing_foot
-from nlp_gait.gaits.nao.body import GRAVITY, arm_joints
+from nlp_gait.gaits.nao.body import GRAVITY, move_arms
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
 from nlp_gait.gaits.nao.least_power import world_frame
 from nlp_gait.robots import Robot
@@ -48,7 +48,7 @@ class PowerInstant:
 
     robot: Robot  # of the phase
     rate_squared: SX  # 1 / T^2 for the time T
-    cosine: float  # largest one of the knee's angle, see ``leg_frames``
+    cosine: float  # largest one of the knee's angle, see ``make_leg_frames``
     torques: dict[str, SX] = field(default_factory=dict)  # by joint, in the time T
     rates: dict[str, SX] = field(default_factory=dict)  # of the joints that turn, in unit time
     zmp: SX = field(default_factory=SX)  # (2,) [m]
@@ -63,7 +63,7 @@ class PowerInstant:
     def add_arm(self, side: str, arms: Mapping[str, Motion], acceleration: SX) -> SX:
         """Add the torques of an arm, whose pose at one phase is numbers; returns its wrench (6, 2) about the torso's origin."""
         joints, a = [self.robot.joint(f"{side}{name}") for name in ARM_JOINTS], SX.sym("a", 3)
-        frames = world_frame.chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
+        frames = world_frame.make_chain_frames(joints, arms, Motion(SX(3, 1), SX(3, 1), a))
         carried, at, rows = SX(6, 2), SX(3, 1), list[SX]()
         for joint in reversed(joints):
             frame = frames[joint.child]
@@ -111,16 +111,20 @@ class PowerInstant:
         """
         geometry, yaw = measure_leg(self.robot, side), self.robot.joint(f"{side}HipYawPitch")
         at_hip = add_motions(hip, resting_point(geometry.hip_m))
-        frames = world_frame.leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        frames = world_frame.make_leg_frames(at_hip, ankle, geometry.thigh_m, geometry.tibia_m, self.cosine)
         apart = Motion(*(a - h for a, h in zip(ankle, at_hip, strict=True)))
-        rates, distance_squared = world_frame.leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
+        rates, distance_squared = world_frame.compute_leg_rates(apart, geometry.thigh_m, geometry.tibia_m, self.cosine)
         self.rates |= {f"{side}{name}": rate for name, rate in zip(LEG_JOINTS, rates, strict=True)}
         self.reaches[side] = distance_squared
         self.sideways[side] = apart.position[1], -apart.position[2]
         names = (yaw.child, *(self.robot.joint(f"{side}{name}").child for name in LEG_JOINTS))
         wrenches = [
             self.link_wrench(name, frame)
-            for name, frame in zip(names, (world_frame.upright(hip), *frames, world_frame.upright(ankle)), strict=True)
+            for name, frame in zip(
+                names,
+                (world_frame.make_upright_frame(hip), *frames, world_frame.make_upright_frame(ankle)),
+                strict=True,
+            )
         ]
         tibia = self.robot.links[names[3]]
         x, y, z = tibia.com_m
@@ -135,7 +139,7 @@ class PowerInstant:
         return [*zip(wrenches, about, strict=True)], [*map(LegJoint, names, axes, places)]
 
 
-def double_support_instants(
+def make_double_support(
     robot: Robot,
     soles: Mapping[str, Point2],
     hip_ends: tuple[Point2, Point2],
@@ -143,16 +147,16 @@ def double_support_instants(
     rule: Division,
     cosine: float,
 ) -> PowerPhase:
-    """Return double support: each leg stands on its own foot at ``soles`` [m]; for ``cosine`` see ``leg_frames``."""
+    """Return double support: each leg stands on its own foot at ``soles`` [m]; for ``cosine`` see ``make_leg_frames``."""
     ankles = {side: SX(DM([*xy, measure_leg(robot, side).ankle_height_m])) for side, xy in soles.items()}
     feet_y = (measure_leg(robot, "L").hip_m[1], measure_leg(robot, "R").hip_m[1])
     weight = robot.mass_kg * GRAVITY
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip, arms = _hip(z, *hip_ends, phase), arm_joints(arm_swing, ONE, SX(phase))
+        hip, arms = _move_hip(z, *hip_ends, phase), move_arms(arm_swing, ONE, SX(phase))
         found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
-        shares = torso_shares(hip.position[1], rule, feet_y)
-        torso = found.link_wrench(robot.root, world_frame.upright(hip))
+        shares = share_torso(hip.position[1], rule, feet_y)
+        torso = found.link_wrench(robot.root, world_frame.make_upright_frame(hip))
         moments, loads = [], []
         for side, foot in (("L", robot.feet["left"]), ("R", robot.feet["right"])):
             upper = found.add_arm(side, arms, hip.acceleration) + shares[side] * torso
@@ -165,24 +169,26 @@ def double_support_instants(
 
     box = make_support_box(robot, soles)
     sides = ((box.back, box.front), (box.right, box.left))
-    return PowerPhase(instant, sides, {axis: _nearer_margin(*pair) for axis, pair in zip("xy", sides, strict=True)})
+    return PowerPhase(
+        instant, sides, {axis: _find_nearer_margin(*pair) for axis, pair in zip("xy", sides, strict=True)}
+    )
 
 
-def single_support_instants(robot: Robot, stance: Stance, arm_swing: Mapping[str, Point2], cosine: float) -> PowerPhase:
+def make_single_support(robot: Robot, stance: Stance, arm_swing: Mapping[str, Point2], cosine: float) -> PowerPhase:
     """Return single support: the left leg carries everything.
 
-    Arm joints move from angle to angle [rad]. For the largest cosine of the knee's angle see ``leg_frames``.
+    Arm joints move from angle to angle [rad]. For the largest cosine of the knee's angle see ``make_leg_frames``.
     """
     foot, weight = robot.feet["left"], robot.mass_kg * GRAVITY
     support = SX(DM([*stance.support_xy, foot.ankle_height_m]))
 
     def instant(z: SX, phase: float) -> PowerInstant:
-        hip = _hip(z, stance.hip_x, stance.hip_y, phase)
-        arms = arm_joints(arm_swing, ONE, SX(phase))
+        hip = _move_hip(z, stance.hip_x, stance.hip_y, phase)
+        arms = move_arms(arm_swing, ONE, SX(phase))
         found = PowerInstant(robot=robot, rate_squared=1 / z[-1] ** 2, cosine=cosine)
         begin, end = (SX(x) for x in stance.swing_x)
         path = swing_foot(begin, end, stance.swing_y, robot.feet["right"].ankle_height_m, z[-2], ONE, SX(phase))
-        upper = found.link_wrench(robot.root, world_frame.upright(hip))
+        upper = found.link_wrench(robot.root, world_frame.make_upright_frame(hip))
         for side in "LR":
             upper = upper + found.add_arm(side, arms, hip.acceleration)
         upper = upper + found.add_swing_leg("R", hip, path)
@@ -198,16 +204,16 @@ def single_support_instants(robot: Robot, stance: Stance, arm_swing: Mapping[str
         low, high = sides[0]
         return (high - at) - ca.if_else(at - x < 0, (high - at) - (at - low), 0)
 
-    return PowerPhase(instant, sides, {"x": margin_x, "y": _nearer_margin(*sides[1])})
+    return PowerPhase(instant, sides, {"x": margin_x, "y": _find_nearer_margin(*sides[1])})
 
 
-def _hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
+def _move_hip(z: SX, along: Point2, across: Point2, phase: float) -> Motion:
     s = SX(phase)
     up = cubic_of_sums(z[0], z[0], z[1], z[2], s)
     return stack(cubic_of_sums(*along, z[3], z[4], s), cubic_of_sums(*across, z[5], z[6], s), up)
 
 
-def _nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
+def _find_nearer_margin(low: float, high: float) -> Callable[[SX], SX]:
     """Return the distance to the nearer of two sides."""
     return lambda at: (high - low) / 2 - ca.fabs(at - (low + high) / 2)
 

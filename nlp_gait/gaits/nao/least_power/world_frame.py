@@ -33,7 +33,7 @@ class LegFrames(NamedTuple):
     ankle: Frame
 
 
-def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_cosine: float = 1.0) -> LegFrames:
+def make_leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_cosine: float = 1.0) -> LegFrames:
     """Return the frames of a leg's links for the motions (3,) of its hip joint and its ankle [m].
 
     The lengths of thigh and tibia are in metres. Distances beyond the one at the largest cosine of the knee's angle are replaced
@@ -55,8 +55,8 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
         along = 0.5 + (thigh**2 - tibia**2) / 2 * inverse
         across = thigh * tibia * ca.sqrt(1 - cosine * cosine) * inverse
         out, down = along * x + across * length, along * length - across * x  # of the knee from the hip
-        upper = _pitch(-out / thigh, down / thigh, forward, left, upward)
-        lower = _pitch((out - x) / tibia, (length - down) / tibia, forward, left, upward)
+        upper = _turn_axes(-out / thigh, down / thigh, forward, left, upward)
+        lower = _turn_axes((out - x) / tibia, (length - down) / tibia, forward, left, upward)
         return ca.horzcat(forward, left, upward, upper, lower, out * forward - down * upward)
 
     moved = map_motion(columns, Motion(*(a - h for a, h in zip(ankle, hip, strict=True))))
@@ -65,12 +65,12 @@ def leg_frames(hip: Motion, ankle: Motion, thigh: float, tibia: float, largest_c
     return LegFrames(Frame(rolled, hip), Frame(upper, hip), Frame(lower, knee), Frame(rolled, ankle))
 
 
-def _pitch(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
+def _turn_axes(sine: SX, cosine: SX, forward: SX, left: SX, upward: SX) -> SX:
     """Return (3, 3) axes turned about the second one."""
     return ca.horzcat(cosine * forward - sine * upward, left, sine * forward + cosine * upward)
 
 
-def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Motion) -> dict[str, Frame]:
+def make_chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Motion) -> dict[str, Frame]:
     """Return the frames of a chain's links, outwards from a base (3,) [m] that does not turn, with angles by joint name [rad]."""
     names = [joint.name for joint in joints]
 
@@ -92,7 +92,7 @@ def chain_frames(joints: Sequence[Joint], angles: Mapping[str, Motion], base: Mo
     return frames
 
 
-def upright(origin: Motion) -> Frame:
+def make_upright_frame(origin: Motion) -> Frame:
     """Return the frame of a link that does not turn."""
     return Frame(Motion(SX.eye(3), SX(3, 3), SX(3, 3)), origin)
 
@@ -122,10 +122,12 @@ def link_wrench(link: Link, axes: Motion, acceleration: SX, gravity: float) -> S
     return ca.horzcat(weight, ca.vertcat(force, moment))
 
 
-def leg_rates(hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float) -> tuple[tuple[SX, ...], SX]:
+def compute_leg_rates(
+    hip_to_ankle: Motion, thigh: float, tibia: float, largest_cosine: float
+) -> tuple[tuple[SX, ...], SX]:
     """Compute the rates of roll, pitch, knee, ankle pitch and ankle roll, and the squared distance of hip and ankle [m^2].
 
-    From the motion (3,) of the ankle seen from the hip joint and the lengths of both links [m]; see ``leg_frames``.
+    From the motion (3,) of the ankle seen from the hip joint and the lengths of both links [m]; see ``make_leg_frames``.
 
     Source:
         Derivatives of Gupta, Pratihar, Deb (2023), eqs. (5)-(14), as in ``kinematics.leg_angles``.
