@@ -89,7 +89,7 @@ def compute_joint_angles(q: Array, *, rates: bool = False) -> Array:
 
 
 def compute_joint_torques(model: Array, stance_toe: Array) -> Array:
-    """Return joint torques (T, 8) from ``loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
+    """Return joint torques (T, 8) from ``compute_loads``' (T, 7) and the standing toe's (T,), which these lack [Nm]."""
     found = {name: sense * model[:, biped.JOINTS.index(joint)] for name, (joint, sense) in MODEL_JOINT.items()}
     return np.stack([found.get(name, stance_toe) for name in JOINTS], axis=1)
 

@@ -52,7 +52,7 @@ def test_the_command_judges_simulates_and_compares_with_the_optimum(gait: Path, 
 
 
 def test_tighter_limits_are_named(gait: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_optimum", lambda *_: None)
+    monkeypatch.setattr(module, "_solve_optimum", lambda *_: None)
     shown = nlp_gait("evaluate", "--motion", gait, "--no-engine", "--set", "torque_change_limit_Nm=0.01").stdout
     assert "Infeasible on the samples" in shown and "torque_change[" in shown and "In the engine" not in shown
 
@@ -82,7 +82,7 @@ def test_missing_results_are_explained(gait: Path, monkeypatch: pytest.MonkeyPat
     )
     leaning = make_recorded_gait(JointAngles(owner="leaning", joints=angles.joints, t=angles.t, q=q), gait="nao-ssp")
     with monkeypatch.context() as patch:
-        patch.setattr(module, "_optimum", lambda *_: None)
+        patch.setattr(module, "_solve_optimum", lambda *_: None)
         judged = judge_gait(leaning)
     assert any("the torso leans by" in note for note in judged.notes) and judged.engine is None
     still = JointAngles(owner="still", joints=angles.joints, t=angles.t, q=np.tile(angles.q[0], (len(angles.t), 1)))
