@@ -64,7 +64,7 @@ def main() -> None:
     """Print a line for each problem."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=1000)
-    parser.add_argument("--problems", default=",".join(nlp_gait.problem_names()))
+    parser.add_argument("--problems", default=",".join(nlp_gait.list_problems()))
     arguments = parser.parse_args()
     print(TABLE.format("problem", "points", *COLUMNS, "not finite"))
     for name in arguments.problems.split(","):

@@ -43,7 +43,7 @@ class Found(NamedTuple):
 
 def from_gaitbench() -> Iterator[Found]:
     """Yield the instances; their points have no violation at all, so they come first."""
-    for id in gaitbench.names():
+    for id in gaitbench.list_instances():
         instance = gaitbench.load(id)
         evidence, runs = instance.evidence, instance.evidence.cma_runs
         found_by = f"{evidence.starts} start{'s' * (evidence.starts > 1)} of IPOPT"

@@ -98,7 +98,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=RUNS, help="of each search; 0 for none")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     arguments = parser.parse_args()
-    for name in arguments.problems or [name for name in nlp_gait.problem_names() if name != "gaitbench"]:
+    for name in arguments.problems or [name for name in nlp_gait.list_problems() if name != "gaitbench"]:
         began = time.perf_counter()
         found = measured(name, arguments.records, arguments.starts, arguments.runs, arguments.jobs)
         write_json(FILE, {**read_raw(), name: asdict(found)})

@@ -28,7 +28,7 @@ from tests.pinocchio_oracle import floating_model, stand
 
 SHARE = "share/example-robot-data/robots"
 CANDIDATES, STARTS, STEPS = 200, 10, 4
-SEARCHES = {name: metaheuristics.algorithm(name) for name in ("pso", "ga", "aco")}
+SEARCHES = {name: metaheuristics.make_algorithm(name) for name in ("pso", "ga", "aco")}
 TIME_S = 2.0  # of NAO's single support
 CLOSURE_M = 1e-9
 

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.optimize import minimize as minimise_locally
 
 import nlp_gait
-from compare.bench.baseline import list_instances, load_baseline
+from compare.bench.baseline import list_baselines, load_baseline
 from metaheuristics import minimize
-from metaheuristics.registry import algorithm
+from metaheuristics.registry import make_algorithm
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -84,7 +84,7 @@ def run_search(problem: Problem, name: str, seed: int, budget: int, evaluate: Ev
     generations: list[Array] = []
     result = minimize(
         evaluate,
-        algorithm(name),
+        make_algorithm(name),
         evaluations=budget,
         seed=seed,
         callback=lambda X, f, violation: generations.append(X.copy()),
@@ -202,7 +202,7 @@ def descend(problem: Problem, evaluate: Evaluate, seed: int) -> Array:
 def collect_dimensions() -> list[dict[str, Any]]:
     """Return variables, and the median gaps of GaitBench's shipped runs of 10,000 evaluations."""
     rows = []
-    for id in list_instances():
+    for id in list_baselines():
         instance = gaitbench.load(id)
         costs: dict[str, list[float]] = {}
         for record in load_baseline(id):

@@ -34,7 +34,7 @@ def measure(name: str) -> dict[str, int]:
 def main() -> None:
     """Measure and write."""
     sizes = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    for name in set(nlp_gait.problem_names()) - {"gaitbench"}:  # which is nao-ssp by default
+    for name in set(nlp_gait.list_problems()) - {"gaitbench"}:  # which is nao-ssp by default
         sizes[name] = measure(name)
         print(name, sizes[name], flush=True)
         FILE.write_text(json.dumps(dict(sorted(sizes.items())), indent=1) + "\n", encoding="utf-8")

@@ -44,7 +44,7 @@ def measure(name: str, changes: int, starts: int, seed: int, *, predict: bool) -
     """Print one problem's times and shares."""
     problem = nlp_gait.load(name)
     solution = nlp_gait.solve(problem, starts=starts, solver=nlp_gait.IpoptSettings(compiled=True), workers=1)
-    plan = nlp_gait.replanner(problem, near=solution, predict=predict)
+    plan = nlp_gait.make_replanner(problem, near=solution, predict=predict)
     near = min(solution.starts, key=lambda outcome: outcome.rank)
     rng = np.random.default_rng(seed)
     drawn = [draw_change(problem, rng) for _ in range(changes)]

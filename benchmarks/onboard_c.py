@@ -44,7 +44,7 @@ def build(problem: GaitProblem, near: Outcome, folder: Path, flags: str = "") ->
 
 def compare(problem: GaitProblem, solution: Solution, changes: Sequence[Mapping[str, float]]) -> None:
     """Print a row: both solve the changes, each twice, so that a second solve removes the tolerance of the first."""
-    plan = nlp_gait.replanner(problem, near=solution)
+    plan = nlp_gait.make_replanner(problem, near=solution)
     near = min(solution.starts, key=lambda outcome: outcome.rank)
     with tempfile.TemporaryDirectory() as fast, tempfile.TemporaryDirectory() as plain:
         in_c = [build(problem, near, Path(folder), flags) for folder, flags in ((fast, ""), (plain, "-DLANES=2"))]

@@ -152,7 +152,7 @@ def main() -> None:
     print(f"IPOPT: power {optimum.objective:.4f} W")
     objective = nlp_gait.compile_objective(problem)
     for own in (Shrinking, annealing):
-        algorithm = metaheuristics.as_algorithm(own, own.__name__)
+        algorithm = metaheuristics.to_algorithm(own, own.__name__)
         result = metaheuristics.minimize(objective, algorithm, evaluations=2000)
         print(f"{own.__name__}, {result.evaluations} evaluations: power {result.objective:.4f} W")
 

@@ -3,7 +3,7 @@
 Independent of any problem and of CasADi: an objective is anything that follows `BatchObjective`.
 
     result = minimize(objective, ParticleSwarm(population=50), evaluations=10_000, seed=1)
-    result = minimize(objective, algorithm("ga", survival="generational"), handling=EpsilonLevel())
+    result = minimize(objective, make_algorithm("ga", survival="generational"), handling=EpsilonLevel())
 """
 
 from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
@@ -25,9 +25,16 @@ from metaheuristics.interface import (
 )
 from metaheuristics.minimize import minimize
 from metaheuristics.preparation import check_limits
-from metaheuristics.registry import ADAPTERS, ALGORITHMS, HANDLINGS, algorithm, handling, list_installed_algorithms
+from metaheuristics.registry import (
+    ADAPTERS,
+    ALGORITHMS,
+    HANDLINGS,
+    list_installed_algorithms,
+    make_algorithm,
+    make_handling,
+)
 from metaheuristics.settings import tunable
-from metaheuristics.user_algorithm import PlainFunction, as_algorithm
+from metaheuristics.user_algorithm import PlainFunction, to_algorithm
 
 __all__ = [
     "ADAPTERS",
@@ -56,11 +63,11 @@ __all__ = [
     "SinglePoint",
     "Start",
     "StaticPenalty",
-    "algorithm",
-    "as_algorithm",
     "check_limits",
-    "handling",
     "list_installed_algorithms",
+    "make_algorithm",
+    "make_handling",
     "minimize",
+    "to_algorithm",
     "tunable",
 ]

@@ -55,7 +55,7 @@ HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = {
 }
 
 
-def algorithm(name: str, /, **settings: object) -> Algorithm:
+def make_algorithm(name: str, /, **settings: object) -> Algorithm:
     """Make an algorithm by name.
 
     Args:
@@ -80,7 +80,7 @@ def _find_package(name: str) -> str:
     return PACKAGES.get(name, name.partition(":")[0])
 
 
-def handling(name: str, /, **settings: object) -> ConstraintHandling:
+def make_handling(name: str, /, **settings: object) -> ConstraintHandling:
     """Make a constraint handling by its name in `HANDLINGS`; raises SearchError as `algorithm` does."""
     return make_by_name("constraint handling", name, HANDLINGS, settings)
 

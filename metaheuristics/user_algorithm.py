@@ -17,7 +17,7 @@ INFEASIBLE = 1e9
 FAILED = 1e30
 
 
-def as_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None) -> Algorithm:
+def to_algorithm(user: Any, name: str, settings: Mapping[str, Any] | None = None) -> Algorithm:
     """Return the algorithm that an object is or makes.
 
     Args:

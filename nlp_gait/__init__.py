@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
     from nlp_gait.backends.onboard.replanner import Replan as Replan
     from nlp_gait.backends.onboard.replanner import Replanner as Replanner
-    from nlp_gait.backends.onboard.replanner import replanner as replanner
+    from nlp_gait.backends.onboard.replanner import make_replanner as make_replanner
     from nlp_gait.backends.optima.gait_library import GaitLibrary as GaitLibrary
     from nlp_gait.backends.optima.gait_library import LibraryGait as LibraryGait
     from nlp_gait.backends.optima.gait_library import load_library as load_library
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from nlp_gait.backends.solvers.registry import make_solver as make_solver
     from nlp_gait.errors import GaitError as GaitError
     from nlp_gait.formulation import GaitProblem as GaitProblem
+    from nlp_gait.formulation import list_problems as list_problems
     from nlp_gait.formulation import load as load
-    from nlp_gait.formulation import problem_names as problem_names
     from nlp_gait.formulation.solution import Solution as Solution
 
 # Imported on first use: a search needs no NLP solver, a solve no kernel, and the command line starts quickly.
 _PUBLIC = {
     "nlp_gait.errors": "GaitError",
-    "nlp_gait.formulation": "GaitProblem load problem_names",
+    "nlp_gait.formulation": "GaitProblem list_problems load",
     "nlp_gait.formulation.solution": "Solution",
     "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
     "nlp_gait.backends.functions.compiled_function": "CompiledFunction compile_function",
@@ -46,7 +46,7 @@ _PUBLIC = {
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",
     "nlp_gait.backends.optima.gait_library": "GaitLibrary LibraryGait load_library",
-    "nlp_gait.backends.onboard.replanner": "Replan Replanner replanner",
+    "nlp_gait.backends.onboard.replanner": "Replan Replanner make_replanner",
 }
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
 __all__ = sorted(_PLACES)

@@ -176,7 +176,7 @@ class RandomSearch:
 
 def test_a_search_algorithm_is_one_file_and_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(algorithms, "ALGORITHMS", {**algorithms.ALGORITHMS, "random-points": RandomPoints})
-    made = metaheuristics.algorithm("random-points", population=20)
+    made = metaheuristics.make_algorithm("random-points", population=20)
     result = metaheuristics.minimize(nlp_gait.compile_objective(nlp_gait.load("walk12")), made, evaluations=400)
     assert result.evaluations == 400 and made == RandomPoints(population=20)
 

@@ -44,7 +44,7 @@ def main() -> None:
     """Print the largest differences and how many points agree bit for bit."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--candidates", type=int, default=4000)
-    parser.add_argument("--problems", default=",".join(nlp_gait.problem_names()))
+    parser.add_argument("--problems", default=",".join(nlp_gait.list_problems()))
     arguments = parser.parse_args()
     print(TABLE.format("problem", "lanes", "bit-equal", "objective", "violation", "beyond 1e-9", "order changed"))
     for name in arguments.problems.split(","):

@@ -53,7 +53,7 @@ def main() -> None:
         pack_drawn(arguments.work)
         return
     solvers = arguments.solvers.split(",")
-    for id in arguments.instance or gaitbench.names(arguments.subset):
+    for id in arguments.instance or gaitbench.list_instances(arguments.subset):
         records: list[RunRecord] = []
         for solver in solvers:
             started = time.perf_counter()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from compare.bench.baseline import list_drawn, list_instances
+from compare.bench.baseline import list_baselines, list_drawn
 from compare.bench.leaderboard import make_leads, rank_solvers
 from compare.report.document import Document
 from compare.report.writing import render_markdown
@@ -52,7 +52,7 @@ def format_instances() -> str:
         "| id | what | n | inequalities | feasible | cost | best known | evidence |",
         "|---|---|--:|--:|--:|--:|--:|---|",
     ]
-    for id in gaitbench.names():
+    for id in gaitbench.list_instances():
         instance = gaitbench.load(id)
         share, small = instance.facts.feasible_share, instance.definition.small
         rows.append(
@@ -65,7 +65,7 @@ def format_instances() -> str:
 
 def describe_shipped() -> str:
     """Return a sentence on the instances whose records are shipped."""
-    there, everything = list_instances(), gaitbench.names()
+    there, everything = list_baselines(), gaitbench.list_instances()
     if set(there) >= set(everything):
         return "Records of all instances are shipped."
     return (
@@ -85,7 +85,7 @@ def make_catalogue() -> dict[str, Any]:
         "suite": SUITE,
         "package": "nlp-gait",
         "schema": 1,
-        "problems": [make_entry(id) for id in gaitbench.names()],
+        "problems": [make_entry(id) for id in gaitbench.list_instances()],
     }
 
 

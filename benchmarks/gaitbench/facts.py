@@ -20,7 +20,7 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
-from compare.bench.baseline import list_instances, load_baseline
+from compare.bench.baseline import list_baselines, load_baseline
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
 from nlp_gait.decoding import decode
@@ -74,7 +74,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a first pass: few starts, one short run of CMA-ES")
     parser.add_argument("--prove-s", type=float, default=0.0, help="time for a proof where one is possible; 0 for none")
     arguments = parser.parse_args()
-    for id in arguments.instance or gaitbench.names(arguments.subset):
+    for id in arguments.instance or gaitbench.list_instances(arguments.subset):
         kept = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
         published = decode(Facts, kept[id], id) if id in kept else None
         started = time.perf_counter()
@@ -90,7 +90,7 @@ def main() -> None:
             print(f"{id}: {error}", flush=True)
             continue
         kept[id] = asdict(found)
-        write_json(FILE, {name: kept[name] for name in gaitbench.names() if name in kept})
+        write_json(FILE, {name: kept[name] for name in gaitbench.list_instances() if name in kept})
         evidence = Evidence(**kept[id]["evidence"])
         print(f"{id}: {kept[id]['best_known']:.10g}, {evidence} ({time.perf_counter() - started:.0f} s)", flush=True)
 
@@ -172,7 +172,7 @@ def near(instance: Instance, point: Array) -> Iterator[Array]:
 
 def best_baseline_points(id: str) -> list[tuple[float, Array]]:
     """Return objective and point of the baseline's best feasible runs, the best first; empty without shipped records."""
-    if id not in list_instances():
+    if id not in list_baselines():
         return []
     runs = sorted(
         (record for record in load_baseline(id) if record.verdict.feasible), key=lambda r: r.verdict.objective

@@ -19,7 +19,7 @@ from compare.questions.pareto.front import solve_front
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, Assembly, GaitProblem, Point
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Solution
-from nlp_gait.gaitbench.fronts import LIMIT, SECOND, UNLIMITED, FrontInstance, fronts, get_front_definition
+from nlp_gait.gaitbench.fronts import LIMIT, SECOND, UNLIMITED, FrontInstance, get_front_definition, list_fronts
 
 FILE = Path(__file__).parents[2] / "nlp_gait" / "gaitbench" / "front_points.json"
 POINTS, STARTS = 40, 3
@@ -60,7 +60,7 @@ class SecondObjective:
 
 def main() -> None:
     """Solve the fronts that are named, or all that are missing; judge all."""
-    for id in sys.argv[1:] or [id for id in fronts() if id not in json.loads(FILE.read_text())]:
+    for id in sys.argv[1:] or [id for id in list_fronts() if id not in json.loads(FILE.read_text())]:
         begin, definition = time.process_time(), get_front_definition(id)
         problem = definition.make()
         front = solve_front(problem, SecondObjective(unit=definition.unit), points=POINTS, starts=STARTS)  # type: ignore[arg-type]

@@ -23,7 +23,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.gaitbench.positions", description=__doc__.splitlines()[0]
     )
-    parser.add_argument("--families", default=",".join(gaitbench.families()))
+    parser.add_argument("--families", default=",".join(gaitbench.list_families()))
     parser.add_argument("--seeds", default="0:12")
     arguments = parser.parse_args()
     everything: list[float] = []

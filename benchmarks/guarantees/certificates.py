@@ -21,7 +21,7 @@ from compare.papers.walk12.walk12_paper import TABLE_3
 from compare.questions.certainty import MOST_VARIABLES
 from nlp_gait.files import write_json
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaitbench.facts import get_definition, load_facts, names
+from nlp_gait.gaitbench.facts import get_definition, list_instances, load_facts
 from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, certify
 from nlp_gait.proofs.certificate import load_certificates, make_certificate_file
@@ -60,7 +60,7 @@ def make_problem(name: str) -> tuple[GaitProblem, Array]:
 
 def list_covered() -> list[str]:
     """Return the names of all certificates."""
-    instances = [id for id in names() if is_covered(make_instance(id)[0])]
+    instances = [id for id in list_instances() if is_covered(make_instance(id)[0])]
     return [*(f"{WALK}{row.weight:g}" for row in TABLE_3), *instances]
 
 

@@ -41,7 +41,7 @@ def choose_instances(
     if families is not None:
         drawn = parse_seeds(seeds)
         chosen += tuple(make_id(family.strip(), seed) for family in families.split(",") for seed in drawn)
-    chosen = chosen or (list_drawn() if suite == "drawn" else gaitbench.names(suite))
+    chosen = chosen or (list_drawn() if suite == "drawn" else gaitbench.list_instances(suite))
     for id in chosen:
         gaitbench.load(id)  # raises for unknown ids
     return chosen
@@ -70,14 +70,14 @@ def make_bench_study(
     return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
-def list_instances(folder: Path = FOLDER) -> tuple[str, ...]:
+def list_baselines(folder: Path = FOLDER) -> tuple[str, ...]:
     """Return the ids of the instances with baseline records, without drawn ones."""
     return tuple(sorted(path.name.removesuffix(".json.gz") for path in folder.glob("*.json.gz")))
 
 
 def list_drawn(folder: Path = FOLDER) -> tuple[str, ...]:
     """Return the ids of the drawn instances with baseline records."""
-    return tuple(id.replace("_", ":") for id in list_instances(folder / DRAWN))
+    return tuple(id.replace("_", ":") for id in list_baselines(folder / DRAWN))
 
 
 def locate_records(instance: str, folder: Path | None) -> Path:
@@ -91,6 +91,6 @@ def load_baseline(instance: str, folder: Path | None = None) -> tuple[RunRecord,
     """Return the records of all solvers of the baseline on an instance; raises InputError if none are shipped."""
     path = locate_records(instance, folder)
     if not path.is_file():
-        available = ", ".join((*list_instances(folder or FOLDER), *list_drawn(folder or FOLDER)))
+        available = ", ".join((*list_baselines(folder or FOLDER), *list_drawn(folder or FOLDER)))
         raise InputError(f"no baseline records of {instance!r} are shipped; available: {available}")
     return tuple(map(decode_record, json.loads(gzip.decompress(path.read_bytes()))))

@@ -60,7 +60,7 @@ def bench(
     `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`,
     `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
     """
-    from compare.bench.baseline import list_drawn, list_instances
+    from compare.bench.baseline import list_baselines, list_drawn
     from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
     from compare.bench.submission import SUFFIX, pack_submission, verify_submission, write_public_pages
     from compare.report.writing import add_session, write_document
@@ -87,7 +87,7 @@ def bench(
         _bench_fronts(algorithm, instances, against, runs, evaluations, out, jobs, as_json)
         return
     chosen = choose_instances(suite, instances, families, seeds)
-    shipped = evaluations == EVALUATIONS and set(chosen) <= {*list_instances(), *list_drawn()}
+    shipped = evaluations == EVALUATIONS and set(chosen) <= {*list_baselines(), *list_drawn()}
     label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
     solvers = {} if shipped else {other: "" for other in parse_names(against) if other != algorithm}
     if algorithm is not None:
@@ -150,7 +150,7 @@ def _bench_fronts(
     from compare.bench.fronts import SEARCHES, make_fronts_page, rank_searches, run_fronts
     from compare.report.writing import add_session, write_document
 
-    chosen = parse_names(instances) if instances else list(gaitbench.fronts())
+    chosen = parse_names(instances) if instances else list(gaitbench.list_fronts())
     solvers = list(SEARCHES if against == RIVALS else parse_names(against))
     solvers += [algorithm] if algorithm and algorithm not in solvers else []
     make_writable_folder(out)

@@ -12,9 +12,9 @@ from compare.cli.printing import print_json, print_table, print_written, stdout
 from compare.study.description import describe_solver, list_described_names
 from compare.study.task import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
+from nlp_gait import formulation
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import load, problem_names
-from nlp_gait.robots import robot_names
+from nlp_gait.robots import list_robots
 from nlp_gait.user_code import find_entry_points
 
 
@@ -93,21 +93,21 @@ def _describe_robot(name: str, out: Path | None, as_json: bool) -> None:
 
 
 def _print_overview(as_json: bool) -> None:
-    problems = {name: load(name) for name in problem_names()}
+    problems = {name: formulation.load(name) for name in formulation.list_problems()}
     installed = {"problems": find_entry_points("problem"), "algorithms": find_entry_points("algorithm")}
     if as_json:
         described = {
             n: {"title": p.title, "variables": list(p.names), "options": dict(p.options)} for n, p in problems.items()
         }
         algorithms = [*list_solvers(), *installed["algorithms"]]
-        data = {"problems": described, "algorithms": algorithms, "robots": list(robot_names()), "installed": installed}
+        data = {"problems": described, "algorithms": algorithms, "robots": list(list_robots()), "installed": installed}
         print_json(data)
         return
     rows = [(name, p.title, str(len(p.names)), str(len(p.own_parameters))) for name, p in problems.items()]
     print_table("Problems", ("name", "description", "variables", "parameters"), rows)
     stdout.print(f"algorithms: {', '.join(list_solvers())}")
     stdout.print(f"for several objectives (pareto): {', '.join(FRONT_ALGORITHMS)}")
-    stdout.print(f"robots: {', '.join(robot_names())}")
+    stdout.print(f"robots: {', '.join(list_robots())}")
     for kind, listed in installed.items():
         if listed:
             packages = ", ".join(f"{name} ({value})" for name, value in listed.items())
@@ -118,7 +118,7 @@ def _print_overview(as_json: bool) -> None:
 
 
 def _print_details(name: str, given: Mapping[str, Any], as_json: bool) -> None:
-    problem = load(name, **given)
+    problem = formulation.load(name, **given)
     if as_json:
         print_json(
             {

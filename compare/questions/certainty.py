@@ -19,7 +19,7 @@ from compare.report.document import Figure, make_text_table
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.minimize import minimize
-from metaheuristics.registry import algorithm
+from metaheuristics.registry import make_algorithm
 from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
@@ -130,7 +130,7 @@ class Certainty(Question[FoundCertainty]):
                 f"got {self.tolerance}, {self.time_limit_s} s"
             )
         if self.evaluations:
-            algorithm("cma")
+            make_algorithm("cma")
 
     def find(self, work: Work) -> Iterator[FoundCertainty]:
         """Yield the evidence.
@@ -219,12 +219,12 @@ class Certainty(Question[FoundCertainty]):
 
 def search_point(problem: GaitProblem, seed: int = 0) -> Array:
     """Return the best point (n,) of a short search by PSO, which shares only the exact functions with IPOPT and proofs."""
-    found = minimize(compile_objective(problem), algorithm("pso"), evaluations=CHECK_EVALUATIONS, seed=seed)
+    found = minimize(compile_objective(problem), make_algorithm("pso"), evaluations=CHECK_EVALUATIONS, seed=seed)
     return np.array(found.x)
 
 
 def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> LongSearch:
-    result = minimize(compile_objective(problem), algorithm("cma"), evaluations=evaluations, seed=seed)
+    result = minimize(compile_objective(problem), make_algorithm("cma"), evaluations=evaluations, seed=seed)
     if result.violation > FEASIBILITY_TOLERANCE:
         return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
     value = problem.objective.sign * result.objective

@@ -15,7 +15,7 @@ from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
 from metaheuristics.errors import SearchError
-from metaheuristics.registry import ALGORITHMS, algorithm
+from metaheuristics.registry import ALGORITHMS, make_algorithm
 from nlp_gait.backends.identity import HASH
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import GaitError
@@ -114,7 +114,7 @@ def _find_defaults(record: RunRecord) -> Mapping[str, Any] | None:
 @cache
 def _load_defaults(name: str) -> Mapping[str, Any]:
     try:
-        return make_solver(name).to_dict() if name in GRADIENT_SOLVERS else describe_settings(algorithm(name))
+        return make_solver(name).to_dict() if name in GRADIENT_SOLVERS else describe_settings(make_algorithm(name))
     except (GaitError, SearchError):  # a package is not installed
         return {}
 

@@ -12,7 +12,7 @@ from compare.judge import evaluate
 from compare.study.record import History, RunRecord, Times, Verdict, check_readable, parse_record
 from compare.study.task import IPOPT, Task, describe_settings
 from metaheuristics.minimize import minimize
-from metaheuristics.registry import handling
+from metaheuristics.registry import make_handling
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.backends.solve import make_solution
 from nlp_gait.errors import InputError, WorkerError
@@ -117,7 +117,7 @@ def _search(task: Task, callback: Callable[..., None] | None) -> RunRecord:
             task.make_search(),
             evaluations=stop.evaluations,
             seed=task.run_seed,
-            handling=handling(task.handling.name, **task.handling.settings),
+            handling=make_handling(task.handling.name, **task.handling.settings),
             target=None if stop.target is None else sign * stop.target,
             stagnation=stop.stagnation,
             time_limit_s=stop.time_limit_s,

@@ -14,8 +14,8 @@ from compare.study.definition import hash_solver_source, select_shared
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_limits
-from metaheuristics.registry import ADAPTERS, ALGORITHMS, algorithm, handling
-from metaheuristics.user_algorithm import PlainFunction, as_algorithm
+from metaheuristics.registry import ADAPTERS, ALGORITHMS, make_algorithm, make_handling
+from metaheuristics.user_algorithm import PlainFunction, to_algorithm
 from nlp_gait.backends.identity import SOURCE, hash_json, identify_problem
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
@@ -126,7 +126,7 @@ class Task:
 
     problem: ProblemSpec
     #: name, or user code as ``file.py:name``, ``module:name`` or ``cmd:COMMAND``, or a picklable search algorithm or plain
-    #: function (see ``metaheuristics.as_algorithm``)
+    #: function (see ``metaheuristics.to_algorithm``)
     solver: str | Algorithm | Callable[..., object]
     settings: Mapping[str, Any] = field(default_factory=dict)  #: of the named solver, that differ from its defaults
     handling: Handling = field(default_factory=Handling)  #: of constraints, in searches
@@ -204,11 +204,11 @@ class Task:
         """Return the search with its settings; this first runs user code. Raises SearchError for no search, and UserCodeError."""
         if isinstance(self.solver, str) and is_program(self.solver):
             program = ExternalProgram(command=parse_command(self.solver), name=self.title, settings=self.settings)
-            return as_algorithm(program, self.title)
+            return to_algorithm(program, self.title)
         own = load_object(str(self.solver), "algorithm") if self.is_user_code else self.solver
         if isinstance(own, str):
-            return algorithm(own, **self.settings)
-        return as_algorithm(own, self.title, self.settings)
+            return make_algorithm(own, **self.settings)
+        return to_algorithm(own, self.title, self.settings)
 
     def make_solver(self) -> Solver:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
@@ -238,7 +238,7 @@ def check_task(task: Task) -> None:
     if not task.is_search:
         task.make_solver().check(problem)
     else:
-        handling(task.handling.name, **task.handling.settings)
+        make_handling(task.handling.name, **task.handling.settings)
         search = UNREAD if task.is_user_code else task.make_search()
         check_limits(search, task.stop.evaluations, task.stop.target, task.stop.stagnation, task.stop.time_limit_s)
     if task.start:

@@ -17,7 +17,7 @@ from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import plot_gait
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.formulation import GaitProblem, load, problem_names
+from nlp_gait.formulation import GaitProblem, list_problems, load
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
@@ -48,7 +48,7 @@ PICTURE = "Best known gait: six poses at equidistant times, later ones darker (l
 
 def names() -> list[str]:
     """Return the problems that have a page."""
-    return [name for name in problem_names() if name not in LEFT_OUT]
+    return [name for name in list_problems() if name not in LEFT_OUT]
 
 
 def write(folder: Path) -> None:

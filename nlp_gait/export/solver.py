@@ -133,13 +133,13 @@ def check_planner(problem: GaitProblem) -> None:
     if n > MOST_VARIABLES or model.lifted > MOST_LIFTED:
         raise InputError(
             f"{problem.name} has {n} variables and {model.lifted} lifted ones; a planner in C has at most {MOST_VARIABLES} "
-            f"and {MOST_LIFTED}: use nlp_gait.replanner"
+            f"and {MOST_LIFTED}: use nlp_gait.make_replanner"
         )
     # Each lifted variable must depend on earlier ones only, so that one substitution after another finds all.
     for row, column in zip(*ca.jacobian_sparsity(model.nlp["g"], model.nlp["x"]).get_triplet(), strict=True):
         if row >= first and column - n > model.tie_owner[row - first]:
             raise InputError(
-                f"{problem.name} solves equations within its motion, which a planner in C cannot; use nlp_gait.replanner"
+                f"{problem.name} solves equations within its motion, which a planner in C cannot; use nlp_gait.make_replanner"
             )
 
 

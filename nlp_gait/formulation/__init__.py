@@ -12,11 +12,11 @@ from nlp_gait.formulation.assembly import (
     Point,
     RowsOverTime,
     Variable,
-    parameters,
+    make_parameters,
 )
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
-from nlp_gait.formulation.registry import load, maker, problem_names
+from nlp_gait.formulation.registry import list_problems, load, maker
 from nlp_gait.formulation.result import Result, load_result, sample_finely, sample_signals
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
 
@@ -41,12 +41,12 @@ __all__ = [
     "SolverHints",
     "Start",
     "Variable",
-    "sample_finely",
-    "make_vector_columns",
+    "list_problems",
     "load",
     "load_result",
+    "make_parameters",
+    "make_vector_columns",
     "maker",
-    "parameters",
-    "problem_names",
+    "sample_finely",
     "sample_signals",
 ]

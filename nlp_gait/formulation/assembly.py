@@ -55,7 +55,7 @@ class Variable:
     def bound(self, end: Literal["lower", "upper"]) -> Parameter:
         """Return one bound as a parameter, ``<variable>.lower`` or ``<variable>.upper``."""
         name, text = f"{self.name}.{end}", f"{end} bound of {self.name}"
-        return parameters((name, self.unit, getattr(self, end), text, self.minimum, self.maximum))[0]
+        return make_parameters((name, self.unit, getattr(self, end), text, self.minimum, self.maximum))[0]
 
 
 def _check_number(owner: str, field: str, value: object) -> None:
@@ -63,7 +63,7 @@ def _check_number(owner: str, field: str, value: object) -> None:
         raise InputError(f"{owner}: {field} must be a finite number, got {format_value(value)}")
 
 
-def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
+def make_parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Parameter, ...]:
     """Return parameters from a table of name, unit, default, description, minimum and maximum."""
     return tuple(
         Parameter(name=name, unit=unit, default=default, description=text, minimum=minimum, maximum=maximum)
@@ -71,7 +71,7 @@ def parameters(*table: tuple[str, str, float, str, float, float]) -> tuple[Param
     )
 
 
-def variables(*table: tuple[str, str, float, float, str]) -> tuple[Variable, ...]:
+def make_variables(*table: tuple[str, str, float, float, str]) -> tuple[Variable, ...]:
     """Return variables from a table of name, unit, lower and upper bound, and description."""
     return tuple(
         Variable(name=name, unit=unit, lower=lower, upper=upper, description=text)

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from nlp_gait.formulation.assembly import Point, Variable, variables
+from nlp_gait.formulation.assembly import Point, Variable, make_variables
 from nlp_gait.formulation.signals import Array
 
 
@@ -32,7 +32,7 @@ class Block:
             for k in range(self.columns)
             for row, ends in zip(self.rows, self.limits, strict=True)
         )
-        return variables(*table)
+        return make_variables(*table)
 
     @property
     def size(self) -> int:

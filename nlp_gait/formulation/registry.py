@@ -60,7 +60,7 @@ def maker(make: Maker) -> Maker:
     return make_problem
 
 
-def problem_names() -> tuple[str, ...]:
+def list_problems() -> tuple[str, ...]:
     """Return the names of the problems in this package."""
     return tuple(PROBLEMS)
 

@@ -43,7 +43,7 @@ DEFINITIONS = tuple(decode(Definition, entry) for entry in read_data("definition
 BY_ID = {definition.id: definition for definition in DEFINITIONS}
 
 
-def names(subset: Subset = "full") -> tuple[str, ...]:
+def list_instances(subset: Subset = "full") -> tuple[str, ...]:
     """Return the ids of all instances or of the ``"small"`` subset (ten, minutes), from easy to hard; raises UnknownNameError."""
     if subset not in ("small", "full"):
         raise unknown("subset of GaitBench", str(subset), ("small", "full"))

@@ -156,7 +156,7 @@ def load_points() -> Mapping[str, list[list[float]]]:
     return points
 
 
-def fronts() -> tuple[str, ...]:
+def list_fronts() -> tuple[str, ...]:
     """Return the ids of the instances with two objectives."""
     return tuple(_load_definitions())
 
@@ -164,7 +164,7 @@ def fronts() -> tuple[str, ...]:
 def get_front_definition(id: str) -> FrontDefinition:
     """Return what an instance with two objectives is made from; raises UnknownNameError."""
     if id not in _load_definitions():
-        raise unknown("instance with two objectives", id, fronts())
+        raise unknown("instance with two objectives", id, list_fronts())
     return _load_definitions()[id]
 
 

@@ -92,7 +92,7 @@ def load_families() -> Mapping[str, Family]:
     return {entry["name"]: decode(Family, entry, entry["name"]) for entry in read_data("families.json")}
 
 
-def families() -> tuple[str, ...]:
+def list_families() -> tuple[str, ...]:
     """Return the names of the families that ``generate`` draws from."""
     return tuple(load_families())
 
@@ -100,7 +100,7 @@ def families() -> tuple[str, ...]:
 def make_id(family: str, seed: int) -> str:
     """Return the id of a drawn instance; raises UnknownNameError for the family and InputError for the seed."""
     if family not in load_families():
-        raise unknown("family of GaitBench 2", str(family), families())
+        raise unknown("family of GaitBench 2", str(family), list_families())
     return f"{PREFIX}:{family}:{check_count('seed', seed, at_least=0, at_most=10**12 - 1)}"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from casadi import DM
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Point, Start, Variable, parameters
+from nlp_gait.formulation import Array, Assembly, Constraint, GaitProblem, Point, Start, Variable, make_parameters
 from nlp_gait.formulation.assembly import Expression, PointOf
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -66,7 +66,7 @@ def hold_constant(problem: GaitProblem, values: Mapping[str, float]) -> GaitProb
     problem.fix(**values)  # raises
     names, start = problem.names, problem.hints.start
     held = [v for v in problem.variables if v.name in values]
-    constants = parameters(*((v.name, v.unit, values[v.name], v.description, v.lower, v.upper) for v in held))
+    constants = make_parameters(*((v.name, v.unit, values[v.name], v.description, v.lower, v.upper) for v in held))
     bounds = {f"{name}.{end}": value for name, value in values.items() for end in ("lower", "upper")}
 
     def start_point(given: Mapping[str, float], rng: np.random.Generator) -> Array:

@@ -77,7 +77,7 @@ class _Record(NamedTuple):
     reversed: bool = False  # the joint's angle is counted in the opposite direction
 
 
-def robot_names() -> tuple[str, ...]:
+def list_robots() -> tuple[str, ...]:
     """Return the names of the robots of the package."""
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _DATA.iterdir() if entry.name.endswith(".json")))
 
@@ -228,8 +228,8 @@ def _resolve(base: str, source: str) -> str:
 
 
 def _read(name_or_path: str) -> RobotFile:
-    if not name_or_path.endswith(".json") and name_or_path not in robot_names():
-        raise unknown("robot", name_or_path, robot_names())
+    if not name_or_path.endswith(".json") and name_or_path not in list_robots():
+        raise unknown("robot", name_or_path, list_robots())
     path = Path(name_or_path if name_or_path.endswith(".json") else str(_DATA / f"{name_or_path}.json"))
     file = read_dataclass(RobotFile, path, "robot file", error=RobotDataError)
     models = [model for ending in MODEL_ENDINGS if os.path.isfile(model := path.with_suffix(ending))]

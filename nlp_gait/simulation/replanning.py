@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from nlp_gait.backends.onboard.replanner import Replanner, replanner
+from nlp_gait.backends.onboard.replanner import Replanner, make_replanner
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint
@@ -121,7 +121,7 @@ class RestPlanner:
         """Return the replanner, built from the optimum of a plan; raises InputError without DAQP."""
         if self._replanner is None:
             problem = self.problem.with_values(**plan.values)
-            self._replanner = replanner(problem, near=solve(problem, x0=plan.x, workers=1))
+            self._replanner = make_replanner(problem, near=solve(problem, x0=plan.x, workers=1))
         return self._replanner
 
     def evaluate(self, plan: Pursuit, t: float, rise: dict[str, float]) -> list[Array]:

@@ -17,7 +17,7 @@ from docs.pages import algorithms, api, commands, problems
 from docs.pages.gallery import ORDER
 from docs.pages.markdown import literal, table
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.formulation import load, problem_names
+from nlp_gait.formulation import list_problems, load
 
 ROOT = Path(__file__).parents[2]
 OWN = ("nlp_gait", "metaheuristics", "compare")
@@ -83,7 +83,7 @@ def test_every_algorithm_and_solver_is_described(tmp_path: Path) -> None:
 
 
 def test_every_problem_has_a_page() -> None:
-    assert set(problems.names()) == {name for name in problem_names() if name != "gaitbench"}
+    assert set(problems.names()) == {name for name in list_problems() if name != "gaitbench"}
     assert set(problems.difficulties()) <= set(problems.names())
 
 

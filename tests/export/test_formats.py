@@ -11,7 +11,7 @@ import pytest
 import nlp_gait
 from nlp_gait.errors import InputError, OutputError, UnknownNameError
 from nlp_gait.export.formats import FORMATS, write_as
-from nlp_gait.formulation import Result, load_result, problem_names
+from nlp_gait.formulation import Result, list_problems, load_result
 from nlp_gait.formulation.result import sample_at_period
 
 DSP = (0.31, -0.0008, -0.0055, 0.052, 0.001, -0.0367, -0.0424, 2)
@@ -39,7 +39,7 @@ def test_csv_has_plain_headers_with_units_and_rows_exactly_a_period_apart(result
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", problem_names())
+@pytest.mark.parametrize("name", list_problems())
 def test_every_time_history_of_every_problem_has_its_unit(name):
     problem = nlp_gait.load(name)
     signals = problem.signals(problem.start_point(np.random.default_rng(0)))

@@ -1,4 +1,4 @@
-"""The planner in C: built by its own build line, the optima of nlp_gait.replanner, bounds and motion as in Python."""
+"""The planner in C: built by its own build line, the optima of nlp_gait.make_replanner, bounds and motion as in Python."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.backends.onboard.replanner import Replanner, replanner
+from nlp_gait.backends.onboard.replanner import Replanner, make_replanner
 from nlp_gait.errors import InputError
 from nlp_gait.export.solver import export_solver
 from nlp_gait.formulation import GaitProblem
@@ -35,7 +35,7 @@ def make_in_c(problem: GaitProblem, near: Outcome, folder: Path, lanes: str = ""
 def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Replanner, ExportedPlanner]]:
     problem = nlp_gait.load("nao-dsp", trajectory="measured", intervals=4)
     solution = nlp_gait.solve(problem, starts=1)
-    plan = replanner(problem, near=solution)
+    plan = make_replanner(problem, near=solution)
     yield plan, make_in_c(problem, solution.starts[0], tmp_path_factory.mktemp("planner"), "-DLANES=1")
 
 

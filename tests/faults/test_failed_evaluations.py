@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from metaheuristics import ADAPTERS, ALGORITHMS, Deb, EpsilonLevel, StaticPenalty, algorithm, minimize
+from metaheuristics import ADAPTERS, ALGORITHMS, Deb, EpsilonLevel, StaticPenalty, make_algorithm, minimize
 from metaheuristics.adapters.pymoo import MODULES
 from metaheuristics.interface import Array
 from tests.metaheuristics.problems import Function
@@ -45,7 +45,7 @@ def test_failures_are_counted_and_never_win(name: str, handling: Deb | StaticPen
         return np.where(failed, kind[:, 0], f), np.where(failed, kind[:, 1], violation)
 
     problem = Function(function, [-1.0, 0.0], [1.0, 1.0])
-    result = minimize(problem, algorithm(name), evaluations=budget, handling=handling, seed=2)
+    result = minimize(problem, make_algorithm(name), evaluations=budget, handling=handling, seed=2)
     assert result.failed_evaluations == failures > 0
     assert np.isfinite([result.objective, result.violation]).all() and result.x[0] >= 0.0
     assert result.evaluations == budget

@@ -25,7 +25,7 @@ for name in list_solvers():
     if name in GRADIENT_SOLVERS:
         continue
     budget = {"bayes": 20}.get(name, 170)
-    found = metaheuristics.minimize(objective, metaheuristics.algorithm(name), evaluations=budget, seed=1)
+    found = metaheuristics.minimize(objective, metaheuristics.make_algorithm(name), evaluations=budget, seed=1)
     print(name, found.evaluations, found.objective.hex(), [value.hex() for value in found.x.tolist()])
 for name, settings in (("ipopt", {}), ("slsqp", {"evaluations": 100})):
     outcome = make_solver(name, **settings).prepare(problem, 1).run(problem, 0.5 * (problem.lower + problem.upper))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import GaitProblem, load, problem_names
+from nlp_gait.formulation import GaitProblem, list_problems, load
 from tests.backends.toys import corner, toy
 
 SINGLE_SUPPORT_NAMES = (
@@ -165,4 +165,4 @@ def test_parameter_arrays_cannot_be_written() -> None:
 
 
 def test_both_nao_phases_can_be_loaded_by_name() -> None:
-    assert {"nao-ssp", "nao-dsp"} <= set(problem_names())
+    assert {"nao-ssp", "nao-dsp"} <= set(list_problems())

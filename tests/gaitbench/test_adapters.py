@@ -155,7 +155,7 @@ def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
     root = Path(__file__).parents[2] / "examples" / "optunahub"
     registered = optunahub.load_local_module("benchmarks/gaitbench", registry_root=str(root))
     assert registered.Problem(instance.id).search_space == problem.search_space
-    assert set(registered.Problem.available_problem_names) == set(gaitbench.names())
+    assert set(registered.Problem.available_problem_names) == set(gaitbench.list_instances())
     params = dict(zip(instance.names, X[0].tolist(), strict=True))
     f, violation = instance(X[:1])
     assert problem.evaluate(params) == f[0]
@@ -223,6 +223,6 @@ def test_an_unknown_adapter_is_refused(instance: gaitbench.Instance) -> None:
 def test_loading_an_instance_imports_none_of_them() -> None:
     import subprocess
 
-    program = "import sys; from nlp_gait import gaitbench; gaitbench.names(); print(*sys.modules)"
+    program = "import sys; from nlp_gait import gaitbench; gaitbench.list_instances(); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert not {"pymoo", "pygmo", "ioh", "cma", "optuna", "nevergrad", "scipy.optimize", "matplotlib"} & set(loaded)

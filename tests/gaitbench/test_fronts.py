@@ -21,7 +21,7 @@ def walk() -> FrontInstance:
 
 def test_every_instance_has_a_front() -> None:
     points = load_points()
-    assert len(gaitbench.fronts()) >= 8 and set(points) == set(gaitbench.fronts())
+    assert len(gaitbench.list_fronts()) >= 8 and set(points) == set(gaitbench.list_fronts())
     assert all(len(front) >= 30 for front in points.values())
 
 

@@ -59,13 +59,13 @@ def test_probe_values_never_change(id: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("id", [id for id in gaitbench.names() if id not in QUICK])
+@pytest.mark.parametrize("id", [id for id in gaitbench.list_instances() if id not in QUICK])
 def test_probe_values_of_all_others_never_change(id: str, published: gaitbench.Instance) -> None:
     check_probes(id)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("id", gaitbench.names())
+@pytest.mark.parametrize("id", gaitbench.list_instances())
 def test_the_best_known_point_is_feasible_and_has_its_value(published: gaitbench.Instance) -> None:
     """Violation exactly zero; no random point nearby is feasible and better by more than a millionth."""
     instance = published
@@ -82,16 +82,16 @@ def test_the_best_known_point_is_feasible_and_has_its_value(published: gaitbench
 
 
 def test_there_are_forty_and_more_and_the_small_ones_are_among_them() -> None:
-    assert len(gaitbench.names()) >= 40
-    assert len(gaitbench.names("small")) == 10
-    assert set(gaitbench.names("small")) < set(gaitbench.names("full")) == set(load_facts())
+    assert len(gaitbench.list_instances()) >= 40
+    assert len(gaitbench.list_instances("small")) == 10
+    assert set(gaitbench.list_instances("small")) < set(gaitbench.list_instances("full")) == set(load_facts())
     assert len({definition.id for definition in DEFINITIONS}) == len(DEFINITIONS)
-    ends = [(len(load_facts()[id].best_x), load_facts()[id].best_known) for id in gaitbench.names()]
+    ends = [(len(load_facts()[id].best_x), load_facts()[id].best_known) for id in gaitbench.list_instances()]
     assert len(set(ends)) == len(ends)  # no two are the same problem
-    counts = [len(load_facts()[id].best_x) for id in gaitbench.names()]
+    counts = [len(load_facts()[id].best_x) for id in gaitbench.list_instances()]
     assert min(counts) <= 9 and max(counts) == 264
     with pytest.raises(UnknownNameError, match="subset"):
-        gaitbench.names("huge")  # type: ignore[arg-type]
+        gaitbench.list_instances("huge")  # type: ignore[arg-type]
     with pytest.raises(UnknownNameError, match="did you mean 'ssp-v5'"):
         gaitbench.load("ssp-v55")
 
@@ -206,7 +206,7 @@ def test_a_pickle_is_the_instance(unit_cube: bool) -> None:
 
 
 def test_evidence_says_what_it_rests_on() -> None:
-    for id in gaitbench.names():
+    for id in gaitbench.list_instances():
         text, evidence = str(gaitbench.load(id).evidence), gaitbench.load(id).evidence
         assert f"{evidence.agreeing} of {evidence.starts} starts" in text
         assert evidence.agreeing > 1 or "best known" in text or evidence.proven_gap is not None
@@ -235,7 +235,7 @@ def test_the_catalogue_in_the_documentation_is_that_of_the_instances() -> None:
     docs = Path(__file__).parents[2] / "docs"
     entries = json.loads((docs / "gaitbench.json").read_text(encoding="utf-8"))["problems"]
     page = (docs / "gaitbench.md").read_text(encoding="utf-8")
-    for entry, id in zip(entries, gaitbench.names(), strict=True):
+    for entry, id in zip(entries, gaitbench.list_instances(), strict=True):
         instance, variables, best = gaitbench.load(id), entry["variables"], entry["best_known"]
         assert (variables["names"], variables["units"]) == (list(instance.names), list(instance.units))
         assert (variables["lower"], variables["upper"]) == (instance.lower.tolist(), instance.upper.tolist())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from metaheuristics import SearchError, algorithm, list_installed_algorithms, minimize
+from metaheuristics import SearchError, list_installed_algorithms, make_algorithm, minimize
 from metaheuristics.algorithms.differential_evolution import compute_gains, compute_lehmer_mean
 from metaheuristics.interface import FEASIBILITY, Array, Start
 from tests.metaheuristics.problems import Function, disc, sphere
@@ -34,7 +34,7 @@ def test_equal_seeds_give_identical_runs_within_budget_and_bounds(name: str) -> 
         def callback(X: Array, f: Array, violation: Array) -> None:
             assert ((problem.lower <= X) & (X <= problem.upper)).all()
 
-        result = minimize(problem, algorithm(name), evaluations=26, seed=seed, callback=callback)
+        result = minimize(problem, make_algorithm(name), evaluations=26, seed=seed, callback=callback)
         assert result.evaluations == sum(problem.calls) == 26
         return result.objective, result.x, problem.calls
 
@@ -53,7 +53,7 @@ def test_equal_seeds_give_identical_runs_within_budget_and_bounds(name: str) -> 
     ],
 )
 def test_an_optimum_on_a_constraint_is_found_from_inside(name: str, evaluations: int, within: float) -> None:
-    result = minimize(Disc(), algorithm(name), evaluations=evaluations, seed=0)
+    result = minimize(Disc(), make_algorithm(name), evaluations=evaluations, seed=0)
     assert result.feasible
     assert OPTIMUM <= result.objective < OPTIMUM + within
 
@@ -63,7 +63,7 @@ def test_a_local_solver_begins_again_until_the_budget_ends(name: str) -> None:
     """A sphere has one minimum, which takes a start some ten evaluations."""
     points: list[Array] = []
     result = minimize(
-        sphere(2), algorithm(name), evaluations=300, seed=0, callback=lambda X, f, violation: points.append(X)
+        sphere(2), make_algorithm(name), evaluations=300, seed=0, callback=lambda X, f, violation: points.append(X)
     )
     assert result.objective < 1e-6
     late = np.concatenate(points)[-200:]
@@ -76,9 +76,9 @@ def test_failed_evaluations_and_fixed_variables_end_nothing(name: str) -> None:
         return np.where(X[:, 0] < 0.0, np.nan, ((X - 0.3) ** 2).sum(axis=1)), np.zeros(len(X))
 
     problem = Function(half, [-1.0, 0.1, -1.0], [1.0, 0.1, 1.0])
-    result = minimize(problem, algorithm(name), evaluations=40, seed=1)
+    result = minimize(problem, make_algorithm(name), evaluations=40, seed=1)
     assert result.failed_evaluations > 0 and result.feasible and result.x[1] == 0.1
-    nothing = minimize(Function(half, [0.5, 0.1], [0.5, 0.1]), algorithm(name), evaluations=40)
+    nothing = minimize(Function(half, [0.5, 0.1], [0.5, 0.1]), make_algorithm(name), evaluations=40)
     assert nothing.reasons == ("all variables are fixed",)
 
 
@@ -96,7 +96,7 @@ def test_failed_evaluations_and_fixed_variables_end_nothing(name: str) -> None:
 )
 def test_a_bad_setting_is_refused_in_one_sentence(name: str, settings: dict[str, float], said: str) -> None:
     with pytest.raises(SearchError, match=said):
-        algorithm(name, **settings)
+        make_algorithm(name, **settings)
 
 
 def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,12 +106,12 @@ def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pyt
     monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
     assert "lshade" in list_installed_algorithms() and not {"bayes", "cma-al"} & set(list_installed_algorithms())
     with pytest.raises(SearchError, match=r"'bayes' needs the package egobox.*pip install 'nlp-gait\[bayes\]'"):
-        algorithm("bayes")
+        make_algorithm("bayes")
 
 
 def test_bayesian_optimisation_stops_where_fitting_takes_too_long() -> None:
     start = _start(20, 2)
-    search = algorithm("bayes").start(start)
+    search = make_algorithm("bayes").start(start)
     assert search.stop() == ()
     X = start.rng.random((500, 2))
     search.tell(X, np.full(500, 1.0), np.zeros(500), FEASIBILITY)  # a flat objective is not fitted
@@ -121,7 +121,7 @@ def test_bayesian_optimisation_stops_where_fitting_takes_too_long() -> None:
 def test_sobol_points_are_those_of_scipy_and_fill_each_axis_evenly() -> None:
     seen: list[Array] = []
     problem = Function(lambda X: (X.sum(axis=1), np.zeros(len(X))), [0.0, 0.0, 5.0], [1.0, 1.0, 5.0])
-    minimize(problem, algorithm("sobol"), evaluations=1 + 64, callback=lambda X, f, violation: seen.append(X))
+    minimize(problem, make_algorithm("sobol"), evaluations=1 + 64, callback=lambda X, f, violation: seen.append(X))
     points = np.concatenate(seen)[1:]
     assert np.all(points[:, 2] == 5.0)
     for axis in (0, 1):  # one in each of 64 equal parts: a net in base 2
@@ -130,7 +130,7 @@ def test_sobol_points_are_those_of_scipy_and_fill_each_axis_evenly() -> None:
 
 def test_the_population_of_lshade_shrinks_to_four() -> None:
     problem = sphere(2)
-    minimize(problem, algorithm("lshade", population=40), evaluations=1000)
+    minimize(problem, make_algorithm("lshade", population=40), evaluations=1000)
     assert problem.calls[0] == 40 and problem.calls[-2] <= 5
     assert all(after <= before for before, after in zip(problem.calls, problem.calls[1:], strict=False))
 

@@ -10,8 +10,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-from metaheuristics import ALGORITHMS, Deb, EpsilonLevel, GeneticAlgorithm, Result, StaticPenalty, minimize
-from metaheuristics import algorithm as make_algorithm
+from metaheuristics import (
+    ALGORITHMS,
+    Deb,
+    EpsilonLevel,
+    GeneticAlgorithm,
+    Result,
+    StaticPenalty,
+    make_algorithm,
+    minimize,
+)
 from metaheuristics.interface import Algorithm, Array
 from tests.metaheuristics.problems import Function, disc, infeasible, rosenbrock, sphere
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import dual_annealing
 from scipy.optimize import minimize as scipy_minimize
 
-from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, as_algorithm, minimize
+from metaheuristics import Deb, ParticleSwarm, SearchError, StaticPenalty, minimize, to_algorithm
 from metaheuristics.interface import Array
 from metaheuristics.user_algorithm import FAILED, INFEASIBLE
 
@@ -35,10 +35,10 @@ def annealing(f: Callable[[Array], float], lower: Array, upper: Array, evaluatio
 
 def test_it_ends_at_its_budget_with_its_best_point() -> None:
     disk = Disk()
-    result = minimize(disk, as_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
+    result = minimize(disk, to_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
     assert (result.evaluations, disk.calls, result.reasons) == (1500, 1500, ("evaluation budget used",))
     assert result.feasible and -np.sqrt(2.0) <= result.objective < -1.35
-    again = minimize(Disk(), as_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
+    again = minimize(Disk(), to_algorithm(annealing, "annealing"), evaluations=1500, seed=1)
     np.testing.assert_array_equal(again.x, result.x)
     history = result.history
     assert (
@@ -54,10 +54,10 @@ def test_it_may_return_early_and_ask_for_many_points_at_once() -> None:
         f(rng.uniform(lower, upper, (int(share * evaluations), 2)))
         return "ignored"
 
-    result = minimize(Disk(), as_algorithm(batches, "batches"), evaluations=100)
+    result = minimize(Disk(), to_algorithm(batches, "batches"), evaluations=100)
     assert (result.evaluations, result.reasons) == (58, ("the function returned",))
-    assert minimize(Disk(), as_algorithm(batches, "b", {"share": 0.2}), evaluations=100).evaluations == 28
-    assert minimize(Disk(), as_algorithm(batches, "b", {"share": 5.0}), evaluations=100).evaluations == 100
+    assert minimize(Disk(), to_algorithm(batches, "b", {"share": 0.2}), evaluations=100).evaluations == 28
+    assert minimize(Disk(), to_algorithm(batches, "b", {"share": 5.0}), evaluations=100).evaluations == 100
 
 
 def test_the_merit_it_receives_orders_points_as_the_rule_does() -> None:
@@ -66,9 +66,9 @@ def test_the_merit_it_receives_orders_points_as_the_rule_does() -> None:
     def listening(f: Any, lower: Array, upper: Array, evaluations: int, seed: int) -> None:
         told[:] = [f(np.array(x)) for x in ((0.5, 0.0), (2.0, 0.0), (2.0, 2.0), (np.nan, 0.0))]
 
-    minimize(Disk(), as_algorithm(listening, "l"), evaluations=10, handling=Deb())
+    minimize(Disk(), to_algorithm(listening, "l"), evaluations=10, handling=Deb())
     assert told == [0.5, INFEASIBLE + 3.0, INFEASIBLE + 7.0, FAILED]
-    minimize(Disk(), as_algorithm(listening, "l"), evaluations=10, handling=StaticPenalty(weight=2.0))
+    minimize(Disk(), to_algorithm(listening, "l"), evaluations=10, handling=StaticPenalty(weight=2.0))
     assert told == [0.5, 2.0 + 6.0, 4.0 + 14.0, FAILED]
 
 
@@ -77,7 +77,7 @@ def test_a_gradient_method_of_another_library_is_a_plain_function_too() -> None:
         start = np.random.default_rng(seed).uniform(lower, upper)
         scipy_minimize(f, start, method="Nelder-Mead", options={"maxfev": evaluations})
 
-    result = minimize(Disk(), as_algorithm(bfgs, "nm"), evaluations=400, handling=StaticPenalty(weight=10.0))
+    result = minimize(Disk(), to_algorithm(bfgs, "nm"), evaluations=400, handling=StaticPenalty(weight=10.0))
     assert result.feasible and result.objective < -1.3
 
 
@@ -90,18 +90,18 @@ class Plain:
         self.width = width
 
     def start(self, start: Any) -> Any:
-        return as_algorithm(ParticleSwarm(population=4), "pso").start(start)
+        return to_algorithm(ParticleSwarm(population=4), "pso").start(start)
 
 
 def test_objects_classes_and_makers_are_algorithms() -> None:
     def maker(*, population: int = 5) -> ParticleSwarm:
         return ParticleSwarm(population=population)
 
-    assert as_algorithm(ParticleSwarm(), "p", {"population": 7}) == ParticleSwarm(population=7)
-    assert as_algorithm(ParticleSwarm, "p", {"population": 7}) == ParticleSwarm(population=7)
-    assert as_algorithm(maker, "m", {"population": 9}) == ParticleSwarm(population=9)
+    assert to_algorithm(ParticleSwarm(), "p", {"population": 7}) == ParticleSwarm(population=7)
+    assert to_algorithm(ParticleSwarm, "p", {"population": 7}) == ParticleSwarm(population=7)
+    assert to_algorithm(maker, "m", {"population": 9}) == ParticleSwarm(population=9)
     for own in (Plain, Plain()):
-        assert minimize(Disk(), as_algorithm(own, "plain"), evaluations=20).evaluations == 20
+        assert minimize(Disk(), to_algorithm(own, "plain"), evaluations=20).evaluations == 20
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_objects_classes_and_makers_are_algorithms() -> None:
 )
 def test_other_objects_are_rejected(own: Any, settings: dict[str, Any], message: str) -> None:
     with pytest.raises(SearchError, match=message):
-        as_algorithm(own, "own", settings)
+        to_algorithm(own, "own", settings)
 
 
 def test_points_outside_the_bounds_are_refused_with_their_place() -> None:
@@ -139,4 +139,4 @@ def test_points_outside_the_bounds_are_refused_with_their_place() -> None:
             return ()
 
     with pytest.raises(SearchError, match="for variable 0 of point 0, outside the bounds -2.0..2.0: clip the points"):
-        minimize(Disk(), as_algorithm(Careless, "c"), evaluations=20)
+        minimize(Disk(), to_algorithm(Careless, "c"), evaluations=20)

@@ -17,8 +17,8 @@ from metaheuristics import (
     EpsilonLevel,
     SearchError,
     StaticPenalty,
-    algorithm,
-    handling,
+    make_algorithm,
+    make_handling,
     minimize,
 )
 from metaheuristics.adapters.cma import CmaEs
@@ -29,19 +29,22 @@ from tests.metaheuristics.problems import disc, sphere
 
 
 def test_names_of_adapters() -> None:
-    assert algorithm("cma", population=20) == CmaEs(population=20)
-    assert algorithm("de", strategy="rand1bin") == DifferentialEvolution(strategy="rand1bin")
-    assert algorithm("pymoo:NSGA2") == Pymoo(algorithm="NSGA2") and algorithm("pymoo:NSGA2").name == "pymoo:NSGA2"
-    assert all(algorithm(name).name == name for name in ADAPTERS)
+    assert make_algorithm("cma", population=20) == CmaEs(population=20)
+    assert make_algorithm("de", strategy="rand1bin") == DifferentialEvolution(strategy="rand1bin")
+    assert (
+        make_algorithm("pymoo:NSGA2") == Pymoo(algorithm="NSGA2")
+        and make_algorithm("pymoo:NSGA2").name == "pymoo:NSGA2"
+    )
+    assert all(make_algorithm(name).name == name for name in ADAPTERS)
 
 
 def test_a_package_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
     with pytest.raises(SearchError, match=r"'cma' needs the package cma.*pip install 'nlp-gait\[algorithms\]'"):
-        algorithm("cma")
+        make_algorithm("cma")
     with pytest.raises(SearchError, match="'pymoo:GA' needs the package pymoo"):
-        algorithm("pymoo:GA")
-    assert algorithm("pso").name == "pso"
+        make_algorithm("pymoo:GA")
+    assert make_algorithm("pso").name == "pso"
 
 
 def test_importing_the_package_imports_none_of_them() -> None:
@@ -52,15 +55,15 @@ def test_importing_the_package_imports_none_of_them() -> None:
 
 
 def test_handlings_by_name() -> None:
-    assert handling("deb") == Deb() and handling("epsilon", control=0.5) == EpsilonLevel(control=0.5)
-    assert handling("penalty", weight=3.0) == StaticPenalty(weight=3.0)
+    assert make_handling("deb") == Deb() and make_handling("epsilon", control=0.5) == EpsilonLevel(control=0.5)
+    assert make_handling("penalty", weight=3.0) == StaticPenalty(weight=3.0)
     for name, settings, message in (
         ("penalty", {}, "constraint handling 'penalty' needs a value for 'weight'"),
         ("deb", {"weight": 1.0}, "constraint handling 'deb' has no setting 'weight'"),
         ("epsilonn", {}, "unknown constraint handling 'epsilonn'; did you mean 'epsilon'"),
     ):
         with pytest.raises(SearchError, match=message):
-            handling(name, **settings)
+            make_handling(name, **settings)
 
 
 @pytest.mark.parametrize(
@@ -80,10 +83,10 @@ def test_handlings_by_name() -> None:
 )
 def test_bad_settings_of_adapters(name: str, settings: dict[str, object], message: str | None) -> None:
     if message is None:  # what pymoo itself takes, it takes: its own settings are passed on
-        assert algorithm(name, **settings).population == 50
+        assert make_algorithm(name, **settings).population == 50
         return
     with pytest.raises(SearchError, match=message):
-        algorithm(name, **settings)
+        make_algorithm(name, **settings)
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -93,14 +96,18 @@ def test_every_pymoo_algorithm_runs_from_the_shared_points_and_leaves_the_global
     before = np.random.get_state()[1].copy()  # type: ignore[union-attr]
     result = minimize(
         disc(),
-        algorithm(f"pymoo:{name}", population=20),
+        make_algorithm(f"pymoo:{name}", population=20),
         evaluations=400,
         seed=7,
         callback=lambda X, f, v: generations.append(X),
     )
     reference: list[Array] = []
     minimize(
-        disc(), algorithm("pso", population=20), evaluations=20, seed=7, callback=lambda X, f, v: reference.append(X)
+        disc(),
+        make_algorithm("pso", population=20),
+        evaluations=20,
+        seed=7,
+        callback=lambda X, f, v: reference.append(X),
     )
     np.testing.assert_array_equal(generations[0], reference[0])
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]

@@ -18,7 +18,7 @@ from metaheuristics import (
     SearchError,
     SimulatedBinary,
     SinglePoint,
-    algorithm,
+    make_algorithm,
 )
 
 
@@ -55,7 +55,7 @@ def test_bad_settings(factory: type, settings: dict[str, object], message: str) 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_lookup_by_name(name: str) -> None:
-    made = algorithm(name, population=12)
+    made = make_algorithm(name, population=12)
     assert made.name == name and made.population == 12 and made == ALGORITHMS[name](population=12)
 
 
@@ -63,11 +63,11 @@ def test_unknown_names_are_answered_with_near_ones() -> None:
     with pytest.raises(
         SearchError, match="unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, aco, aco-grid"
     ):
-        algorithm("psoo")
+        make_algorithm("psoo")
     with pytest.raises(SearchError, match="'pso' has no setting 'inertial'; did you mean 'inertia'"):
-        algorithm("pso", inertial=1.0)
+        make_algorithm("pso", inertial=1.0)
     with pytest.raises(SearchError, match="unknown algorithm 'simplex'; Known"):
-        algorithm("simplex")
+        make_algorithm("simplex")
 
 
 def test_settings_are_immutable() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots import Link, load_robot, robot_names
+from nlp_gait.robots import Link, list_robots, load_robot
 from nlp_gait.robots.tree import check_inertias, compute_joint_ratio, shift_to_com
 from tests.robots.custom import about_joints, humanoid, nao, six
 from tests.robots.files import written
@@ -37,7 +37,7 @@ def test_a_tensor_that_no_body_has_about_its_joint_is_refused() -> None:
         shift_to_com(ROD)
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", list_robots())
 def test_the_real_robots_pass_by_a_wide_margin(name: str) -> None:
     links = load_robot(name).links.values()
     assert sum(compute_joint_ratio(link) > 1.0 for link in links) > len(links) / 2

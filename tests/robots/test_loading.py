@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from nlp_gait.errors import RobotDataError, UnknownNameError
-from nlp_gait.robots import load_robot, robot_names
+from nlp_gait.robots import list_robots, load_robot
 from tests.robots.files import written
 
 
@@ -192,7 +192,7 @@ def test_an_unknown_robot_or_joint_gets_the_nearest_names() -> None:
 
 @pytest.mark.parametrize(("name", "mass_kg"), [("nao-v4", 5.19535), ("nao-v5", 5.30535), ("nao-v6", 5.35975)])
 def test_nao_weighs_what_its_maker_says(name: str, mass_kg: float) -> None:
-    assert name in robot_names()
+    assert name in list_robots()
     assert load_robot(name).mass_kg == pytest.approx(mass_kg, abs=1e-9)  # a sum of five-digit numbers
 
 

@@ -50,7 +50,7 @@ class Replan:
     guess: Guess  #: x and its multipliers in the lifted NLP
 
 
-def replanner(
+def make_replanner(
     problem: GaitProblem | str,
     *,
     near: Solution | None = None,
@@ -78,10 +78,10 @@ def replanner(
 
 
 class Replanner:
-    """Steps of sequential quadratic programming from the last optimum and its multipliers; made by ``replanner``."""
+    """Steps of sequential quadratic programming from the last optimum and its multipliers; made by ``make_replanner``."""
 
     def __init__(self, problem: GaitProblem, near: Outcome, *, predict: bool = False) -> None:
-        """Use ``replanner`` instead."""
+        """Use ``make_replanner`` instead."""
         if near.guess is None or not near.converged:
             name = problem.name
             raise InputError(f"{name}: planning again needs an optimum by IPOPT to begin from; it {near.status}")

@@ -13,7 +13,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
-from nlp_gait.formulation.assembly import variables
+from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
@@ -179,7 +179,7 @@ class Body(ABC):
             for end in ("start", "end"):
                 limits = self.scale_time(min(least, least * self.swing_speed)), self.scale_time(most * self.swing_speed)
                 rows.append((f"hip_v{axis}_{end}_m_s", "m/s", *limits, f"{word} velocity at the {end}"))
-        return variables(*rows)
+        return make_variables(*rows)
 
     def split_hip(
         self, splines: Splines, along: tuple[float, float], across: tuple[float, float]

@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
-from nlp_gait.formulation.assembly import variables
+from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.symbolic.trajectories import Motion, add_motions, count_coefficients, cubic, spline, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
@@ -62,7 +62,7 @@ class Splines:
             for curve, unit in self.units.items()
             for k in range(self.count)
         )
-        return variables(*rows)
+        return make_variables(*rows)
 
     def motions(self, at: InstantPoint, duration: SX, phase: SX) -> dict[str, Motion]:
         """Return what each curve adds to its cubic."""

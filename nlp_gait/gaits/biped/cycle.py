@@ -11,7 +11,7 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.formulation import Array, Assembly, Constraint, Display, GaitProblem, Grid, Signals, SolverHints, Start
-from nlp_gait.formulation.assembly import Objective, Parameter, Point, RowsOverTime, Variable, parameters
+from nlp_gait.formulation.assembly import Objective, Parameter, Point, RowsOverTime, Variable, make_parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName
 from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
@@ -65,9 +65,11 @@ class WalkingCycle:
         both = collect_parameters(self.phases)
         balance, shared = ([p for p in both if p.name.endswith(BALANCE) == own] for own in (True, False))
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
-        limit = parameters(("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
+        limit = make_parameters(
+            ("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump)
+        )
         step = self.variables[-1]
-        speed = parameters(
+        speed = make_parameters(
             (SPEED, "m/s", self.body.scale_time(SPEED_M_S), "speed of walking", LEAST_SPEED, math.inf),
             (f"{STEP}.lower", "m", step.lower, "lower bound of the step length", -math.inf, math.inf),
             (f"{STEP}.upper", "m", step.upper, "upper bound of the step length", -math.inf, math.inf),

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
-from nlp_gait.formulation.assembly import variables
+from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, PhaseName, read_duration
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
@@ -79,7 +79,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
         (f"{what}_{name}_{SUFFIXES[unit]}", unit, lower, upper, f"{words}, {at}")
         for what, unit, lower, upper, words in table
     )
-    return list(variables(*rows))
+    return list(make_variables(*rows))
 
 
 def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:

@@ -14,7 +14,7 @@ from casadi import MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point, Signals
-from nlp_gait.formulation.assembly import Variable, parameters
+from nlp_gait.formulation.assembly import Variable, make_parameters
 from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
 from nlp_gait.gaits.biped.cycle_motion import interpolate_states, make_cycle_variables, make_state_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
@@ -81,7 +81,7 @@ class FootstepWalk(WholeWalk):
         rows = (
             (name_speed(end, k), "m/s", limit, f"{end} speed of step {k}", 0.0, NO_LIMIT) for end, limit, k in steps
         )
-        return parameters(*rows)
+        return make_parameters(*rows)
 
     def limit_speed(self, at: Point, times: Mapping[str, MX], energies: Mapping[str, MX]) -> RowsAndIndexes:
         """Return the rows of the inner steps: what both feet advance on average in a swing and the double support after it."""

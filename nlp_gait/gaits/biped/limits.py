@@ -11,7 +11,7 @@ import numpy as np
 from casadi import DM, MX
 
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
-from nlp_gait.formulation.assembly import parameters as table
+from nlp_gait.formulation.assembly import make_parameters as table
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.samples import Samples, Trace
 from nlp_gait.robots import Robot

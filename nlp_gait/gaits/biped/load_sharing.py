@@ -16,8 +16,8 @@ from casadi import MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Point, Start, Variable
-from nlp_gait.formulation.assembly import parameters as table
-from nlp_gait.formulation.assembly import variables
+from nlp_gait.formulation.assembly import make_parameters as table
+from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
@@ -111,7 +111,7 @@ class PlannedLoad(LoadSharing):
             lower = -weight if component == "force_z" else -upper
             for k in range(self._count):
                 rows.append((f"right_{component}_{unit}[{k}]", unit, lower, upper, f"coefficient {k} {text}"))
-        self.variables = variables(*rows)
+        self.variables = make_variables(*rows)
 
     def add_to(self, plan: Planner) -> Planner:
         names = [variable.name for variable in self.variables]

@@ -21,7 +21,7 @@ import casadi as ca
 from casadi import MX, SX
 
 from nlp_gait.formulation import GaitProblem, Grid, InstantPoint, Objective, Parameter, Point
-from nlp_gait.formulation.assembly import Variable, variables
+from nlp_gait.formulation.assembly import Variable, make_variables
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import TIMES, Body, PhaseName, read_duration
 from nlp_gait.gaits.biped.goals import Goal
@@ -217,7 +217,7 @@ def _list_variables(body: Body, name: PhaseName) -> tuple[Variable, ...]:
         (OUTSIDE, "m", 0.0, 0.3, "of the ZMP beyond its polygon"),
         (BEYOND, "1", 0.0, 1.0, "of joints beyond their limits [rad] and cosines of knees beyond theirs"),
     ]
-    return variables(*rows)
+    return make_variables(*rows)
 
 
 def _list_state(body: Body, name: PhaseName) -> tuple[Parameter, ...]:

@@ -16,7 +16,7 @@ from casadi import MX
 
 from nlp_gait.errors import check_count
 from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Point, Signals, SolverHints, Variable
-from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, RowsOverTime, parameters
+from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, RowsOverTime, make_parameters
 from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
@@ -87,7 +87,7 @@ class WholeWalk:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of all phases; those of balance begin with the kind of the phase."""
-        count = parameters(
+        count = make_parameters(
             (STEPS, "1", float(self.steps), "number of steps; set by the option steps", self.steps, self.steps)
         )
         found = collect_parameters(self.phases)
@@ -98,7 +98,7 @@ class WholeWalk:
         """Parameters of the inner steps' speed."""
         if "ssp" not in self.parts:
             return ()
-        return parameters(
+        return make_parameters(
             (LEAST_SPEED, "m/s", 0.0, "least speed of the inner steps", 0.0, NO_LIMIT),
             (GREATEST_SPEED, "m/s", NO_LIMIT, "greatest speed of the inner steps (no limit by default)", 0.0, NO_LIMIT),
         )

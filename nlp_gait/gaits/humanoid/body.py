@@ -11,7 +11,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
-from nlp_gait.formulation.assembly import variables
+from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
@@ -60,7 +60,7 @@ class Humanoid(Body):
             for name, largest in LARGEST_LEAN.items()
             for end in ("start", "end")
         )
-        return variables(*rows)
+        return make_variables(*rows)
 
     def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
         return LEAN

@@ -13,7 +13,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError, check_count
 from nlp_gait.formulation import Array, Display, GaitProblem, Grid, Signals, SolverHints, maker
-from nlp_gait.formulation.assembly import Assembly, Constraint, NumericPoint, Objective, Point, parameters
+from nlp_gait.formulation.assembly import Assembly, Constraint, NumericPoint, Objective, Point, make_parameters
 from nlp_gait.formulation.blocks import Block, Layout
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import stair
@@ -49,7 +49,7 @@ FINE_INTERVALS = 1000  # of a simulated gait
 
 PARAMETERS = (
     *stair.STAIR_PARAMETERS,
-    *parameters(
+    *make_parameters(
         ("step_time_s", "s", 3.5, "t3, time of the step", 0.1, inf),
         ("torque_weight", "1/(N m)^2/s", 0.01, "cost of squared torque", 0.0, inf),
         ("acceleration_weight", "s^3/rad^2", 1e-3, "cost of squared link acceleration", 0.0, inf),

@@ -11,7 +11,7 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Constraint, Display, GaitProblem, Grid, Signals, SolverHints, maker
-from nlp_gait.formulation.assembly import NumericPoint, Objective, Point, RowsOverTime, Variable, parameters
+from nlp_gait.formulation.assembly import NumericPoint, Objective, Point, RowsOverTime, Variable, make_parameters
 from nlp_gait.gaits.stairs import stair
 from nlp_gait.gaits.stairs.display import (
     StepMotion,
@@ -63,7 +63,7 @@ FINE_INTERVALS = 250  # of each phase of a simulated gait
 PARAMETERS = (
     *stair.STAIR_PARAMETERS,
     *stair.GIVEN_PARAMETERS,
-    *parameters(
+    *make_parameters(
         stair.REACH_MARGIN,
         ("zmp_margin_m", "m", 0.01, "least distance of the stance foot's ZMP from its ends", 0.0, 0.08),
         stair.LEAST_STANCE_FORCE,

@@ -7,7 +7,7 @@ from math import inf
 import casadi as ca
 from casadi import MX, SX
 
-from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, make_vector_columns, parameters
+from nlp_gait.formulation import Array, Columns, Constraint, Point, Variable, make_parameters, make_vector_columns
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load_toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
@@ -46,7 +46,7 @@ COLUMNS = {
 }
 
 
-STAIR_PARAMETERS = parameters(
+STAIR_PARAMETERS = make_parameters(
     ("stair_length_m", "m", CASES[2][0], "length of a double step: two treads (Table IV)", 0.05, 2.0),
     ("rise_run_ratio", "1", CASES[2][1], "rise over run", 0.01, 5.0),
 )
@@ -134,7 +134,7 @@ GOVERNING_VARIABLES = tuple(
     Variable(name=name, unit=unit, lower=lower, upper=upper, description=text, minimum=minimum, maximum=maximum)
     for name, unit, text, (lower, upper), (minimum, maximum) in _TABLE
 )
-GIVEN_PARAMETERS = parameters(  # Table III
+GIVEN_PARAMETERS = make_parameters(  # Table III
     ("t3_s", "s", 3.5, "t3, end of the step", 0.5, inf),
     ("sole_angle_rad", "rad", math.pi / 6, "theta_a, largest angle of the rear sole", 0.0, 1.2),
     ("toe_angle_rad", "rad", math.pi / 6, "theta_b, angle of the rear toe as it lifts", 0.0, 1.2),

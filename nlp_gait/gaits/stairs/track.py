@@ -10,7 +10,7 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, Assembly, Columns, Display, GaitProblem, Objective, Signals, SolverHints, maker
-from nlp_gait.formulation.assembly import NumericPoint, Point, Variable, parameters
+from nlp_gait.formulation.assembly import NumericPoint, Point, Variable, make_parameters
 from nlp_gait.gaits.stairs import closed_loop, stair
 from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, make_simulation_model, make_skeleton
 from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped
@@ -44,9 +44,9 @@ LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 PLANNED = [variable for variable in stair.GOVERNING_VARIABLES if variable.name != TORSO_PITCH]
 PARAMETERS = (
     *stair.STAIR_PARAMETERS,
-    *parameters(*((v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum) for v in PLANNED)),
+    *make_parameters(*((v.name, v.unit, PLAN[v.name], v.description, v.minimum, v.maximum) for v in PLANNED)),
     *stair.GIVEN_PARAMETERS,
-    *parameters(
+    *make_parameters(
         stair.REACH_MARGIN,
         ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
         ("zmp_weight", "1/m", 100.0, "worth of the ZMP margin, or cost of the ZMP outside the polygon", 0.0, inf),

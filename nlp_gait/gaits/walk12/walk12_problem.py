@@ -10,7 +10,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Objective, Point, SolverHints, maker
-from nlp_gait.formulation.assembly import RowsOverTime, Variable, parameters
+from nlp_gait.formulation.assembly import RowsOverTime, Variable, make_parameters
 from nlp_gait.gaits.walk12 import walk12_model
 from nlp_gait.gaits.walk12.walk12_display import make_simulation_model, make_skeleton
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at
@@ -37,7 +37,7 @@ VARIABLES = (  # (eq. 7)
 )
 
 TURN = "K, yaw of the swing leg: each step turns by it; Q is that of the first step, right leg swinging"
-PARAMETERS = parameters(
+PARAMETERS = make_parameters(
     ("lambda", "1", 0.15, "weight of stability against step length (eq. 11)", 0.0, 1.0),
     ("step_time_s", "s", 1.0, "T, time of one step", 0.01, math.inf),
     ("f1max", "1/(m^2 s)", F1MAX, "f1 that counts as 1 (eq. 11)", 1e-6, math.inf),

@@ -10,7 +10,7 @@ import pytest
 from casadi import MX
 
 import nlp_gait
-from nlp_gait.backends.onboard.replanner import Replanner, replanner
+from nlp_gait.backends.onboard.replanner import Replanner, make_replanner
 from nlp_gait.backends.optima.optimum import SHARP
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Constraint
@@ -22,12 +22,12 @@ pytest.importorskip("daqp")
 
 @pytest.fixture(scope="module")
 def nao() -> Iterator[Replanner]:
-    yield replanner("nao-ssp", starts=2)
+    yield make_replanner("nao-ssp", starts=2)
 
 
 def test_a_corner_follows_its_limit_across_a_change_of_sign() -> None:
     """|x - 1| + 2 |y - 1| with min(x, y) >= limit is 0 at (1, 1) up to limit 1, then 3 (limit - 1) at (limit, limit)."""
-    plan = replanner(toy(corner, limit=0.5), starts=3)
+    plan = make_replanner(toy(corner, limit=0.5), starts=3)
     for limit, expected in ((1.5, 1.5), (1.2, 0.6), (0.7, 0.0), (1.05, 0.15)):
         found = plan.solve({"limit": limit}, judge=True)
         assert found.converged and found.feasible and found.solver == "sqp", found.note
@@ -44,7 +44,7 @@ def test_many_values_that_are_zero_at_once_stay_so() -> None:
         terms = [ops.abs(math.cos(a) * d + math.sin(a) * e + d * e / 10) for a in angles]
         return sum(terms, 3 * x), (row(x + y, lower=MX(-9)),)
 
-    plan = replanner(toy(fan, limit=0.5), starts=1)
+    plan = make_replanner(toy(fan, limit=0.5), starts=1)
     for limit in (0.6, 1.4, -0.3, -0.31):
         found = plan.solve({"limit": limit}, judge=True)
         assert found.converged and found.feasible and found.solver == "sqp" and found.iterations <= 5, found.note
@@ -54,7 +54,7 @@ def test_many_values_that_are_zero_at_once_stay_so() -> None:
 
 def test_a_predicted_start_is_the_optimum_where_the_same_bounds_stay_active() -> None:
     """Where limit > 1, the optimum is (limit, limit): one step confirms it."""
-    plan = replanner(toy(corner, limit=1.5), starts=3, predict=True)
+    plan = make_replanner(toy(corner, limit=1.5), starts=3, predict=True)
     for limit, most in ((1.9, 1), (1.2, 1), (0.7, 20)):
         found = plan.solve({"limit": limit})
         assert found.converged and found.solver == "sqp" and found.iterations <= most
@@ -63,7 +63,7 @@ def test_a_predicted_start_is_the_optimum_where_the_same_bounds_stay_active() ->
 
 def test_a_limit_that_nothing_satisfies_is_named_with_its_amount() -> None:
     """min(x, y) >= 5 with x <= 2: the row misses its bound by at least 3."""
-    found = replanner(toy(corner), starts=3).solve({"limit": 5.0})
+    found = make_replanner(toy(corner), starts=3).solve({"limit": 5.0})
     assert not found.feasible and not found.converged and "IPOPT" in found.note
     assert found.violated[0].name == "row" and found.violated[0].violation >= 3.0 - 1e-6
 
@@ -82,7 +82,7 @@ def test_every_change_of_the_parameters_leads_to_ipopts_optimum(nao: Replanner) 
 
 @pytest.mark.slow
 def test_a_disturbed_robot_plans_from_the_state_where_it_is() -> None:
-    plan = replanner(nlp_gait.load("nao-dsp", trajectory="measured", intervals=4), starts=1)
+    plan = make_replanner(nlp_gait.load("nao-dsp", trajectory="measured", intervals=4), starts=1)
     state = {"hip_x_start_m": 0.002, "hip_y_start_m": -0.003, "hip_z_start_m": -0.002, "hip_vx_start_m_s": 0.01}
     values = {key: plan.problem.value(key) + change for key, change in state.items()}
     found = plan.solve(values, judge=True)
@@ -118,4 +118,4 @@ def test_what_is_not_allowed_is_named(nao: Replanner) -> None:
         nao.solve([1.0, 2.0])
     other = nlp_gait.solve(nao.problem, solver=nlp_gait.make_solver("slsqp"))
     with pytest.raises(InputError, match="optimum by IPOPT"):
-        replanner(nao.problem, near=other)
+        make_replanner(nao.problem, near=other)

@@ -13,7 +13,7 @@ from compare.analysis.tuning import choose_training, read_tunings, tune_solvers,
 from compare.study.run_study import Study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop
-from metaheuristics import SearchError, algorithm
+from metaheuristics import SearchError, make_algorithm
 from metaheuristics.settings import list_ranges
 from nlp_gait.errors import InputError
 from tests.backends.toys import corner, toy
@@ -59,7 +59,9 @@ def test_a_tuned_search_is_better_and_the_same_again(
     for tuning, solver in zip(tunings, tuned.solvers[2::2], strict=True):
         assert tuning.area[1] > tuning.area[0] and solver.settings == tuning.settings
     with_default, without = (search.trials[0] for search in searches)
-    assert with_default.params == {name: getattr(algorithm("de"), name) for name in list_ranges(algorithm("de"))}
+    assert with_default.params == {
+        name: getattr(make_algorithm("de"), name) for name in list_ranges(make_algorithm("de"))
+    }
     assert with_default.value == tunings[0].area[0] and without.state == optuna.trial.TrialState.FAIL
     assert 7 * 190 <= tunings[0].evaluations <= 7 * 200
     again = tune_solvers(replace(study, folder=None), settings, 7, said.append)[1]
@@ -94,8 +96,8 @@ def test_a_wrong_range_is_one_sentence(within: tuple[float, ...]) -> None:
 
 def test_ranges_contain_the_defaults_and_their_ends_are_allowed() -> None:
     for name in ("pso", "ga", "aco", "aco-grid", "de", "lshade"):
-        for setting, (low, high, *_) in list_ranges(algorithm(name)).items():
-            default = getattr(algorithm(name), setting)
+        for setting, (low, high, *_) in list_ranges(make_algorithm(name)).items():
+            default = getattr(make_algorithm(name), setting)
             assert default in (low, high) or isinstance(low, str) or low < default < high
             for end in (low, high):
-                algorithm(name, **{setting: end})
+                make_algorithm(name, **{setting: end})

@@ -21,7 +21,7 @@ from compare.bench.audit import (
     make_change,
 )
 from metaheuristics.interface import Algorithm, Start
-from metaheuristics.registry import algorithm
+from metaheuristics.registry import make_algorithm
 from nlp_gait import gaitbench
 
 INSTANCE = "gb2:walk12-long:0"
@@ -68,7 +68,7 @@ def run(search: Any, runs: int = 6, evaluations: int = 400) -> Audit:
 @pytest.mark.slow
 @pytest.mark.parametrize("base", ["pso"])
 def test_a_search_that_drifts_to_the_middle_is_found(base: str) -> None:
-    found = run(Planted(algorithm(base), "middle"), 12, 800)
+    found = run(Planted(make_algorithm(base), "middle"), 12, 800)
     assert "in the middle of the box" in found.accusations[0]
     centre = next(effect for effect in found.effects if effect.change == CENTRE)
     assert (centre.verdict, centre.a12 > 0.64) == ("better", True)
@@ -76,19 +76,19 @@ def test_a_search_that_drifts_to_the_middle_is_found(base: str) -> None:
 
 @pytest.mark.parametrize("base", ["pso"])
 def test_a_search_that_clips_to_bounds_is_found(base: str) -> None:
-    (accusation,) = run(Planted(algorithm(base), "bound")).accusations
+    (accusation,) = run(Planted(make_algorithm(base), "bound")).accusations
     assert accusation.startswith("clips: on noise, ")
 
 
 @pytest.mark.parametrize("name", ["random", "pso", "lshade"])
 def test_an_unbiased_search_is_not_accused(name: str) -> None:
-    assert run(algorithm(name)).accusations == ()
+    assert run(make_algorithm(name)).accusations == ()
 
 
 @pytest.mark.slow
 def test_cma_es_is_not_accused() -> None:
     pytest.importorskip("cma")
-    assert run(algorithm("cma"), 3, 300).accusations == ()
+    assert run(make_algorithm("cma"), 3, 300).accusations == ()
 
 
 def test_every_change_keeps_the_problem() -> None:
@@ -120,7 +120,7 @@ def test_noise_tells_nothing_and_is_a_function() -> None:
     assert (violation == 0.0).all() and np.array_equal(Noise(3)(X[::-1])[0], f[::-1])
     assert not np.allclose(Noise(4)(X)[0], f)
     assert abs(np.corrcoef(X.T, f)[-1, :-1]).max() < 0.05 and f.mean() == pytest.approx(0.5, abs=0.02)
-    result = metaheuristics.minimize(Noise(3), algorithm("random"), evaluations=50, seed=0)
+    result = metaheuristics.minimize(Noise(3), make_algorithm("random"), evaluations=50, seed=0)
     assert result.objective < 0.2
 
 

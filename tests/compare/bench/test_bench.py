@@ -14,8 +14,8 @@ from compare.bench.baseline import (
     BASELINE,
     FOLDER,
     RUNS,
+    list_baselines,
     list_drawn,
-    list_instances,
     load_baseline,
 )
 from compare.bench.leaderboard import make_leaderboard_page, make_leads, rank_solvers
@@ -28,9 +28,9 @@ ID = "walk12-w015"
 @pytest.mark.slow
 def test_everything_of_the_small_suite_is_shipped() -> None:
     """Twelve solvers, fifteen runs each with the seeds of the rules, the same budget; all of it below 20 MB."""
-    assert set(gaitbench.names("small")) <= set(list_instances())
+    assert set(gaitbench.list_instances("small")) <= set(list_baselines())
     assert sum(path.stat().st_size for path in FOLDER.glob("*.json.gz")) <= 20e6
-    for id in list_instances():
+    for id in list_baselines():
         records = load_baseline(id)
         assert sorted((r.solver, r.run) for r in records) == sorted(product(BASELINE, range(RUNS)))
         assert all(r.seed == r.run and r.problem == id for r in records)
@@ -54,7 +54,7 @@ def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
 @pytest.mark.slow
 def test_no_shipped_run_is_better_than_the_best_known() -> None:
     """By more than a judge's tolerance of 1e-6 can buy."""
-    for id in list_instances():
+    for id in list_baselines():
         instance, records = gaitbench.load(id), load_baseline(id)
         sign = instance.gait_problem.objective.sign
         best = min((sign * r.verdict.objective for r in records if r.verdict.feasible), default=math.inf)

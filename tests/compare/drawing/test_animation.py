@@ -7,7 +7,7 @@ from PIL import Image
 import nlp_gait
 from compare.drawing.animation import draw_frames, write_contact_sheet
 from compare.drawing.gait_figure import make_skeleton
-from nlp_gait.formulation import Result, problem_names
+from nlp_gait.formulation import Result, list_problems
 
 SSP = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 WALK = (0.13, 0.1135, 0.02, 0.0204)
@@ -46,7 +46,7 @@ def test_walk12_legs_reach_from_hip_to_ankle():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", problem_names())
+@pytest.mark.parametrize("name", list_problems())
 def test_every_problem_can_be_drawn(name):
     skeleton = drawn(name)
     low, high = skeleton.box()

@@ -11,7 +11,7 @@ __all__ = ["Problem"]
 class Problem(OptunaProblem):
     """An instance of GaitBench."""
 
-    available_problem_names = gaitbench.names()
+    available_problem_names = gaitbench.list_instances()
 
     def __init__(self, instance_id: str = "ssp-v5") -> None:
         super().__init__(gaitbench.load(instance_id))
