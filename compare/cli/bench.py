@@ -1,8 +1,8 @@
 """``nlp-gait bench``."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
@@ -13,7 +13,6 @@ from compare.cli.exchange import print_findings
 from compare.cli.options import name_all, parse_names
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
-from compare.study.record import RunRecord
 from compare.study.settings import SolverSpec
 from compare.study.task import check_task
 from nlp_gait import gaitbench
@@ -26,28 +25,55 @@ from nlp_gait.user_code import is_reference
 RIVALS = "random,pso,de,cma"
 
 
+@dataclass(frozen=True, kw_only=True)
+class InstanceOptions:
+    """Instances of GaitBench."""
+
+    suite: Literal["small", "full", "drawn"] = "small"
+    instances: str | None = None
+    families: str | None = None
+    seeds: str = "0:5"
+
+    @property
+    def title(self) -> str:
+        """What was chosen, in words."""
+        return "chosen instances" if self.instances or self.families else f"suite {self.suite}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SubmissionOptions:
+    """Submissions: to write one, to check one, or to show all of a folder."""
+
+    submit: Path | None = None
+    verify: Path | None = None
+    rerun: float = 0.1
+    code: list[str] | None = None
+    leaderboard: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchEffort:
+    """What runs, and where its results are."""
+
+    against: str = RIVALS
+    runs: int = RUNS
+    evaluations: int = EVALUATIONS
+    out: Path = Path("bench")
+    jobs: int | None = None
+    scheduler: str | None = None
+
+
 @command
 def bench(
     algorithm: str | None = None,
-    suite: Literal["small", "full", "drawn"] = "small",
-    instances: str | None = None,
-    families: str | None = None,
-    seeds: str = "0:5",
-    against: str = RIVALS,
+    *,
+    chosen: InstanceOptions,
     objectives: Literal["1", "2"] = "1",
     tune: int = 0,
     audit: bool = False,
-    submit: Path | None = None,
-    verify: Path | None = None,
-    rerun: float = 0.1,
-    code: list[str] | None = None,
-    leaderboard: Path | None = None,
+    submission: SubmissionOptions,
     label: str = "",
-    runs: int = RUNS,
-    evaluations: int = EVALUATIONS,
-    out: Path = Path("bench"),
-    jobs: int | None = None,
-    scheduler: str | None = None,
+    effort: BenchEffort,
     as_json: bool = False,
 ) -> None:
     """Run an algorithm on GaitBench and rank it with the shipped baseline, or with others that run beside it.
@@ -60,61 +86,70 @@ def bench(
     `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`,
     `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
     """
+    if submission.submit is not None or submission.verify is not None:
+        _submit_or_verify(submission, algorithm, as_json)
+    elif submission.leaderboard is not None:
+        _write_public_pages(submission.leaderboard, effort.out, as_json)
+    elif audit:
+        _audit(algorithm, as_json)
+    elif objectives == "2":
+        _rank_on_fronts(algorithm, chosen.instances, effort, as_json)
+    else:
+        _rank(algorithm, label, chosen, effort, tune, as_json)
+
+
+def _submit_or_verify(options: SubmissionOptions, algorithm: str | None, as_json: bool) -> None:
+    from compare.bench.submission import SUFFIX, pack_submission, verify_submission
+
+    name_all([*(options.code or ()), *([algorithm] if algorithm and is_reference(algorithm) else ())])
+    if options.submit is not None:
+        file = check_output_file(options.submit.with_name(f"{options.submit.name}-submission{SUFFIX}"))
+        print_written(pack_submission(options.submit, file))
+    if options.verify is not None:
+        print_findings(verify_submission(options.verify, share=options.rerun, progress=say).findings, as_json)
+
+
+def _write_public_pages(submissions: Path, out: Path, as_json: bool) -> None:
+    from compare.bench.submission import write_public_pages
+
+    written, rejected = write_public_pages(submissions, make_writable_folder(out), progress=say)
+    print_result(as_json, {"rejected": rejected}, written, lambda: None)
+    if rejected:
+        fail(f"rejected: {'; '.join(rejected)}")
+
+
+def _rank(
+    algorithm: str | None, label: str, chosen: InstanceOptions, effort: BenchEffort, tune: int, as_json: bool
+) -> None:
+    """Run what the baseline lacks on the instances, rank all, and write the leaderboard."""
     from compare.bench.baseline import list_baselines, list_drawn
     from compare.bench.leaderboard import make_leaderboard_page, make_verdict, rank_solvers
-    from compare.bench.submission import SUFFIX, pack_submission, verify_submission, write_public_pages
     from compare.report.writing import add_session, write_document
 
-    if submit is not None or verify is not None:
-        name_all([*(code or ()), *([algorithm] if algorithm and is_reference(algorithm) else ())])
-        if submit is not None:
-            print_written(
-                pack_submission(submit, check_output_file(submit.with_name(f"{submit.name}-submission{SUFFIX}")))
-            )
-        if verify is not None:
-            print_findings(verify_submission(verify, share=rerun, progress=say).findings, as_json)
-        return
-    if leaderboard is not None:
-        written, rejected = write_public_pages(leaderboard, make_writable_folder(out), progress=say)
-        print_result(as_json, {"rejected": rejected}, written, lambda: None)
-        if rejected:
-            fail(f"rejected: {'; '.join(rejected)}")
-        return
-    if audit:
-        _audit(algorithm, as_json)
-        return
-    if objectives == "2":
-        _bench_fronts(algorithm, instances, against, runs, evaluations, out, jobs, as_json)
-        return
-    chosen = choose_instances(suite, instances, families, seeds)
-    shipped = evaluations == EVALUATIONS and set(chosen) <= {*list_baselines(), *list_drawn()}
-    label = label or (f"my-{algorithm}" if algorithm in BASELINE else "")
-    solvers = {} if shipped else {other: "" for other in parse_names(against) if other != algorithm}
+    out = effort.out
+    instances = choose_instances(chosen.suite, chosen.instances, chosen.families, chosen.seeds)
+    shipped = effort.evaluations == EVALUATIONS and set(instances) <= {*list_baselines(), *list_drawn()}
+    solvers = {} if shipped else {other: "" for other in parse_names(effort.against) if other != algorithm}
     if algorithm is not None:
-        solvers[algorithm] = label  # the last one
+        solvers[algorithm] = label or (f"my-{algorithm}" if algorithm in BASELINE else "")  # the last one
     if tune and not solvers:
         raise InputError(
             "--tune needs a search that runs here: name it with --algorithm, or drawn instances with --families"
         )
     make_writable_folder(out)
-    records: list[RunRecord] = []
-    name: str | None = None
+    records, name = [], None
     if solvers:
         specs = [SolverSpec(name=solver, label=own) for solver, own in solvers.items()]
-        settings = make_bench_study(chosen, *specs, runs=runs, evaluations=evaluations)
+        settings = make_bench_study(instances, *specs, runs=effort.runs, evaluations=effort.evaluations)
         name = settings.tasks()[-1].title if algorithm is not None else None
         if name in BASELINE:
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
-        records = run_in_folder(settings, out, jobs, scheduler, tune, "rerun the command to continue")
-    board = rank_solvers(chosen, records, shipped=shipped)
-    suite_name = "chosen instances" if instances or families else f"suite {suite}"
-    page = add_session(
-        make_leaderboard_page(board, name, suite_name, evaluations, read_tunings(out)),
-        describe_command(),
-        [{"name": "gaitbench", "options": {"instance": id}} for id in chosen],
-        scheduler or str(jobs or available_cores()),
-    )
-    written = write_document(out, page, "leaderboard")
+        records = run_in_folder(settings, out, effort.jobs, effort.scheduler, tune, "rerun the command to continue")
+    board = rank_solvers(instances, records, shipped=shipped)
+    page = make_leaderboard_page(board, name, chosen.title, effort.evaluations, read_tunings(out))
+    problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]
+    workers = effort.scheduler or str(effort.jobs or available_cores())
+    written = write_document(out, add_session(page, describe_command(), problems, workers), "leaderboard")
 
     def tables() -> None:
         rows = [
@@ -122,13 +157,13 @@ def bench(
             for k, s in enumerate(board.standings, start=1)
         ]
         header = ("rank", "solver", "mean rank", "targets solved", "runs feasible")
-        print_table(f"GaitBench, {suite_name}: {len(chosen)} instances", header, rows)
+        print_table(f"GaitBench, {chosen.title}: {len(instances)} instances", header, rows)
         for sentence in () if name is None else make_verdict(board, name):
             stdout.print(sentence)
 
     data = {
-        "suite": suite_name,
-        "instances": list(chosen),
+        "suite": chosen.title,
+        "instances": list(instances),
         "solver": name,
         "rank": None if name is None else board.place(name),
         "standings": [asdict(standing) for standing in board.standings],
@@ -136,31 +171,23 @@ def bench(
     print_result(as_json, data, written, tables)
 
 
-def _bench_fronts(
-    algorithm: str | None,
-    instances: str | None,
-    against: str,
-    runs: int,
-    evaluations: int,
-    out: Path,
-    jobs: int | None,
-    as_json: bool,
-) -> None:
+def _rank_on_fronts(algorithm: str | None, instances: str | None, effort: BenchEffort, as_json: bool) -> None:
     """Run searches on the instances with two objectives and write their page."""
     from compare.bench.fronts import SEARCHES, make_fronts_page, rank_searches, run_fronts
     from compare.report.writing import add_session, write_document
 
-    chosen = parse_names(instances) if instances else list(gaitbench.list_fronts())
-    solvers = list(SEARCHES if against == RIVALS else parse_names(against))
+    chosen, out, runs = parse_names(instances or "") or list(gaitbench.list_fronts()), effort.out, effort.runs
+    solvers = list(SEARCHES if effort.against == RIVALS else parse_names(effort.against))
     solvers += [algorithm] if algorithm and algorithm not in solvers else []
     make_writable_folder(out)
-    options = {"runs": runs, "evaluations": evaluations, "folder": out, "jobs": jobs or available_cores()}
+    jobs = effort.jobs or available_cores()
+    options: dict[str, Any] = {"runs": runs, "evaluations": effort.evaluations, "folder": out, "jobs": jobs}
     with (
         report_interrupts(f"interrupted; finished runs are stored in {out}; rerun the command to continue"),
         show_progress("runs", len(chosen) * len(solvers) * runs) as advance,
     ):
-        results = run_fronts(chosen, solvers, **options, progress=advance)  # type: ignore[arg-type]
-    page = add_session(make_fronts_page(results, runs, evaluations), describe_command(), [], str(options["jobs"]))
+        results = run_fronts(chosen, solvers, **options, progress=advance)
+    page = add_session(make_fronts_page(results, runs, effort.evaluations), describe_command(), [], str(jobs))
     written, ranks = write_document(out, page, "fronts"), rank_searches(results)
     data = {"instances": chosen, "mean_ranks": ranks}
     title = f"GaitBench with two objectives: {len(chosen)} instances"
