@@ -1,6 +1,7 @@
 """Tracking a planned step with a PD controller: gains and torso pitch of least cost (the paper's use of ant colonies)."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
@@ -102,10 +103,10 @@ def stairs_track(
     """
     if not closed_loop.QUANTUM <= duration_s <= 60.0:
         raise InputError(f"duration_s must be within [{closed_loop.QUANTUM}, 60], got {duration_s}")
-    suffixes = [""] if gains == "scalar" else [f"_{angle}" for angle in closed_loop.ANGLES[coordinates]]
-    quanta = round(duration_s / closed_loop.QUANTUM)
+    angles = closed_loop.ANGLES[coordinates]
+    suffixes = [""] if gains == "scalar" else [f"_{angle}" for angle in angles]
     loop = closed_loop.ClosedLoop(
-        quanta=quanta,
+        quanta=round(duration_s / closed_loop.QUANTUM),
         scheme=scheme,
         gains=len(suffixes),
         inverse_kinematics=inverse_kinematics,
@@ -123,95 +124,106 @@ def stairs_track(
         ),
         *(v for v in stair.GOVERNING_VARIABLES if v.name == TORSO_PITCH),
     )
-
-    def rollout(point: Point, ops: Nonsmooth) -> closed_loop.Rollout:
-        return loop.rollout(point, ca.vertcat(*(stair.clip_to_range(point, variable) for variable in variables)), ops)
-
-    def start(_: Mapping[str, float], rng: np.random.Generator) -> Array:
-        about = np.append(np.full(2 * len(suffixes), PLAUSIBLE_GAIN), PLAUSIBLE_TORSO)
-        return about * (1 + SCATTER * rng.standard_normal(len(variables)))
-
-    def motion(at: NumericPoint) -> Signals:
-        found = rollout(at, Exact())
-        parts = (*found[:4], loop.find_stance_ankle(found))
-        desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
-        joints = loop.joints.full().T
-        names = tuple(closed_loop.ANGLES[coordinates])
-        (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))
-        links = {"q": q, "qd": qd, "q_desired": q_desired, "qd_desired": qd_desired}
-        t = np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta)
-        arrays = {"t": t, **{name: value @ joints for name, value in links.items()}, "link_q": q, "link_qd": qd}
-        arrays |= {"tau": torque, "zmp": zmp[:, 0], "stance_ankle": stance_ankle}
-        columns = {name: stair.COLUMNS[name] for name in ("zmp", "stance_ankle")}
-        for kind, labels in (("{}_desired", names), ("link_{}", LINKS)):
-            columns |= {kind.format("q"): Columns(unit="rad", labels=labels)}
-            columns |= {kind.format("qd"): Columns(unit="rad/s", labels=labels)}
-        return Signals(joints=names, arrays=arrays, columns=columns)
-
-    def step_motion(at: NumericPoint) -> StepMotion:
-        arrays = motion(at).arrays
-        state = np.hstack([arrays["link_q"], arrays["link_qd"]])
-        on_links = arrays["tau"] @ loop.joints.full()
-        return make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
-
-    model = make_simulation_model(step_motion) if step == "next" else None
+    tracked = TrackedStep(loop=loop, variables=variables, zmp=zmp, tracking_limit=tracking_limit)
+    model = make_simulation_model(tracked.move) if step == "next" else None
     return GaitProblem(
         name="stairs-track",
         title="Stairs, tracked step: PD gains and torso pitch of least cost",
         variables=variables,
         own_parameters=PARAMETERS,
         objective=Objective(name="cost", unit="1"),
-        assemble=lambda point, ops: _assemble(point, rollout(point, ops), loop, zmp, tracking_limit, ops),
-        display=Display(motion=motion, skeleton=make_skeleton, simulation_model=model),
-        hints=SolverHints(start=start, starts=1, amplifies_rounding=True),
+        assemble=tracked.assemble,
+        display=Display(motion=tracked.compute_signals, skeleton=make_skeleton, simulation_model=model),
+        hints=SolverHints(start=tracked.start, starts=1, amplifies_rounding=True),
     )
 
 
-def _assemble(
-    point: Point,
-    rollout: closed_loop.Rollout,
-    loop: closed_loop.ClosedLoop,
-    rule: ZmpRule,
-    tracking_limit: bool,
-    ops: Nonsmooth,
-) -> Assembly:
-    """Return the mean of (53) over all quanta with the worth of the ZMP margin or its penalty, and the limits of both."""
-    quanta, zmp = loop.quanta, rollout.zmp.T
-    errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
-    power = rollout.torque * (loop.joints @ rollout.state[closed_loop.N :, :])
-    rear, front = compute_support(point, loop)
-    exact = Exact()
-    tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
-    if rule == "penalty":  # the mean distance of the ZMP from the support polygon [m]
-        distances = ca.vertcat(rear - zmp, zmp - front)
-        balance = ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
-    else:
-        balance = -_compute_margin(zmp, rear, front, ops)
-    instants, constraints = range(1, quanta + 1), []
-    if rule == "limits":  # (Algorithm 3)
-        constraints.append(
-            stair.make_rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrackedStep:
+    """A planned step in the closed loop."""
+
+    loop: closed_loop.ClosedLoop
+    variables: tuple[Variable, ...]  # gains, then the torso's pitch
+    zmp: ZmpRule
+    tracking_limit: bool  # whether errors of the controlled angles are limited
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Names of the controlled angles."""
+        return tuple(closed_loop.ANGLES[self.loop.coordinates])
+
+    def start(self, _: Mapping[str, float], rng: np.random.Generator) -> Array:
+        """Draw a start point (n,)."""
+        about = np.append(np.full(2 * self.loop.gains, PLAUSIBLE_GAIN), PLAUSIBLE_TORSO)
+        return about * (1 + SCATTER * rng.standard_normal(len(self.variables)))
+
+    def roll_out(self, point: Point, ops: Nonsmooth) -> closed_loop.Rollout:
+        """Return the closed loop with the gains and the pitch of a point."""
+        x = ca.vertcat(*(stair.clip_to_range(point, variable) for variable in self.variables))
+        return self.loop.rollout(point, x, ops)
+
+    def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
+        """Return the mean of (53) over all quanta with the worth of the ZMP margin or its penalty, and the limits of both."""
+        loop, rollout, exact = self.loop, self.roll_out(point, ops), Exact()
+        quanta, zmp = loop.quanta, rollout.zmp.T
+        errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
+        power = rollout.torque * (loop.joints @ rollout.state[closed_loop.N :, :])
+        rear, front = compute_support(point, loop)
+        tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
+        if self.zmp == "penalty":  # the mean distance of the ZMP from the support polygon [m]
+            distances = ca.vertcat(rear - zmp, zmp - front)
+            balance = ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
+        else:
+            balance = -_compute_margin(zmp, rear, front, ops)
+        instants, constraints = range(1, quanta + 1), []
+        if self.zmp == "limits":  # (Algorithm 3)
+            constraints.append(
+                stair.make_rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants)
+            )
+        if self.tracking_limit:
+            most, limited = point["tracking_tolerance_rad"], errors[: closed_loop.N, :]
+            row = stair.make_rows(
+                "tracking", limited, self.angles, "rad", 0.1, lower=-most, upper=most, columns=instants
+            )
+            constraints.append(row)
+        finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
+        return Assembly(
+            objective=tracking + effort + point["zmp_weight"] * balance,
+            constraints=tuple(constraints),
+            indexes={
+                "controller_cost": ca.sum1(exact.abs(ca.vertcat(ca.vec(errors), ca.vec(power)))) / quanta,
+                "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
+                "energy_J": ca.sum1(exact.abs(ca.vec(power))) * closed_loop.QUANTUM,
+                "largest_error_rad": exact.largest(ca.vec(errors[: closed_loop.N, :])),
+                "peak_torque_Nm": exact.largest(ca.vec(rollout.torque)),
+                "zmp_margin_min_m": _compute_margin(zmp, rear, front, exact),
+                "quanta_before_divergence": ca.sum2(finite),
+            },
         )
-    if tracking_limit:
-        most = point["tracking_tolerance_rad"]
-        names = tuple(closed_loop.ANGLES[loop.coordinates])
-        limited = errors[: closed_loop.N, :]
-        row = stair.make_rows("tracking", limited, names, "rad", 0.1, lower=-most, upper=most, columns=instants)
-        constraints.append(row)
-    finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
-    return Assembly(
-        objective=tracking + effort + point["zmp_weight"] * balance,
-        constraints=tuple(constraints),
-        indexes={
-            "controller_cost": ca.sum1(exact.abs(ca.vertcat(ca.vec(errors), ca.vec(power)))) / quanta,
-            "tracking_cost": ca.sum1(exact.abs(ca.vec(errors))) / quanta,
-            "energy_J": ca.sum1(exact.abs(ca.vec(power))) * closed_loop.QUANTUM,
-            "largest_error_rad": exact.largest(ca.vec(errors[: closed_loop.N, :])),
-            "peak_torque_Nm": exact.largest(ca.vec(rollout.torque)),
-            "zmp_margin_min_m": _compute_margin(zmp, rear, front, exact),
-            "quanta_before_divergence": ca.sum2(finite),
-        },
-    )
+
+    def compute_signals(self, at: NumericPoint) -> Signals:
+        """Return time histories at a point of numbers."""
+        loop, found = self.loop, self.roll_out(at, Exact())
+        parts = (*found[:4], loop.find_stance_ankle(found))
+        desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
+        joints = loop.joints.full().T
+        (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))
+        links = {"q": q, "qd": qd, "q_desired": q_desired, "qd_desired": qd_desired}
+        t = np.linspace(closed_loop.QUANTUM, loop.quanta * closed_loop.QUANTUM, loop.quanta)
+        arrays = {"t": t, **{name: value @ joints for name, value in links.items()}, "link_q": q, "link_qd": qd}
+        arrays |= {"tau": torque, "zmp": zmp[:, 0], "stance_ankle": stance_ankle}
+        columns = {name: stair.COLUMNS[name] for name in ("zmp", "stance_ankle")}
+        for kind, labels in (("{}_desired", self.angles), ("link_{}", LINKS)):
+            columns |= {kind.format("q"): Columns(unit="rad", labels=labels)}
+            columns |= {kind.format("qd"): Columns(unit="rad/s", labels=labels)}
+        return Signals(joints=self.angles, arrays=arrays, columns=columns)
+
+    def move(self, at: NumericPoint) -> StepMotion:
+        """Return the motion of the robot that the engine simulates."""
+        arrays = self.compute_signals(at).arrays
+        state = np.hstack([arrays["link_q"], arrays["link_qd"]])
+        on_links = arrays["tau"] @ self.loop.joints.full()
+        return make_driven_step(arrays["t"], state, on_links, arrays["zmp"], float(at["t2_s"]))
 
 
 def compute_support(point: Point, loop: closed_loop.ClosedLoop) -> tuple[MX, MX]:
