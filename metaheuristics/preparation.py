@@ -100,7 +100,9 @@ def check_limits(
     if isinstance(algorithm, type) or not (
         hasattr(algorithm, "population") and callable(getattr(algorithm, "start", None))
     ):
-        raise SearchError(f"algorithm must be made by algorithm('pso') or ParticleSwarm(), got {abbreviate(algorithm)}")
+        raise SearchError(
+            f"algorithm must be made by make_algorithm('pso') or ParticleSwarm(), got {abbreviate(algorithm)}"
+        )
     check_population(algorithm)
     if not is_number(evaluations, Integral) or evaluations < algorithm.population:
         raise SearchError(
@@ -145,7 +147,7 @@ def check_reasons(reasons: object) -> list[str]:
 def check_helpers(handling: object, callback: object) -> None:
     """Raise SearchError unless these are a constraint handling and a function or None."""
     if isinstance(handling, type) or not callable(getattr(handling, "rule", None)):
-        raise SearchError(f"handling must be made by handling('deb') or Deb(), got {abbreviate(handling)}")
+        raise SearchError(f"handling must be made by make_handling('deb') or Deb(), got {abbreviate(handling)}")
     if callback is not None and not callable(callback):
         raise SearchError(f"callback must be a function of X, f and violation, got {abbreviate(callback)}")
 

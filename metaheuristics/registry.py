@@ -81,12 +81,12 @@ def _find_package(name: str) -> str:
 
 
 def make_handling(name: str, /, **settings: object) -> ConstraintHandling:
-    """Make a constraint handling by its name in `HANDLINGS`; raises SearchError as `algorithm` does."""
+    """Make a constraint handling by its name in `HANDLINGS`; raises SearchError as `make_algorithm` does."""
     return make_by_name("constraint handling", name, HANDLINGS, settings)
 
 
 def make_by_name(kind: str, name: str, factories: Mapping[str, Callable[..., T]], settings: Mapping[str, object]) -> T:
-    """Call the factory of that name with settings; raises SearchError as `algorithm` does."""
+    """Call the factory of that name with settings; raises SearchError as `make_algorithm` does."""
     if not isinstance(name, str):
         raise SearchError(
             f"the name of {'an' if kind[0] in 'aeiou' else 'a'} {kind} must be a text, got {abbreviate(name)}"

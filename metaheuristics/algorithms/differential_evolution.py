@@ -131,8 +131,8 @@ class LShade:
 
     Source:
         Tanabe, Fukunaga (2014), Improving the search performance of SHADE using linear population size reduction; epsilon
-        levels after Takahama, Sakai (2006). The source has no constraints: a improved that the violation decides counts there
-        by how much the violation fell, and each kind of improved has the weight of its largest.
+        levels after Takahama, Sakai (2006). The source has no constraints: an improvement that the violation decides counts there
+        by how much the violation fell, and each kind of improvement has the weight of its largest.
     """
 
     #: members in the beginning; the source takes 18 for each variable, which is 162 for 9

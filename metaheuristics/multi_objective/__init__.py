@@ -27,7 +27,7 @@ FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = {
 
 
 def make_front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
-    """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `algorithm` does."""
+    """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `make_algorithm` does."""
     return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
 

@@ -219,7 +219,7 @@ def generate(family: str, seed: int, *, unit_cube: bool = False) -> Instance:
     """Draw an instance of GaitBench 2 from a family; the same seed gives the same one on every machine.
 
     Args:
-        family: one of ``families()``.
+        family: one of ``list_families()``.
         seed: 0 or above; test seeds (``list_test_seeds``) are disjoint from those for training.
         unit_cube: whether x runs from 0 to 1; generated instances always do.
 
