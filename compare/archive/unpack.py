@@ -37,6 +37,8 @@ def unpack_archive(path: Path, folder: Path) -> tuple[ArchiveManifest, list[str]
         InputError: it is not an archive of a study, is damaged, or contains names or sizes that no such archive has.
     """
     owner = f"archive {str(path)!r}"
+    with convert_errors(f"{owner} cannot be read", InputError):
+        path.stat()
     try:
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()

@@ -15,7 +15,7 @@ from casadi import SX
 
 from nlp_gait.backends.derivatives.first_order import Assembler, Glue, StagePlaces, unite
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, SECOND, Call, DerivativePlan, Integers, PlaceBlock, Row
-from nlp_gait.backends.derivatives.structure import Structure, to_dense
+from nlp_gait.backends.derivatives.structure import Structure, stack_nonzeros
 
 # Columns d and c, the entries for c, and places of the entry for d and of a factor.
 Products: TypeAlias = "list[tuple[Integers, Integers, Row, int, int]]"
@@ -63,7 +63,7 @@ class Hessian:
         total = ca.dot(symbols[curved], glue.rows[curved])
         H = ca.triu(ca.hessian(total, assembler.y)[0])
         first, second = H.sparsity().get_triplet()
-        values = to_dense(H)
+        values = stack_nonzeros(H)
         places = plan.allocate(len(first)) + np.arange(len(first))
         assembler.evaluate(SECOND, values, places, (symbols, weights))
         for i, j, place in zip(first, second, places.tolist(), strict=True):

@@ -168,15 +168,15 @@ class CompiledNlp:
         for _ in range(MOST_POINTS):
             w, d, weights = rng.uniform(0.0, 1.0, n), rng.uniform(-1.0, 1.0, n), rng.uniform(-1.0, 1.0, m)
             slope, other = (
-                (_format_numbers(machine(w + step * d, p)) - _format_numbers(machine(w - step * d, p))) / (2 * step)
+                (_join_numbers(machine(w + step * d, p)) - _join_numbers(machine(w - step * d, p))) / (2 * step)
                 for step in (STEP, OTHER_STEP)
             )
             if not _agree(slope, other):
                 continue
             (f, gradient), (g, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
             pairs = [
-                (_format_numbers(machine(w, p)), _format_numbers([f, g])),
-                (slope, _format_numbers([ca.dot(gradient, d), J @ d])),
+                (_join_numbers(machine(w, p)), _join_numbers([f, g])),
+                (slope, _join_numbers([ca.dot(gradient, d), J @ d])),
             ]
             if "nlp_hess_l" in self.functions:
                 ahead, behind = (
@@ -185,7 +185,7 @@ class CompiledNlp:
                 )
                 change = ahead[0] - behind[0] + (ahead[1] - behind[1]).T @ weights
                 H = self.functions["nlp_hess_l"](w, p, 1.0, weights)
-                pairs.append((_format_numbers([change / (2 * STEP)]), _format_numbers([ca.triu2symm(H) @ d])))
+                pairs.append((_join_numbers([change / (2 * STEP)]), _join_numbers([ca.triu2symm(H) @ d])))
             agreeing += all(_agree(expected, value) for expected, value in pairs)
             if (checked := checked + 1) == CHECK_POINTS:
                 break
@@ -206,7 +206,7 @@ def _hash_generator() -> str:
     return digest.hexdigest()
 
 
-def _format_numbers(parts: Any) -> Array:
+def _join_numbers(parts: Any) -> Array:
     return np.concatenate([ca.DM(part).full().ravel() for part in parts])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.backends.derivatives.plan import FIRST, ONE, VALUES, Call, DerivativePlan, Integers, PlaceBlock, Row
-from nlp_gait.backends.derivatives.structure import Stage, Structure, split_nonzeros, to_dense
+from nlp_gait.backends.derivatives.structure import Stage, Structure, split_nonzeros, stack_nonzeros
 from nlp_gait.symbolic.tape import read_tape
 
 # Longest function whose derivatives are all written out, if that is cheaper than one direction after the other.
@@ -115,8 +115,10 @@ def derive_sample(function: ca.Function, active: Integers, used: Integers, direc
     in_directions = first.n_instructions() + second.n_instructions()
     if value.n_instructions() <= LONGEST_WRITTEN_OUT:
         J, H = ca.jacobian(v, x), ca.triu(ca.jacobian(gradient, x))
-        all_first = ca.Function("first", [u], ca.cse([to_dense(ca.project(J, jacobian))]))
-        all_second = ca.Function("second", [u, weights], ca.cse([gradient, to_dense(ca.project(H, ca.triu(hessian)))]))
+        all_first = ca.Function("first", [u], ca.cse([stack_nonzeros(ca.project(J, jacobian))]))
+        all_second = ca.Function(
+            "second", [u, weights], ca.cse([gradient, stack_nonzeros(ca.project(H, ca.triu(hessian)))])
+        )
         written_out = all_first.n_instructions() + all_second.n_instructions()
         if written_out <= MOST_GROWTH * in_directions and written_out <= in_directions * min(directions, len(active)):
             return SampleDerivatives(value, jacobian, hessian, False, all_first, all_second)

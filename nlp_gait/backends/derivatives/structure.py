@@ -60,7 +60,7 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
         function = call.which_function()
         inner = _expand(function.find_functions(0)[0] if function.class_name() == "Map" else function)
         arguments = inner.sx_in()  # all nonzeros become one vector
-        ends = [ca.vertcat(*map(to_dense, parts)) for parts in (arguments, inner.call(arguments))]
+        ends = [ca.vertcat(*map(stack_nonzeros, parts)) for parts in (arguments, inner.call(arguments))]
         inner = ca.Function(inner.name(), ends[:1], ends[1:])
         count = function.nnz_in() // inner.nnz_in()
         read = _by_sample([u.pop(0) for _ in inputs], count)
@@ -69,7 +69,7 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
     return Structure(w=w, p=q, stages=tuple(stages), rows=ca.vertcat(ca.densify(cost), ca.densify(rows)))
 
 
-def to_dense(value: SX) -> SX:
+def stack_nonzeros(value: SX) -> SX:
     """Return the structural nonzeros as a dense vector."""
     found = SX(value.nz[:])  # a row where the value is one
     return found if found.shape[1] == 1 else found.T
@@ -89,7 +89,7 @@ def _expand(function: ca.Function) -> ca.Function:
 
 def _by_sample(matrices: list[SX], count: int) -> SX:
     """Return the nonzeros of matrices, a block of columns for each sample, as one vector, sample by sample."""
-    parts = [to_dense(matrix) for matrix in matrices]
+    parts = [stack_nonzeros(matrix) for matrix in matrices]
     starts = np.cumsum([0, *(part.shape[0] for part in parts)])
     order = [np.arange(*ends).reshape(count, -1) for ends in zip(starts[:-1], starts[1:], strict=True)]
     return ca.vertcat(*parts)[np.hstack(order).ravel().tolist()]

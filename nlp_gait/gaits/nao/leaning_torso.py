@@ -135,9 +135,8 @@ def _place_hips(robot: Robot, pose: SX, ankles: Mapping[str, SX]) -> SX:
     found = [turn[1]]
     for side in "LR":
         hip, rotation = _place_hip(robot, side, turn, pose)
-        rest = rotation.T @ axis_rotation(
-            FORWARD, _compute_plane(hip, ankles[side])
-        )  # roll about x, then the pitch about y
+        plane = _compute_plane(hip, ankles[side])
+        rest = rotation.T @ axis_rotation(FORWARD, plane)  # roll about x, then the pitch about y
         found += [hip, ca.atan2(rest[2, 1], rest[1, 1]), ca.atan2(rest[0, 2], rest[0, 0])]
     return ca.vertcat(*found)
 

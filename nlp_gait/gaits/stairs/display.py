@@ -246,7 +246,7 @@ def _measure_stair(at: NumericPoint | Mapping[str, float]) -> tuple[float, float
 
 
 def _locate_points(q: Array, stance_ankle: Array | None = None) -> dict[str, Array]:
-    """Return the places (T, 2) of joints and ends by name [m], for angles (T, 9); from the stance ankle, or from its place."""
+    """Return the places (T, 2) of joints and ends by name [m], for angles (T, 9); the stance ankle is by default at zero."""
     angles, ankle = SX.sym("q", len(biped.LINKS)), SX.sym("ankle", 2)
     found = biped.locate_points(angles, ankle)
     base = np.zeros((len(q), 2)) if stance_ankle is None else stance_ankle

@@ -71,7 +71,7 @@ def record_film(title: str, plan: Plan, simulate: Simulator, interval_s: float) 
     at = np.minimum(indexes, len(simulation.t) - 1)
     power = np.abs(simulation.torque * simulation.qd).sum(axis=1) + plan.heat_loss * (simulation.torque**2).sum(axis=1)
     torso = simulation.torso
-    ahead, behind = (np.clip(at + sign * _list_steps(SPEED_WINDOW) // 2, 0, len(simulation.t) - 1) for sign in (1, -1))
+    ahead, behind = (np.clip(at + sign * _count_steps(SPEED_WINDOW) // 2, 0, len(simulation.t) - 1) for sign in (1, -1))
     return Recording(
         title=title,
         model=models[0],
@@ -88,12 +88,12 @@ def record_film(title: str, plan: Plan, simulate: Simulator, interval_s: float) 
     )
 
 
-def _list_steps(window_s: float) -> int:
+def _count_steps(window_s: float) -> int:
     return max(1, round(window_s / TIME_STEP))
 
 
 def _smooth(values: Array, window_s: float) -> Array:
-    return np.asarray(uniform_filter1d(values, _list_steps(window_s), axis=0, mode="nearest"))
+    return np.asarray(uniform_filter1d(values, _count_steps(window_s), axis=0, mode="nearest"))
 
 
 AZIMUTH, ELEVATION, DISTANCE, LOOK_AT = 125.0, -12.0, 1.6, (0.06, 0.0, 0.24)  # it follows the torso

@@ -236,3 +236,8 @@ def test_user_code_and_robots_travel_with_the_archive(
     assert [f.sentence for f in findings if not f.holds] == []
     (away / "unpacked" / "code" / "helper.py").write_text("def middle(a, b):\n    return a\n")
     assert [f.holds for f in _check_code_files(away / "unpacked", read_records(away / "unpacked"))] == [False]
+
+
+def test_an_archive_that_does_not_exist_is_not_called_damaged(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot be read: No such file"):
+        verify_archive(tmp_path / "missing.zip")
