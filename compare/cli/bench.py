@@ -2,15 +2,17 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+import typer
 
 from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
 from compare.cli.endings import fail, report_interrupts
 from compare.cli.exchange import print_findings
-from compare.cli.options import name_all, parse_names
+from compare.cli.options import AsJson, Code, Evaluations, Jobs, name_all, parse_names
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.study.settings import SolverSpec
@@ -29,10 +31,26 @@ RIVALS = "random,pso,de,cma"
 class InstanceOptions:
     """Instances of GaitBench."""
 
-    suite: Literal["small", "full", "drawn"] = "small"
-    instances: str | None = None
-    families: str | None = None
-    seeds: str = "0:5"
+    suite: Annotated[
+        Literal["small", "full", "drawn"],
+        typer.Option(
+            help="small (ten instances, minutes), full, or drawn: instances of families that the baseline has, too."
+        ),
+    ] = "small"
+    instances: Annotated[
+        str | None, typer.Option(help="Only these instances, separated by commas, instead of a suite.")
+    ] = None
+    families: Annotated[
+        str | None,
+        typer.Option(help="Only instances that these families draw, separated by commas: ssp, dsp, humanoid-ssp, ..."),
+    ] = None
+    seeds: Annotated[
+        str,
+        typer.Option(
+            help="Of the drawn instances: FIRST:END (END is not among them), numbers separated by "
+            "commas, or test:COUNT for those of today."
+        ),
+    ] = "0:5"
 
     @property
     def title(self) -> str:
@@ -44,37 +62,87 @@ class InstanceOptions:
 class SubmissionOptions:
     """Submissions: to write one, to check one, or to show all of a folder."""
 
-    submit: Path | None = None
-    verify: Path | None = None
-    rerun: float = 0.1
-    code: list[str] | None = None
-    leaderboard: Path | None = None
+    submit: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write the submission of this folder of an earlier bench, as one file; name user code by --algorithm.",
+        ),
+    ] = None
+    verify: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Check a submission: every final point is judged again, some runs are repeated."
+        ),
+    ] = None
+    rerun: Annotated[
+        float,
+        typer.Option(
+            min=0, max=1, help="With --verify: share of the runs to repeat; only repeated runs prove their histories."
+        ),
+    ] = 0.1
+    code: Code = None
+    leaderboard: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Write static pages (to --out) of all submissions in this folder that hold."
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchEffort:
     """What runs, and where its results are."""
 
-    against: str = RIVALS
-    runs: int = RUNS
-    evaluations: int = EVALUATIONS
-    out: Path = Path("bench")
-    jobs: int | None = None
-    scheduler: str | None = None
+    against: Annotated[
+        str, typer.Option(help="Solvers that run beside yours where no baseline is shipped, separated by commas.")
+    ] = RIVALS
+    runs: Annotated[int, typer.Option(min=2, max=1000, help="Runs on each instance; the baseline has 15.")] = RUNS
+    evaluations: Evaluations = EVALUATIONS
+    out: Annotated[
+        Path, typer.Option(help="Folder for the page and the records; finished runs in it are reused."), OUTPUT
+    ] = Path("bench")
+    jobs: Jobs = None
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
+    ] = None
 
 
 @command
 def bench(
-    algorithm: str | None = None,
+    algorithm: Annotated[
+        str | None,
+        typer.Option(
+            help="Your algorithm as my.py:MyAlgo or module:name, or a name; without it, only the baseline is shown."
+        ),
+    ] = None,
     *,
     chosen: InstanceOptions,
-    objectives: Literal["1", "2"] = "1",
-    tune: int = 0,
-    audit: bool = False,
+    objectives: Annotated[
+        Literal["1", "2"],
+        typer.Option(help="2: searches for several objectives on the instances with two, against their true fronts."),
+    ] = "1",
+    tune: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            max=1000,
+            help="Tune the settings of each search by N trials on training instances first, with "
+            "Optuna, and show NAME-tuned beside NAME.",
+        ),
+    ] = 0,
+    audit: Annotated[
+        bool,
+        typer.Option(
+            help="Examine --algorithm for biases instead: does it gain where the optimum is in the "
+            "middle, or clip to bounds?"
+        ),
+    ] = False,
     submission: SubmissionOptions,
-    label: str = "",
+    label: Annotated[str, typer.Option(help="Name of your algorithm on the page (default: its own name).")] = "",
     effort: BenchEffort,
-    as_json: bool = False,
+    as_json: AsJson = False,
 ) -> None:
     """Run an algorithm on GaitBench and rank it with the shipped baseline, or with others that run beside it.
 

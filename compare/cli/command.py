@@ -1,8 +1,7 @@
 """Commands: groups of options, and exit by errors.
 
 Options of several commands form a group: a frozen dataclass whose fields are annotated like parameters of a Typer command. A
-command with a parameter of that type has every field as an option, and receives the dataclass. Texts, flags and limits of options
-are in ``options.toml``, except those that a program computes: these are annotated.
+command with a parameter of that type has every field as an option, and receives the dataclass.
 """
 
 import codecs
@@ -13,14 +12,12 @@ import io
 import os
 import select
 import sys
-import tomllib
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
-from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_origin
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -34,17 +31,12 @@ from nlp_gait.interrupts import raise_interrupts
 R = TypeVar("R")
 
 PLAIN = "nlp-gait-plain"  # error handler for characters that an output cannot encode
-# Parameters that name what a command writes.
-OUTPUTS = ("out", "to", "table", "signals", "video")
+OUTPUT = "output"  # in the annotation of a parameter that names what the command writes
 FORCE = inspect.Parameter(
     "force",
     inspect.Parameter.KEYWORD_ONLY,
     default=False,
     annotation=Annotated[bool, typer.Option("--force", help="Replace inputs and files of other programs, too.")],
-)
-# By command or group of options, and by parameter; "shared" has what several commands take.
-TEXTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
-    (files("compare.cli") / "options.toml").read_text(encoding="utf-8")
 )
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -59,7 +51,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
     def run(**given: Any) -> R:
         try:
             with raise_interrupts():
-                protect_inputs(_find_inputs(given), given.pop("force", False))
+                protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
                 with register_written():
@@ -74,19 +66,20 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
             _report_os_error(error)
             raise typer.Exit(1) from None
 
-    options = list(_list_options(function, [function.__name__]))
-    if any(option.name in OUTPUTS for option in options):
+    options = list(_list_options(function))
+    outputs = {option.name for option in options if _is_output(option)}
+    if outputs:
         options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     return run
 
 
-def _find_inputs(given: Mapping[str, Any]) -> Iterator[Path]:
+def _find_inputs(given: Mapping[str, Any], outputs: Container[str]) -> Iterator[Path]:
     """Yield the existing files that arguments name: alone, as the value of an option, or as the file of user code."""
     for name, value in given.items():
         for text in value if isinstance(value, (list, tuple)) else [value]:
-            if name in OUTPUTS or not isinstance(text, (str, Path)):
+            if name in outputs or not isinstance(text, (str, Path)):
                 continue
             for part in (str(text), str(text).partition("=")[2], str(text).rpartition(":")[0]):
                 with suppress(OSError, ValueError):  # a name that is too long, or none
@@ -94,25 +87,17 @@ def _find_inputs(given: Mapping[str, Any]) -> Iterator[Path]:
                         yield Path(part)
 
 
-def _list_options(function: Callable[..., Any], owners: Sequence[str]) -> Iterator[inspect.Parameter]:
-    """Yield the parameters of a function or group as options, described by the owners' texts; a group stands for its fields."""
+def _list_options(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:
+    """Yield the parameters of a function or group as options; a group stands for its fields."""
     for parameter in inspect.signature(function, eval_str=True).parameters.values():
-        kind = parameter.annotation
-        if is_dataclass(kind) and isinstance(kind, type):
-            yield from _list_options(kind, [base.__name__ for base in kind.__mro__])
+        if is_dataclass(parameter.annotation) and isinstance(parameter.annotation, type):
+            yield from _list_options(parameter.annotation)
         else:
-            annotation = _annotate(kind, parameter.name, owners)
-            yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=annotation)
+            yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
 
 
-def _annotate(annotation: Any, name: str, owners: Sequence[str]) -> Any:
-    """Add the text, flags and limits of ``options.toml`` to the type of a parameter; the first owner that has them decides."""
-    entry = next((TEXTS[owner][name] for owner in (*owners, "shared") if name in TEXTS.get(owner, ())), None)
-    if entry is None or get_origin(annotation) is Annotated:
-        return annotation
-    described = {"help": entry} if isinstance(entry, str) else dict(entry)
-    make = typer.Argument if described.pop("argument", False) else typer.Option
-    return Annotated[annotation, make(*described.pop("flags", ()), **described)]
+def _is_output(option: inspect.Parameter) -> bool:
+    return OUTPUT in getattr(option.annotation, "__metadata__", ())
 
 
 def run_app(app: Callable[[], object]) -> None:

@@ -11,9 +11,9 @@ from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
 from compare.analysis.tuning import tune_solvers, write_tunings
 from compare.analysis.verdict import describe_best_known
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, end_interrupted, fail, report_interrupts, say_error
-from compare.cli.options import RESULTS, ProblemOptions, SearchOptions, name_all, parse_names
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.printing import describe_command, print_result, print_table, say, show_progress, stderr, stdout
 from compare.cli.report import encode_simulations, print_simulations, simulate_best
 from compare.study.import_runs import read_imported_records
@@ -48,7 +48,9 @@ SESSION_OPTIONS = ("config", "out", "resume", "jobs", "scheduler", "code", "engi
 def compare(
     *,
     context: typer.Context,
-    problems: list[str] | None = None,
+    problems: Annotated[
+        list[str] | None, typer.Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
+    ] = None,
     algorithms: Annotated[
         str,
         typer.Option(
@@ -58,19 +60,36 @@ def compare(
             f"search (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,
-    starts: int = 20,
+    starts: Annotated[
+        int, typer.Option(min=0, max=100000, help="Starts of IPOPT and other gradient methods; each is a run.")
+    ] = 20,
     searches: SearchOptions,
     options: ProblemOptions,
-    tune: int = 0,
-    config: Path | None = None,
-    out: Path = RESULTS,
-    resume: bool = False,
-    jobs: int | None = None,
-    code: list[str] | None = None,
-    scheduler: str | None = None,
-    engine: bool = False,
-    as_csv: bool = False,
-    as_json: bool = False,
+    tune: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            max=1000,
+            help="Tune the settings of each search by N trials on training instances first, with "
+            "Optuna, and show NAME-tuned beside NAME.",
+        ),
+    ] = 0,
+    config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead.")] = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder for records, report and figures; finished runs in it are reused."), OUTPUT
+    ] = RESULTS,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out.")] = False,
+    jobs: Jobs = None,
+    code: Code = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
+    ] = None,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Also simulate every solver's best gait in MuJoCo (extra sim).")
+    ] = False,
+    as_csv: AsCsv = False,
+    as_json: AsJson = False,
 ) -> None:
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
 

@@ -6,12 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from compare.analysis.units import make_heading, with_unit
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.endings import fail
-from compare.cli.options import AnyProblem, parse_values, parse_x
+from compare.cli.options import AnyProblem, AsJson, parse_values, parse_x
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_result, print_rows, print_table, print_written, stdout
 from compare.judge import Evaluation
@@ -34,16 +36,31 @@ SHOWN_VIOLATIONS = 10
 
 @command
 def evaluate(
-    x: str | None = None,
-    motion: Path | None = None,
-    touch_down: float | None = None,
-    engine: bool = True,
+    x: Annotated[
+        str | None,
+        typer.Option(
+            "--x", help="Decision variables in order, separated by commas; or a .csv file with one candidate per row."
+        ),
+    ] = None,
+    motion: Annotated[
+        Path | None,
+        typer.Option(help="Joint angles over time instead: a CSV with columns t and joints, or a Webots .motion."),
+    ] = None,
+    touch_down: Annotated[
+        float | None,
+        typer.Option(help="Landing time of the swing foot of a cycle in --motion [s] (default: inferred)."),
+    ] = None,
+    engine: Annotated[bool, typer.Option(help="Also simulate a motion in the physics engine (extra sim).")] = True,
     *,
     problem: AnyProblem,
-    rounded: bool = False,
-    signals: Path | None = None,
-    table: Path | None = None,
-    as_json: bool = False,
+    rounded: Annotated[
+        bool, typer.Option("--rounded", help="Judge all points that round to the digits of --x, not that point alone.")
+    ] = False,
+    signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file."), OUTPUT] = None,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the judged points to this CSV file."), OUTPUT
+    ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Evaluate candidates with the exact functions, at the problem's samples and on a dense grid.
 

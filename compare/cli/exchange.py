@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.solver_table import describe_unknown
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.endings import end_if_excluded, fail
-from compare.cli.options import RESULTS, NamedProblem, name_all
+from compare.cli.options import RESULTS, AsCsv, AsJson, Code, NamedProblem, name_all
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_result, print_written, say, show_progress, stdout
 from compare.logs import write_coco, write_ioh
@@ -31,13 +33,30 @@ if TYPE_CHECKING:
 def import_results(
     *,
     problem: NamedProblem,
-    finals: Path,
-    history: Path | None = None,
-    label: str,
-    evaluations: int | None = None,
-    out: Path = RESULTS,
-    as_csv: bool = False,
-    as_json: bool = False,
+    finals: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FINALS.csv",
+            help="One row per run: the variables, and where known run, seed, objective, violation, "
+            "evaluations, time_s.",
+        ),
+    ],
+    history: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="Best so far: run, evaluations, objective and optionally time_s."),
+    ] = None,
+    label: Annotated[str, typer.Option("--as", help='Name in the report, for example "GA (MATLAB)".')],
+    evaluations: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=9223372036854775807,
+            help="Evaluations of every run, if neither file has them; leave it out if they are unknown.",
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of a new or existing study."), OUTPUT] = RESULTS,
+    as_csv: AsCsv = False,
+    as_json: AsJson = False,
 ) -> None:
     """Import results of other programs into a study, judged and reported like all others.
 
@@ -60,7 +79,16 @@ def import_results(
 
 
 @command
-def logs(folder: Path, to: Path, form: Literal["ioh", "coco"] = "ioh", as_json: bool = False) -> None:
+def logs(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare` or `bench`.")
+    ],
+    to: Annotated[Path, typer.Option("--to", help="Folder for the logs."), OUTPUT],
+    form: Annotated[
+        Literal["ioh", "coco"], typer.Option("--format", help="IOHprofiler's JSON, or COCO-like data.")
+    ] = "ioh",
+    as_json: AsJson = False,
+) -> None:
     """Write a study's runs as logs that iohinspector and IOHanalyzer read.
 
     The logs contain the relative gap to the best known objective, and equivalent evaluations.
@@ -80,7 +108,12 @@ def logs(folder: Path, to: Path, form: Literal["ioh", "coco"] = "ioh", as_json: 
 
 
 @command
-def archive(*, folder: Path, out: Path = Path("study.zip"), code: list[str] | None = None) -> None:
+def archive(
+    *,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
+    out: Annotated[Path, typer.Option(help="The archive to write."), OUTPUT] = Path("study.zip"),
+    code: Code = None,
+) -> None:
     """Pack a study for others: records, report, user code, robots, certificates, versions, hashes, and how to repeat it.
 
     All records are checked and the report is rewritten first. `nlp-gait verify FILE.zip` checks the archive on any machine.
@@ -99,7 +132,16 @@ def archive(*, folder: Path, out: Path = Path("study.zip"), code: list[str] | No
 
 
 @command
-def verify(*, study: Path, rerun: str = "0%", code: list[str] | None = None, as_json: bool = False) -> None:
+def verify(
+    *,
+    study: Annotated[Path, typer.Argument(metavar="DIR_OR_ZIP", help="Folder of a study, or its archive.")],
+    rerun: Annotated[
+        str,
+        typer.Option(metavar="SHARE", help="Also repeat a random share of the runs, such as 5%: same seed, same bits."),
+    ] = "0%",
+    code: Code = None,
+    as_json: AsJson = False,
+) -> None:
     """Check a study: evaluate every point again, check histories, hashes, sessions, certificates and, of an archive, the report.
 
     Prints what holds and what does not; the exit status is 1 if anything does not. User code runs only if named with --code.
@@ -140,7 +182,17 @@ def _parse_share(text: str) -> float:
 
 
 @command
-def cite(name: str | None = None, as_json: bool = False) -> None:
+def cite(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[PROBLEM|PAPER|INSTANCE]",
+            help="What you used: a problem (`nlp-gait list`), a paper (nao, walk12, stairs) or an "
+            "instance of GaitBench; everything without it.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
     """Print BibTeX for the software, and for the papers and the suite that a problem comes from.
 
     Examples: `nlp-gait cite`, `nlp-gait cite nao-ssp`, `nlp-gait cite ssp-v5`

@@ -1,10 +1,13 @@
 """``nlp-gait animate``, ``export``, ``export-objective`` and ``export-solver``."""
 
 from pathlib import Path
+from typing import Annotated
 
-from compare.cli.command import command
+import typer
+
+from compare.cli.command import OUTPUT, command
 from compare.cli.endings import report_interrupts
-from compare.cli.options import NamedProblem, StoredGait
+from compare.cli.options import AsJson, NamedProblem, StoredGait
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_result, print_written
 from compare.study.references import find_reference
@@ -23,7 +26,14 @@ SHEET = ".png"  # suffix of a contact sheet
 
 
 @command
-def export(stored: StoredGait, format_: str, out: Path | None = None, period_ms: int = PERIOD_MS) -> None:
+def export(
+    stored: StoredGait,
+    format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf, mujoco-keyframes, naoqi or ros.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File; by default next to the result, with the format's suffix."), OUTPUT
+    ] = None,
+    period_ms: Annotated[int, typer.Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
+) -> None:
     """Write a gait in a format of other tools.
 
     Example: `nlp-gait export best.json --format webots` after `nlp-gait solve nao-ssp --out best.json`
@@ -37,7 +47,13 @@ def export(stored: StoredGait, format_: str, out: Path | None = None, period_ms:
 
 
 @command
-def export_objective(instance: str, to: Path, as_json: bool = False) -> None:
+def export_objective(
+    instance: Annotated[
+        str, typer.Argument(metavar="INSTANCE", help="Of GaitBench, for example ssp-v5 or gb2:ssp:3, or a problem.")
+    ],
+    to: Annotated[Path, typer.Option("--to", help="Folder for the files."), OUTPUT],
+    as_json: AsJson = False,
+) -> None:
     """Write an instance of GaitBench as plain C++ with a C header, for C, MATLAB, Octave and Julia.
 
     The files need only libc and libm: source, header, build script, an example in C, and callers for the others.
@@ -50,7 +66,20 @@ def export_objective(instance: str, to: Path, as_json: bool = False) -> None:
 
 @command
 def export_solver(
-    to: Path, *, problem: NamedProblem, planner: bool = False, nl: bool = False, as_json: bool = False
+    to: Annotated[Path, typer.Option("--to", help="Folder for the files."), OUTPUT],
+    *,
+    problem: NamedProblem,
+    planner: Annotated[
+        bool,
+        typer.Option(
+            "--planner", help="Write a solver in C, too: plans again for changed parameters, within milliseconds."
+        ),
+    ] = False,
+    nl: Annotated[
+        bool,
+        typer.Option("--nl", help="Write an .nl file for AMPL's solvers instead, with names and best known value."),
+    ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
 
@@ -77,7 +106,17 @@ def export_solver(
 
 @command
 def animate(
-    stored: StoredGait, out: Path | None = None, frames_per_s: float = 12.5, speed: float = 1.0, poses: int = 6
+    stored: StoredGait,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="A .gif or .mp4, a .png contact sheet, or an .html page; by default a GIF next to the result."
+        ),
+        OUTPUT,
+    ] = None,
+    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames per second.")] = 12.5,
+    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,
+    poses: Annotated[int, typer.Option(min=2, max=20, help="Poses of a contact sheet.")] = 6,
 ) -> None:
     """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
 

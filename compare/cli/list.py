@@ -4,9 +4,12 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from compare.cli.command import command
+import typer
+
+from compare.cli.command import OUTPUT, command
+from compare.cli.options import AsJson
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, stdout
 from compare.study.description import describe_solver, list_described_names
@@ -20,11 +23,28 @@ from nlp_gait.user_code import find_entry_points
 
 @command
 def list_problems(
-    name: str | None = None,
-    algorithms: bool = False,
-    robot: str | None = None,
-    out: Path | None = None,
-    as_json: bool = False,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME]",
+            help="A problem, for its variables, parameters and options; an algorithm or solver, for its settings.",
+        ),
+    ] = None,
+    algorithms: Annotated[
+        bool, typer.Option("--algorithms", help="Show the settings of all algorithms and solvers.")
+    ] = False,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show a robot as read: URDF, MJCF (.xml), JSON, or a name; with a problem, that "
+            "problem for this robot.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG."), OUTPUT
+    ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """List problems, algorithms and robots, or describe one of them.
 

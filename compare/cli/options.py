@@ -4,8 +4,11 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import typer
+
+from compare.cli.command import OUTPUT
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import Handling, ProblemSpec, Stop
 from nlp_gait.errors import InputError, describe_type, unknown
@@ -16,6 +19,20 @@ from nlp_gait.user_code import allow_code, is_reference
 
 # Default folder of results.
 RESULTS = Path("results")
+# Options of several commands.
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
+Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
+Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
+OutFolder = Annotated[Path, typer.Option(help="Folder for report, tables, figures, data and stored results."), OUTPUT]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Write all runs and all judged points as CSV files too.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+Code = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="FILE.py:NAME",
+        help="Your code that the file refers to; it runs only if named here; repeatable.",
+    ),
+]
 # Options of problems with their own flag.
 FLAGS = ("robot", "intervals", "derivatives")
 
@@ -24,8 +41,13 @@ FLAGS = ("robot", "intervals", "derivatives")
 class StoredGait:
     """A gait in a file, and the user code that it needs."""
 
-    result: Path
-    code: list[str] | None = None
+    result: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULT.json", help="From `solve --out` or `plan --out`, a study's record, or written by hand."
+        ),
+    ]
+    code: Code = None
 
     def load(self) -> Result:
         """Return the gait; raises as ``load_result``, and InputError for code that is not a reference."""
@@ -37,11 +59,28 @@ class StoredGait:
 class CycleOptions:
     """Options and values of a walking cycle."""
 
-    robot: str | None = None
-    intervals: int | None = None
-    option: list[str] | None = None
-    values: list[str] | None = None
-    fix: list[str] | None = None
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Of NAO and humanoid problems: nao-v5 (default), nao-v6, nao-v4, a robot file "
+            "(.json, .urdf, .xml of MuJoCo), or PACKAGE:NAME of an installed package."
+        ),
+    ] = None
+    intervals: Annotated[
+        int | None, typer.Option(help="Equal intervals of the motion (default: see `nlp-gait list PROBLEM`).")
+    ] = None
+    option: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Any other option of the problem; repeatable.")
+    ] = None
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="NAME=VALUE", help="Parameter, or a variable's bound as NAME.lower=VALUE; repeatable."
+        ),
+    ] = None
+    fix: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a variable at a value; repeatable.")
+    ] = None
 
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
@@ -61,21 +100,32 @@ class CycleOptions:
 class AnyCycle(CycleOptions):
     """A walking cycle, by default NAO's."""
 
-    name: str = "nao-cycle"
+    name: Annotated[
+        str, typer.Argument(metavar="[PROBLEM]", help="nao-cycle, or humanoid-cycle with --robot FILE.")
+    ] = "nao-cycle"
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProblemOptions(CycleOptions):
     """Options and values of any problem."""
 
-    derivatives: str | None = None
+    derivatives: Annotated[
+        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedProblem(ProblemOptions):
     """A problem by name, with its options and values."""
 
-    name: str
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="PROBLEM",
+            help="For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or "
+            "gb2:ssp:3; or your own, FILE.py:NAME.",
+        ),
+    ]
 
     def spec(self) -> ProblemSpec:
         """Return the problem as plain data; raises as ``make_spec``."""
@@ -90,7 +140,10 @@ class NamedProblem(ProblemOptions):
 class AnyProblem(ProblemOptions):
     """A problem whose name may be left out where a file determines it."""
 
-    name: str | None = None
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out where a file names it."),
+    ] = None
 
     def spec(self) -> ProblemSpec:
         """Return the problem; raises as ``make_spec``."""
@@ -103,22 +156,39 @@ class AnyProblem(ProblemOptions):
 class NaoPhase(NamedProblem):
     """A problem, by default nao-ssp."""
 
-    name: str = "nao-ssp"
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="PROBLEM",
+            help="For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or "
+            "gb2:ssp:3; or your own, FILE.py:NAME.",
+        ),
+    ] = "nao-ssp"
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
     """Number of runs of search algorithms, constraint handling, and stop criteria."""
 
-    runs: int = 11
-    seed: int = 0
-    evaluations: int = 10_000
-    handling: str = "deb"
-    penalty_weight: float | None = None
-    target: float | None = None
-    stagnation: int | None = None
-    time_limit: float | None = None
-    polish: bool = False
+    runs: Annotated[int, typer.Option(min=1, max=100000, help="Runs of each search algorithm.")] = 11
+    seed: Seed = 0
+    evaluations: Evaluations = 10_000
+    handling: Annotated[
+        str, typer.Option(help="Constraints in searches: deb (feasibility rules), penalty or epsilon.")
+    ] = "deb"
+    penalty_weight: Annotated[
+        float | None, typer.Option(help="Objective units per unit of violation, for --handling penalty.")
+    ] = None
+    target: Annotated[float | None, typer.Option(help="End a search at a feasible objective at least this good.")] = (
+        None
+    )
+    stagnation: Annotated[
+        int | None, typer.Option(min=1, help="End a search after this many generations without progress.")
+    ] = None
+    time_limit: Annotated[float | None, typer.Option(help="End a run after this many seconds.")] = None
+    polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each search's result, as another solver.")] = (
+        False
+    )
 
     def make_study(
         self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20

@@ -12,9 +12,9 @@ import typer
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.record_statistics import Weighting
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, report_interrupts
-from compare.cli.options import name_all
+from compare.cli.options import AsCsv, AsJson, Code, name_all
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.cli.simulate import DriveOptions
 from compare.papers import REPRODUCTIONS, load_reproduction
@@ -38,19 +38,35 @@ ENGINE_TABLE = (
 @command
 def report(
     *,
-    folder: Path,
-    gradient_weight: float | None = None,
-    hessian_weight: float | None = None,
-    engine: bool = False,
-    latex: bool = False,
-    pdf: bool = False,
-    style: Path | None = None,
-    parquet: bool = False,
-    code: list[str] | None = None,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
+    gradient_weight: Annotated[
+        float | None, typer.Option(min=0.0, help="Evaluations counted for a first derivative (default n + 1).")
+    ] = None,
+    hessian_weight: Annotated[
+        float | None, typer.Option(min=0.0, help="Evaluations counted for a Hessian (default (n + 1)(n + 2)/2).")
+    ] = None,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored.")
+    ] = False,
+    latex: Annotated[
+        bool, typer.Option("--latex", help="Also write a table of each problem for papers (LaTeX, package booktabs).")
+    ] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Also write figures for papers, one column wide, and their captions in LaTeX.")
+    ] = False,
+    style: Annotated[
+        Path | None, typer.Option(metavar="FILE.mplstyle", help="Matplotlib style file for the figures of --pdf.")
+    ] = None,
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help="Also write all runs as runs.parquet (extra parquet).")
+    ] = False,
+    code: Code = None,
     drive_options: DriveOptions,
-    as_csv: bool = False,
-    as_json: bool = False,
-    watch: bool = False,
+    as_csv: AsCsv = False,
+    as_json: AsJson = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Rewrite the report while the study runs; the open page reloads itself.")
+    ] = False,
 ) -> None:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
@@ -91,10 +107,22 @@ def report(
 @command
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
-    out: Path,
-    quick: bool = False,
-    effort: Path | None = None,
-    scheduler: str | None = None,
+    out: Annotated[
+        Path,
+        typer.Option(help="Folder for the report, its tables and figures; results stored in it are used again."),
+        OUTPUT,
+    ],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="The least work that fills every table and figure, instead of the paper's.")
+    ] = False,
+    effort: Annotated[
+        Path | None,
+        typer.Option(help="JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Perform the runs on the workers of this Dask scheduler instead."),
+    ] = None,
 ) -> None:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 

@@ -7,14 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 
 from compare.analysis.units import format_millimetres, with_unit
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.endings import fail, report_interrupts
-from compare.cli.options import StoredGait, parse_number
+from compare.cli.options import AsJson, StoredGait, parse_number
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, show_progress, stdout
 from nlp_gait.errors import InputError, unknown
@@ -34,18 +35,53 @@ if TYPE_CHECKING:
 class DriveOptions:
     """The drive of the simulated robot, by name, and its settings."""
 
-    drive: str = "feed-forward"
-    period_ms: float | None = None
-    interpolation: str | None = None
-    feed_forward: str | None = None
-    torque_limits: str | None = None
-    feedback: str = "none"
-    feedback_delay_ms: float | None = None
-    feedback_noise: float = 1.0
-    feedback_seed: int = 0
-    replan_hz: float = 100.0
-    replan_free: str = "length,width,time"
-    speed_factor: float = 1.0
+    drive: Annotated[
+        str,
+        typer.Option(
+            help="feed-forward: set-points every 10 ms, linear between them, planned velocity and "
+            "torque fed forward. held: each held for 40 ms, nothing fed forward."
+        ),
+    ] = "feed-forward"
+    period_ms: Annotated[float | None, typer.Option(help="Time between set-points (default: the drive's).")] = None
+    interpolation: Annotated[str | None, typer.Option(help="Between set-points: linear or held.")] = None
+    feed_forward: Annotated[str | None, typer.Option(help="torque (and velocity), velocity, or none.")] = None
+    torque_limits: Annotated[
+        str | None,
+        typer.Option(
+            help="urdf (default), stall or continuous: published limits differ; joints without motor"
+            " data have the limit of the robot file."
+        ),
+    ] = None
+    feedback: Annotated[
+        str,
+        typer.Option(
+            help="none, in open loop; torso-spring: balance by measured place and attitude of the "
+            "torso; replan: the rest of each phase is planned again from what is measured, with"
+            " the next foothold, for walks of NAO."
+        ),
+    ] = "none"
+    feedback_delay_ms: Annotated[
+        float | None, typer.Option(help="From measuring to acting (default: the feedback's).")
+    ] = None
+    feedback_noise: Annotated[float, typer.Option(help="Factor on the noise of its sensors; 0 for none.")] = 1.0
+    feedback_seed: Annotated[int, typer.Option(min=0, help="Of this noise: same seed, same walk.")] = 0
+    replan_hz: Annotated[float, typer.Option(help="Plans per second of the feedback replan.")] = 100.0
+    replan_free: Annotated[
+        str,
+        typer.Option(
+            metavar="WHAT",
+            help="What of the next step it may change: some of length, width, time, separated by "
+            "commas; empty for the hip's motion alone.",
+        ),
+    ] = "length,width,time"
+    speed_factor: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=2.0,
+            help="On the length of the steps in the second half of the walk, with the feedback replan.",
+        ),
+    ] = 1.0
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
@@ -76,12 +112,24 @@ class DriveOptions:
 class ConditionOptions:
     """Differences of the simulated world and robot from the planned ones."""
 
-    friction: float | None = None
-    slope_deg: str = "0,0"
-    mass_factor: float = 1.0
-    stiffness_factor: float = 1.0
-    push: str = "0,0"
-    push_at_s: float | None = None
+    friction: Annotated[float | None, typer.Option(help="Coefficient of sliding friction (default: 0.7).")] = None
+    slope_deg: Annotated[
+        str,
+        typer.Option(
+            metavar="X,Y",
+            help="Rise of the floor forward and to the left, added to the slope of a walk planned for one.",
+        ),
+    ] = "0,0"
+    mass_factor: Annotated[float, typer.Option(help="On all masses; the gait was planned for 1.")] = 1.0
+    stiffness_factor: Annotated[
+        float, typer.Option(help="True stiffness of the joints over what their drive assumes.")
+    ] = 1.0
+    push: Annotated[str, typer.Option(metavar="X,Y", help="Impulse on the torso, forward and to the left [N s].")] = (
+        "0,0"
+    )
+    push_at_s: Annotated[
+        float | None, typer.Option(min=0.0, help="When it begins (default: in the middle of the motion).")
+    ] = None
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
@@ -103,11 +151,16 @@ class ConditionOptions:
 class FilmOptions:
     """A film of a simulated gait, and how it is made."""
 
-    video: Path | None = None
-    beside: Path | None = None
-    size: str = "1280x720"
-    speed: float = 1.0
-    frames_per_s: float = 25.0
+    video: Annotated[
+        Path | None, typer.Option(help="Film it to this .gif or .mp4 file, from the side, the front and above."), OUTPUT
+    ] = None
+    beside: Annotated[
+        Path | None,
+        typer.Option(metavar="OTHER.json", help="Simulate this gait as well, next to the other in the film."),
+    ] = None
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Of the film [pixels].")] = "1280x720"
+    speed: Annotated[float, typer.Option(min=0.05, max=20.0, help="Speed of the film; 0.25 is slow motion.")] = 1.0
+    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")] = 25.0
 
 
 def _parse_pair(text: str, flag: str) -> tuple[float, float]:
@@ -121,17 +174,25 @@ def _parse_pair(text: str, flag: str) -> tuple[float, float]:
 def simulate(
     stored: StoredGait,
     *,
-    steps: int | None = None,
-    viewer: bool = False,
-    out: Path | None = None,
-    sole: str = "rectangle",
+    steps: Annotated[int | None, typer.Option(help="Simulate this many steps of a gait that repeats.")] = None,
+    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for report, time histories, model and figure."), OUTPUT
+    ] = None,
+    sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
-    share_loads: bool = False,
-    load_rate: float = 12.5,
+    share_loads: Annotated[
+        bool, typer.Option("--share-loads", help="Redistribute loads in double support for least power (extra qp).")
+    ] = False,
+    load_rate: Annotated[
+        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load [robot weights/s].")
+    ] = 12.5,
     film: FilmOptions,
-    robustness: bool = False,
-    as_json: bool = False,
+    robustness: Annotated[
+        bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
+    ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Simulate a gait in MuJoCo, open loop or with feedback, and compare it with the model's predictions.
 

@@ -2,15 +2,27 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 import nlp_gait
 from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
-from compare.cli.command import command
+from compare.cli.command import OUTPUT, command
 from compare.cli.compare import print_summaries
 from compare.cli.endings import end_interrupted, fail, run_until_interrupted
-from compare.cli.options import NamedProblem, SearchOptions, parse_names, parse_number, parse_values, parse_x
+from compare.cli.options import (
+    AsJson,
+    Jobs,
+    NamedProblem,
+    SearchOptions,
+    Seed,
+    parse_names,
+    parse_number,
+    parse_values,
+    parse_x,
+)
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_rows, print_table, print_written, say, show_progress, stdout
 from compare.study.record import RunRecord
@@ -28,15 +40,21 @@ from nlp_gait.proofs.guarantee import guarantee
 @command
 def solve(
     *,
-    starts: int | None = None,
-    seed: int = 0,
-    x0: str | None = None,
+    starts: Annotated[
+        int | None,
+        typer.Option(min=1, max=100000, help="Random starts within the bounds (default: 20, fewer for slow problems)."),
+    ] = None,
+    seed: Seed = 0,
+    x0: Annotated[str | None, typer.Option("--x0", help="First start: values separated by commas.")] = None,
     problem: NamedProblem,
-    solver: str = "ipopt",
-    linear_solver: str | None = None,
-    jobs: int | None = None,
-    out: Path | None = None,
-    as_json: bool = False,
+    solver: Annotated[str, typer.Option(help="NLP solver; see nlp-gait list.")] = "ipopt",
+    linear_solver: Annotated[
+        str | None,
+        typer.Option(help="Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."),
+    ] = None,
+    jobs: Jobs = None,
+    out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file."), OUTPUT] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
 
@@ -118,12 +136,17 @@ def _print(solution: Solution) -> None:
 @command
 def search(
     *,
-    algorithm: str = "pso",
+    algorithm: Annotated[
+        str,
+        typer.Option(help="pso, ga, aco, aco-grid, cma, de, pymoo:GA, ...; or your own, FILE.py:NAME or cmd:COMMAND."),
+    ] = "pso",
     searches: SearchOptions,
     problem: NamedProblem,
-    out: Path | None = None,
-    jobs: int | None = 1,
-    as_json: bool = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Store one record file per run in this folder; continue from it."), OUTPUT
+    ] = None,
+    jobs: Jobs = 1,
+    as_json: AsJson = False,
 ) -> None:
     """Search a problem with a metaheuristic and the compiled exact functions.
 
@@ -192,20 +215,49 @@ def _run(record: RunRecord) -> dict[str, Any]:
 @command
 def plan(
     *,
-    robot: str = "nao-v5",
-    steps: int | None = None,
-    speed: float | None = None,
-    speeds: str = "",
-    distance: float | None = None,
-    slope_deg: float = 0.0,
-    stairs: str = "",
-    turn_deg: float = 0.0,
-    footholds: Path | None = None,
-    intervals: int = 10,
-    values: list[str] | None = None,
-    starts: int = 3,
-    out: Path | None = None,
-    as_json: bool = False,
+    robot: Annotated[
+        str,
+        typer.Option(
+            help="nao-v5, nao-v6, nao-v4, a robot file (.json, .urdf, .xml of MuJoCo), or "
+            "PACKAGE:NAME of an installed package."
+        ),
+    ] = "nao-v5",
+    steps: Annotated[
+        int | None,
+        typer.Option(min=2, max=1000, help="Swings of a foot, both half steps included (default: 10, or by distance)."),
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Speed of the inner steps [m/s] (default: the cheapest).")] = None,
+    speeds: Annotated[
+        str, typer.Option(help="Speeds of the inner steps [m/s], separated by commas; between them it changes evenly.")
+    ] = "",
+    distance: Annotated[float | None, typer.Option(help="Distance that the feet advance [m].")] = None,
+    slope_deg: Annotated[float, typer.Option(help="By which the ground rises forward; negative falls.")] = 0.0,
+    stairs: Annotated[
+        str, typer.Option(metavar="RISExRUN:N", help="Climb N treads of this rise and depth [m], one with each step.")
+    ] = "",
+    turn_deg: Annotated[
+        float,
+        typer.Option(
+            help="Turn to the left along an arc, by 15 degrees with each step unless --steps; "
+            "negative turns to the right."
+        ),
+    ] = 0.0,
+    footholds: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file with columns x_m,y_m,z_m,yaw_deg: where the right foot, the left foot and so on land."
+        ),
+    ] = None,
+    intervals: Annotated[int, typer.Option(min=1, max=10000, help="Equal intervals of each phase.")] = 10,
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="NAME=VALUE", help="Parameter or bound of nao-walk or humanoid-walk; repeatable."
+        ),
+    ] = None,
+    starts: Annotated[int, typer.Option(min=1, max=100, help="Most start points, until one converges.")] = 3,
+    out: Annotated[Path | None, typer.Option(help="Write the plan to this JSON file."), OUTPUT] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Plan a whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 

@@ -2,9 +2,24 @@
 
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from compare.cli.command import command
-from compare.cli.options import AnyCycle, AnyProblem, NamedProblem, NaoPhase, name_all, parse_names
+from compare.cli.options import (
+    AnyCycle,
+    AnyProblem,
+    AsJson,
+    Code,
+    Evaluations,
+    NamedProblem,
+    NaoPhase,
+    OutFolder,
+    Seed,
+    name_all,
+    parse_names,
+)
 from compare.cli.printing import print_json, show_progress, stdout
 from compare.cli.questions.output import Output
 from compare.cli.simulate import DriveOptions
@@ -15,18 +30,27 @@ from nlp_gait.files import make_writable_folder
 @command
 def certainty(
     *,
-    starts: int = 10_000,
-    evaluations: int = 1_000_000,
-    tolerance: float = 1e-6,
-    time_limit: float = 1800.0,
-    seed: int = 0,
+    starts: Annotated[int, typer.Option(min=1, max=1000000, help="Random starts of IPOPT.")] = 10_000,
+    evaluations: Annotated[
+        int, typer.Option(min=0, max=1000000000000, help="Budget of one long CMA-ES with restarts; 0 for none.")
+    ] = 1_000_000,
+    tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 1e-6,
+    time_limit: Annotated[
+        float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables and NAO's phases; 0 for none.")
+    ] = 1800.0,
+    seed: Seed = 0,
     problem: AnyProblem,
-    check: Path | None = None,
-    paths: int = 200,
-    complete: bool = False,
-    code: list[str] | None = None,
-    out: Path = Path("certainty"),
-    as_json: bool = False,
+    check: Annotated[
+        Path | None,
+        typer.Option(help="Certificate to check instead: look for a better point, then repeat paths of its proof."),
+    ] = None,
+    paths: Annotated[int, typer.Option(min=1, max=100000, help="Paths of a proof to check.")] = 200,
+    complete: Annotated[
+        bool, typer.Option("--complete", help="With --check: also repeat the whole proof; rerun to continue.")
+    ] = False,
+    code: Code = None,
+    out: OutFolder = Path("certainty"),
+    as_json: AsJson = False,
 ) -> None:
     """Gather evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
 
@@ -81,13 +105,19 @@ def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: b
 @command
 def motions(
     *,
-    problem: str = "nao-ssp",
-    orders: str = "cubic,quintic,spline-2,spline-4,spline-8",
-    free_orders: str = "spline-2,spline-4,spline-8,spline-16",
-    starts: int = 1,
-    seed: int = 0,
-    robot: str = "nao-v5",
-    intervals: int = 10,
+    problem: Annotated[str, typer.Argument(metavar="[nao-ssp|nao-dsp]")] = "nao-ssp",
+    orders: Annotated[
+        str, typer.Option(help="Motions of hip, foot and arms, separated by commas.")
+    ] = "cubic,quintic,spline-2,spline-4,spline-8",
+    free_orders: Annotated[
+        str, typer.Option(help="Motions of free joints, separated by commas; empty for none.")
+    ] = "spline-2,spline-4,spline-8,spline-16",
+    starts: Annotated[
+        int, typer.Option(min=0, max=100000, help="Random starts for each order, next to the simpler optimum.")
+    ] = 1,
+    seed: Seed = 0,
+    robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
+    intervals: Annotated[int, typer.Option(min=1, help="Intervals of the phase.")] = 10,
     output: Output,
 ) -> None:
     """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the least power of richer motions.
@@ -105,7 +135,13 @@ def motions(
 
 
 @command
-def motors(*, starts: int = 10, seed: int = 0, problem: NaoPhase, output: Output) -> None:
+def motors(
+    *,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts for each variant.")] = 10,
+    seed: Seed = 0,
+    problem: NaoPhase,
+    output: Output,
+) -> None:
     """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat and rotor of each motor.
 
     Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
@@ -116,7 +152,14 @@ def motors(*, starts: int = 10, seed: int = 0, problem: NaoPhase, output: Output
 
 
 @command
-def prices(*, starts: int = 10, seed: int = 0, checks: int = 3, problem: NamedProblem, output: Output) -> None:
+def prices(
+    *,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts within the bounds.")] = 10,
+    seed: Seed = 0,
+    checks: Annotated[int, typer.Option(min=0, help="Quantities of the robot that are verified by solving again.")] = 3,
+    problem: NamedProblem,
+    output: Output,
+) -> None:
     """Compute what each limit costs the optimum, and which error of masses, lengths or soles would change it most.
 
     Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
@@ -129,12 +172,18 @@ def prices(*, starts: int = 10, seed: int = 0, checks: int = 3, problem: NamedPr
 @command
 def robust(
     *,
-    mass: float = 5.0,
-    sole: float = 2.0,
-    starts: int = 10,
-    seed: int = 0,
-    samples: int = 20,
-    simulate: bool = True,
+    mass: Annotated[float, typer.Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
+    sole: Annotated[
+        float, typer.Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")
+    ] = 2.0,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts of the nominal problem.")] = 10,
+    seed: Seed = 0,
+    samples: Annotated[
+        int, typer.Option(min=0, max=100000, help="Random corners on which each result is evaluated.")
+    ] = 20,
+    simulate: Annotated[
+        bool, typer.Option(help="Simulate both gaits in MuJoCo on the worst robots (extra sim).")
+    ] = True,
     problem: NaoPhase,
     output: Output,
 ) -> None:
@@ -151,11 +200,11 @@ def robust(
 @command
 def sweep(
     *,
-    over: list[str],
-    algorithm: str = "ipopt",
-    starts: int = 5,
-    evaluations: int = 10_000,
-    seed: int = 0,
+    over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
+    algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts where no neighbour helps.")] = 5,
+    evaluations: Evaluations = 10_000,
+    seed: Seed = 0,
     problem: NamedProblem,
     output: Output,
 ) -> None:
@@ -172,7 +221,18 @@ def sweep(
 
 
 @command
-def capabilities(*, starts: int = 3, seed: int = 0, problem: AnyCycle, output: Output) -> None:
+def capabilities(
+    *,
+    starts: Annotated[
+        int,
+        typer.Option(
+            min=1, max=100000, help="Random starts for the cheapest cycle, from which each quantity is raised."
+        ),
+    ] = 3,
+    seed: Seed = 0,
+    problem: AnyCycle,
+    output: Output,
+) -> None:
     """Report the highest walking speed, the longest step and the highest lift of a foot, each with the limits that stop it.
 
     For robots that can turn, also the sharpest turn of a step.
@@ -189,13 +249,28 @@ def capabilities(*, starts: int = 3, seed: int = 0, problem: AnyCycle, output: O
 @command
 def walk(
     *,
-    over: list[str] | None = None,
-    library: bool = False,
-    engine: bool = False,
-    steps: int | None = None,
-    baseline: list[str] | None = None,
-    starts: int = 5,
-    seed: int = 0,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH:COUNT",
+            help="Speeds (default: ten from 0.01 to 0.1 m/s, for humanoids in proportion to the root"
+            " of their leg length), or another parameter or variable; NAME=V1,V2,... Repeatable"
+            " with --library.",
+        ),
+    ] = None,
+    library: Annotated[
+        bool, typer.Option(help="Write a library of gaits with their derivatives, and judge what lies between them.")
+    ] = False,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Simulate ten steps of each gait in MuJoCo (extra sim).")
+    ] = False,
+    steps: Annotated[int | None, typer.Option(min=0, max=1000, help="Simulate so many steps; 0 for none.")] = None,
+    baseline: Annotated[
+        list[str] | None,
+        typer.Option(help="Planner to compare with, on the same footsteps: cart-table, least-torque; repeatable."),
+    ] = None,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts where no neighbour helps.")] = 5,
+    seed: Seed = 0,
     drives: DriveOptions,
     problem: AnyCycle,
     output: Output,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from compare.cli.endings import describe_stored, end_interrupted, fail
-from compare.cli.options import RESULTS
+from compare.cli.options import RESULTS, AsJson, OutFolder
 from compare.cli.printing import describe_command, print_result, print_table, say, show_progress, stdout
 from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class Output:
     """Folder of the answer, and how it is printed."""
 
-    out: Path = RESULTS
-    as_json: bool = False
+    out: OutFolder = RESULTS
+    as_json: AsJson = False
 
     def __post_init__(self) -> None:
         """Require a writable folder before the work."""

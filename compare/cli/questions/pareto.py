@@ -1,9 +1,12 @@
 """``nlp-gait pareto``."""
 
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from compare.cli.command import command
-from compare.cli.options import NamedProblem
+from compare.cli.options import AsJson, NamedProblem, OutFolder, Seed
 from compare.cli.questions.output import Output
 from nlp_gait.errors import InputError
 
@@ -13,15 +16,28 @@ SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 @command
 def pareto(
     *,
-    objectives: str = "power,dbm_y_mean",
-    points: int = 40,
-    starts: int = 5,
-    search: list[str] | None = None,
-    runs: int = 11,
-    seed: int = 0,
+    objectives: Annotated[
+        str,
+        typer.Option(
+            help="power [W] and one or two of dbm_y_mean, dbm_x_mean, dbm_y_min, dbm_x_min [m] and "
+            "speed [m/s], separated by commas."
+        ),
+    ] = "power,dbm_y_mean",
+    points: Annotated[int, typer.Option(min=5, max=10000, help="Points of the front.")] = 40,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts at every third point.")] = 5,
+    search: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=BUDGET,BUDGET",
+            show_default=False,
+            help="NSGA2, CMOPSO, CMOEAD or DCNSGA3; repeatable. 'none' for no search.",
+        ),
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, max=100000, help="Runs of each search.")] = 11,
+    seed: Seed = 0,
     problem: NamedProblem,
-    out: Path = Path("pareto"),
-    as_json: bool = False,
+    out: OutFolder = Path("pareto"),
+    as_json: AsJson = False,
 ) -> None:
     """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
 
