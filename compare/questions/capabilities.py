@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import ClassVar, NamedTuple
 
 from compare.analysis.units import choose_natural_step, join_words, with_unit
-from compare.questions.question import Answer, Question, Work, make_csv_table, make_table
+from compare.questions.question import Answer, Question, Work, make_record_table, make_table
 from nlp_gait.backends.plan_walk import find_walk
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.solver import Solver
@@ -119,13 +119,12 @@ class Capabilities(Question[tuple[Capability, ...]]):
             "our bounds moved": lambda c: with_unit(c.beyond and c.beyond.value, c.unit, ".4g"),
             "then stopped by": lambda c: describe_stops(c.beyond),
         }
-        rows = [
-            (c.quantity, k, item.value, s.name, s.side, s.bound, s.unit, s.gain, "ours" if s.ours else "robot's")
+        stops = [
+            {"quantity": c.quantity, "round": k, "value": item.value, **asdict(stop)}
             for c in findings
             for k, item in enumerate(c.rounds)
-            for s in item.stops
+            for stop in item.stops
         ]
-        header = ("quantity", "round", "value", "limit", "side", "bound", "unit", "gain_per_natural_step", "origin")
         robot = self.problem.display.robot
         return Answer(
             stem=stem,
@@ -138,7 +137,7 @@ class Capabilities(Question[tuple[Capability, ...]]):
                 "with least times and greatest velocities from the joints that swing the robot's legs. Where they stop the "
                 f"robot, they are moved by a factor of {FACTOR:g}, again and again.",
                 *(f"{c.words}: {c.end}." for c in findings),
-                make_csv_table(stem, header, rows),
+                make_record_table(stem, stops),
             ],
             data={"problem": self.problem.name, "capabilities": [asdict(c) for c in findings]},
         )

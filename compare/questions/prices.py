@@ -20,8 +20,8 @@ from compare.analysis.units import (
 )
 from compare.drawing.figures import make_figure, use_style
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
-from compare.questions.question import Answer, Question, Work, make_csv_table
-from compare.report.document import Figure, Part, Table, Value, make_text_table
+from compare.questions.question import Answer, Question, Work, make_record_table
+from compare.report.document import Figure, Part, make_text_table
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.optima.optimum import SHARP, Optimum, find_optimum
 from nlp_gait.backends.optima.sensitivities import Sensitivities, differentiate_by_models, differentiate_by_parameters
@@ -320,12 +320,17 @@ class Prices(Question[FoundPrices]):
         if findings.limits or findings.robot:
             shown = "Cost of one natural step of each limit, and effect of errors of the robot."
             parts.append(Figure(name=stem, caption=shown, drawing=plot_prices(findings, problem)))
+        rows = [
+            {"kind": kind, **vars(price), "per_step": price.per_step}
+            for kind, prices in (("limit", findings.limits), ("robot", findings.robot))
+            for price in prices
+        ]
         about = {"objective_name": objective.name, "unit": objective.unit, "sense": objective.sense}
         return Answer(
             stem=stem,
             title=f"{problem.name}: what each limit costs",
             verdict=(f"{objective.name} {with_unit(findings.objective, objective.unit)}, to {objective.sense}",),
-            parts=[*parts, _make_csv(stem, findings)],
+            parts=[*parts, make_record_table(stem, rows)],
             data={"problem": problem.name, **about, **asdict(findings)},
         )
 
@@ -343,25 +348,6 @@ def _make_row(price: Price, ranges: Mapping[str, float]) -> tuple[str, ...]:
         steps = tuple("none" if value is None else f"{value:+z.5f}" for value in price.one_step)  # type: ignore[assignment]
         errors = ", ".join("-" if error is None else f"{error:.0e}" for error in (price.error, price.x_error))
     return (price.name, price.words, f"{price.per_step:+z.5f}", *steps, errors, moves, f"{down:+.2g} to {up:+.2g}")
-
-
-def _make_csv(stem: str, findings: FoundPrices) -> Table:
-    """All quantities, with the derivatives of objective and x*."""
-    header = [
-        *("kind", "quantity", "unit", "value", "slope", "natural_step", "change_per_step", "resolved_slope"),
-        *("one_step_less", "one_step_more", "turns_below", "turns_above", *(f"d_{name}" for name in findings.x)),
-    ]
-    rows: list[list[Value]] = [
-        [
-            *(kind, price.name, price.unit, price.value, price.slope, price.step, price.per_step, price.resolved),
-            *(price.one_step or (None, None)),
-            *price.reach,
-            *(None if price.x is None else price.x[name] for name in findings.x),
-        ]
-        for kind, prices in (("limit", findings.limits), ("robot", findings.robot))
-        for price in prices
-    ]
-    return make_csv_table(stem, header, rows)
 
 
 def plot_prices(findings: FoundPrices, problem: GaitProblem) -> Drawing:

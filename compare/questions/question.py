@@ -5,7 +5,7 @@ A new question is one file with a subclass of ``Question``, and a command that d
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, Generic, TypeVar
@@ -133,6 +133,31 @@ def make_table(caption: str, items: Iterable[T], columns: Mapping[str, Callable[
 def make_csv_table(name: str, header: Sequence[str], rows: Sequence[Sequence[Value]]) -> Table:
     """Return a table that is written to a CSV file with all digits, and rounded in the report."""
     return Table(name=name, columns=dict.fromkeys(header, ".6g"), rows=rows, caption=f"As in {name}.csv, rounded")
+
+
+def make_record_table(name: str, records: Iterable[Any], leave_out: Sequence[str] = ()) -> Table:
+    """Return a table that is written to a CSV file with all digits, with a row for each data class or mapping.
+
+    Columns are the fields; parts of a field have its name in front (``x.hip_height_m``, ``reach.0``).
+    """
+    flat = [dict(_flatten(record)) for record in records]
+    names = dict.fromkeys(key for row in flat for key in row if key.partition(".")[0] not in leave_out)
+    columns = [key for key in names if not any(other.startswith(f"{key}.") for other in names)]
+    rows = [[row.get(key) for key in columns] for row in flat]
+    return Table(name=name, columns=dict.fromkeys(columns, ".6g"), rows=rows, caption=f"As in {name}.csv, rounded")
+
+
+def _flatten(value: Any, path: str = "") -> Iterator[tuple[str, Value]]:
+    """Yield paths and values of all numbers and texts in plain data or data classes."""
+    if is_dataclass(value):
+        value = {item.name: getattr(value, item.name) for item in fields(value)}
+    elif isinstance(value, tuple | list):
+        value = dict(enumerate(value))
+    if not isinstance(value, Mapping):
+        yield path, value
+        return
+    for key, part in value.items():
+        yield from _flatten(part, f"{path}.{key}" if path else str(key))
 
 
 def make_optima_table(optima: Mapping[str, Mapping[str, float]]) -> Table:

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import format_quantity, list_units, make_axis_label, with_unit
 from compare.drawing.figures import COLOURS, make_axes, use_style
-from compare.questions.question import Answer, Question, Work, make_csv_table
-from compare.report.document import Figure, Table, Value, make_text_table
+from compare.questions.question import Answer, Question, Work, make_record_table
+from compare.report.document import Figure, make_text_table
 from compare.study.record import RunRecord, parse_record
 from compare.study.references import find_reference
 from compare.study.run_task import run_task, try_task
@@ -181,7 +181,7 @@ class Sweep(Question[list[SweepPoint]]):
             parts=(
                 make_text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem, solver)),
-                _make_csv(stem, findings, problem),
+                make_record_table(stem, findings),
             ),
             data={"problem": problem.name, "points": [asdict(point) for point in findings]},
         )
@@ -235,27 +235,6 @@ def _make_point(at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoin
         evaluations=end.evaluations["f"],
         time_s=end.time_s.solve,
     )
-
-
-def _make_csv(stem: str, points: Sequence[SweepPoint], problem: GaitProblem) -> Table:
-    axes, unit = list(points[0].at), problem.objective.unit
-    # A variable may be an axis too; its column then has the exact value of the axis.
-    columns = [name for name in problem.names if name not in axes]
-    objective = problem.objective.name + (f"_{unit}" if unit != "1" else "")
-    taken = {*axes, *columns}
-    verdict, cost = (
-        [f"run_{name}" if name in taken else name for name in names]  # a user's problem may have a variable time_s
-        for names in ((objective, "feasible", "violation"), ("evaluations", "time_s", "status"))
-    )
-    rows: list[list[Value]] = [
-        [
-            *(*point.at.values(), point.objective, point.feasible, point.violation),
-            *(point.x[name] for name in columns),
-            *(point.evaluations, f"{point.time_s:.4f}", point.status),
-        ]
-        for point in points
-    ]
-    return make_csv_table(stem, [*axes, *verdict, *columns, *cost], rows)
 
 
 def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem, solver: str) -> Drawing:

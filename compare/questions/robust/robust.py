@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Drawing
 from compare.analysis.units import format_millimetres
 from compare.drawing.figures import add_legend_below, make_figure, use_style
 from compare.questions.perturbed_problem import is_mass
-from compare.questions.question import Answer, Question, Work, make_csv_table, make_optima_table, make_table
+from compare.questions.question import Answer, Question, Work, make_optima_table, make_record_table, make_table
 from compare.questions.robust.robust_gait import (
     Box,
     RobotSimulation,
@@ -20,7 +20,7 @@ from compare.questions.robust.robust_gait import (
     simulate_robots,
     solve_robust,
 )
-from compare.report.document import Figure, Table, Value
+from compare.report.document import Figure, Table
 from nlp_gait.simulation.engine import load_mujoco
 
 NOMINAL, ROBUST, WORST = "0.72", "#0072B2", "#D55E00"
@@ -95,7 +95,7 @@ class Robust(Question[FoundRobust]):
                 make_optima_table({"nominal": gaits[0].nominal_x, **{gait.name: gait.x for gait in gaits}}),
                 *([_make_simulation_table(widest, simulations)] if simulations else ()),
                 Figure(name=stem, caption=shown, drawing=plot_robust(gaits, simulations)),
-                _make_csv(stem, gaits),
+                make_record_table(stem, gaits, leave_out=("corners", "robots")),
             ),
             data={
                 "problem": name,
@@ -134,22 +134,6 @@ def _make_simulation_table(widest: RobustGait, simulations: Sequence[RobotSimula
             "MuJoCo": lambda s: format_millimetres(s.margin_m),
         },
     )
-
-
-def _make_csv(stem: str, gaits: Sequence[RobustGait]) -> Table:
-    header = [
-        *("uncertain", "scenarios", "nominal_W", "violation_of_nominal", "unit", "row", "robust_W", "robust_worst_W"),
-        *("violation_of_robust", "violation_of_robust_in_random_corners", *gaits[0].x, "settled"),
-    ]
-    rows: list[list[Value]] = [
-        [
-            *(g.name, len(g.corners), g.nominal_W, g.nominal_worst.violation, g.nominal_worst.unit),
-            *(g.nominal_worst.row, g.power_W, g.worst_W, g.worst.violation, g.random_worst.violation),
-            *(*g.x.values(), g.settled),
-        ]
-        for g in gaits
-    ]
-    return make_csv_table(stem, header, rows)
 
 
 def plot_robust(gaits: Sequence[RobustGait], simulations: Sequence[RobotSimulation]) -> Drawing:

@@ -25,7 +25,7 @@ def test_sweep_writes_table_and_picture(tmp_path: Path) -> None:
     assert [point["at"] for point in result["points"]] == [{"hip_height_m": 0.305}, {"hip_height_m": 0.31}]
     written = {path.suffix: path for path in map(Path, result["files"])}
     rows = list(csv.DictReader(written[".csv"].read_text().splitlines()))
-    assert [float(row["power_W"]) for row in rows] == [point["objective"] for point in result["points"]]
+    assert [float(row["objective"]) for row in rows] == [point["objective"] for point in result["points"]]
     assert written.keys() >= {".png", ".svg", ".html"} and all(path.stat().st_size > 0 for path in written.values())
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli.questions.output import Output
-from compare.questions.question import Answer, make_csv_table, make_optima_table
+from compare.questions.question import Answer, make_optima_table, make_record_table
 from nlp_gait.errors import OutputError
 
 ANSWER = Answer(
@@ -19,7 +19,14 @@ ANSWER = Answer(
     parts=(
         "A note.",
         make_optima_table({"first": {"a_m": 1.0 / 3.0}, "second": {"a_m": 2.0}}),
-        make_csv_table("walk-numbers", ["case", "a_m", "found", "price"], [["first", 1.0 / 3.0, True, None]]),
+        make_record_table(
+            "walk-numbers",
+            [
+                {"case": "first", "x": {"a_m": 1.0 / 3.0}, "found": True, "price": None, "notes": ("long",)},
+                {"case": "second", "x": None, "found": False, "price": 0.5, "notes": ()},
+            ],
+            leave_out=["notes"],
+        ),
     ),
     data={"a_m": 1.0 / 3.0, "bound": math.inf},
     results={"walk-first": {"problem": "walk"}},
@@ -29,7 +36,9 @@ ANSWER = Answer(
 def test_an_answer_is_a_page_a_table_with_every_digit_and_plain_data(tmp_path: Path) -> None:
     written = ANSWER.write(tmp_path)
     assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()}
-    assert (tmp_path / "walk-numbers.csv").read_text() == "case,a_m,found,price\nfirst,0.3333333333333333,true,\n"
+    assert (tmp_path / "walk-numbers.csv").read_text() == (
+        "case,x.a_m,found,price\nfirst,0.3333333333333333,true,\nsecond,,false,0.5\n"
+    )
     assert json.loads((tmp_path / "walk-question.json").read_text()) == {"a_m": 1.0 / 3.0, "bound": None}
     assert json.loads((tmp_path / "walk-first.json").read_text()) == {"problem": "walk"}
     page = (tmp_path / "walk-question.md").read_text()

@@ -38,7 +38,7 @@ def test_the_command_prices_every_limit_and_writes_table_and_picture(folder: Pat
     assert dearest["slope"] == pytest.approx(-0.85 / 0.13, rel=1e-6)
     written = [Path(name) for name in answer["files"]]
     rows = list(csv.DictReader((folder / "walk12-prices.csv").read_text().splitlines()))
-    assert [row["quantity"] for row in rows] == [price["name"] for price in answer["limits"]]
+    assert [row["name"] for row in rows] == [price["name"] for price in answer["limits"]]
     assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
     assert all(path.stat().st_size > 0 for path in written)
 

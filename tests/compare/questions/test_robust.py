@@ -48,7 +48,7 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
     price = 23.7325
     assert found["power_W"] - found["nominal_W"] == pytest.approx(0.002 * price, rel=0.01)
     written = [Path(name) for name in answer["files"]]
-    assert [row["uncertain"] for row in csv.DictReader((tmp_path / "nao-ssp-robust.csv").read_text().splitlines())] == [
+    assert [row["name"] for row in csv.DictReader((tmp_path / "nao-ssp-robust.csv").read_text().splitlines())] == [
         "soles"
     ]
     assert {path.suffix for path in written} == {".html", ".md", ".csv", ".png", ".svg", ".json"}

@@ -127,7 +127,7 @@ def test_infeasible_points_are_kept_and_named(tmp_path: Path) -> None:
     table = tmp_path / "nao-ssp-sweep-dbm_y_mean_limit_m-ipopt.csv"
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [row["feasible"] for row in rows] == ["true", "true", "false"]
-    assert [float(row["power_W"]) for row in rows] == [0.8459, 0.9, 1.7]
+    assert [float(row["objective"]) for row in rows] == [0.8459, 0.9, 1.7]
     assert rows[2]["status"] == "in the way: dbm_y_mean (by 0.04 m)"
     (axes,) = plot_sweep(points, problem, "ipopt").axes
     line, cross = axes.lines
