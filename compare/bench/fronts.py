@@ -15,8 +15,13 @@ import numpy as np
 from compare.drawing.figures import assign_looks, make_figure, use_style
 from compare.report.document import Document, Figure, Section, make_text_table
 from compare.study.store import Computation, Store
-from metaheuristics.multi_objective import FRONT_ALGORITHMS, make_front_algorithm
-from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, check_budgets, minimize_many
+from metaheuristics.multi_objective import (
+    FRONT_ALGORITHMS,
+    FrontAlgorithm,
+    check_budgets,
+    make_front_algorithm,
+    minimize_many,
+)
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.formulation import Array
 from nlp_gait.gaitbench.fronts import FrontQuality, get_front_definition, load_front
@@ -26,7 +31,7 @@ from nlp_gait.user_code import hash_source, is_reference, load_object, shorten_n
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-SEARCHES = ("NSGA2", "CMOPSO", "CMOEAD", "DCNSGA3")
+SEARCHES = ("NSGA2", "CMOPSO")
 COLUMNS = 3  # of panels in the figure
 SMALL_RINGS: Mapping[str, Any] = {"markersize": 3, "markerfacecolor": "none"}  # markers of points
 

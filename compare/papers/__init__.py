@@ -13,10 +13,8 @@ if TYPE_CHECKING:
 # Modules with a REPRODUCTION, by name of the paper.
 REPRODUCTIONS = {
     "nao": "compare.papers.nao.nao_reproduction",
-    "nao-pareto": "compare.papers.nao_pareto.nao_pareto_reproduction",
     "walk12": "compare.papers.walk12.walk12_reproduction",
     "stairs": "compare.papers.stairs.stairs_reproduction",
-    "nao-claims": "compare.papers.nao_walk.nao_walk_reproduction",
 }
 
 

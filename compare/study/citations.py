@@ -23,13 +23,12 @@ SECTION = re.compile(r"^(Attributes|Args|Raises|Returns|Source):$")
 class _Entry:
     bibtex: str
     cited_as: str = ""  # text by which a ``Source:`` names it
-    also: tuple[str, ...] = ()  # further names
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Entries:
     software: _Entry
-    papers: Mapping[str, _Entry]
+    papers: dict[str, _Entry]
     suite: _Entry
 
 
@@ -42,12 +41,11 @@ def find_citations(name: str | None = None) -> list[str]:
     """
     text = (files("compare.study") / "citations.toml").read_text(encoding="utf-8")
     known = decode(_Entries, tomllib.loads(text.replace("VERSION", version("nlp-gait"))))
-    papers = {n: paper for own, paper in known.papers.items() for n in (own, *paper.also)}
     sources = [*known.papers.values(), known.suite]
-    if name in papers:
-        sources = [papers[name]]
+    if name in known.papers:
+        sources = [known.papers[name]]
     elif name is not None:
-        source = _find_source(name, {*PROBLEMS, *papers, *BY_ID})
+        source = _find_source(name, {*PROBLEMS, *known.papers, *BY_ID})
         sources = [entry for entry in sources if entry.cited_as in source]
     return [entry.bibtex.strip() for entry in (known.software, *sources)]
 

@@ -30,7 +30,7 @@ def pareto(
         typer.Option(
             metavar="NAME=BUDGET,BUDGET",
             show_default=False,
-            help="NSGA2, CMOPSO, CMOEAD or DCNSGA3; repeatable. 'none' for no search.",
+            help="NSGA2 or CMOPSO; repeatable. 'none' for no search.",
         ),
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=100000, help="Runs of each search.")] = 11,

@@ -28,8 +28,7 @@ from compare.questions.question import Answer, Question, Work, make_csv_table, m
 from compare.report.document import Figure, Part, Table
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
-from metaheuristics.multi_objective import make_front_algorithm
-from metaheuristics.multi_objective.minimize_many import check_budgets
+from metaheuristics.multi_objective import check_budgets, make_front_algorithm
 from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
@@ -38,10 +37,8 @@ from nlp_gait.formulation import GaitProblem
 SEARCH_COLOURS = {
     "NSGA2": COLOURS["ga"],
     "CMOPSO": COLOURS["pso"],
-    "CMOEAD": COLOURS["aco-grid"],
-    "DCNSGA3": COLOURS["cma"],
 }
-SEARCH_NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO", "CMOEAD": "C-MOEA/D", "DCNSGA3": "DCNSGA-III"}
+SEARCH_NAMES = {"NSGA2": "NSGA-II", "CMOPSO": "CMOPSO"}
 MARKS = ("x", "+", ".")
 
 

@@ -11,8 +11,7 @@ from compare.questions.pareto.competing import CompetingObjective
 from compare.questions.pareto.front import FrontPoint, select_front, solve_point
 from compare.questions.question import Work
 from metaheuristics.interface import Array
-from metaheuristics.multi_objective import make_front_algorithm
-from metaheuristics.multi_objective.minimize_many import FrontAlgorithm, minimize_many
+from metaheuristics.multi_objective import FrontAlgorithm, make_front_algorithm, minimize_many
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
@@ -44,15 +43,11 @@ class Scale:
 
 
 class PowerAndCompeting:
-    """The compiled objective with a criterion next to the power; see ``metaheuristics.multi_objective.ManyObjectives``.
-
-    Its constraints are those that its problem names, each with its worst row.
-    """
+    """The compiled objective with a criterion next to the power; see ``metaheuristics.multi_objective.ManyObjectives``."""
 
     def __init__(self, objective: CompiledObjective, criterion: CompetingObjective, scale: Scale) -> None:
         self.names, self.lower, self.upper, self.count = objective.names, objective.lower, objective.upper, 2
         self._objective, self._criterion, self._scale = objective, criterion, scale
-        self.inequalities, self.groups = objective.inequalities, objective.groups
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return objectives (P, 2) and violations (P,)."""

@@ -40,7 +40,7 @@ def test_every_reproduction_has_its_template_and_knows_its_steps() -> None:
         reproduction = load_reproduction(name)
         folder = resources.files("compare.papers") / reproduction.name
         assert (folder / f"{reproduction.name}_report.md").is_file()
-        assert (reproduction.full.steps is None) == (name == "nao-pareto")
+        assert reproduction.full.steps
 
 
 def test_an_unknown_paper_is_one_sentence(tmp_path: Path) -> None:

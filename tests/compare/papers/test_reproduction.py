@@ -140,7 +140,7 @@ def test_percentages_in_the_text_are_computed(paper: str) -> None:
     assert not re.findall(r"\d ?%", re.sub(r"\{[^{}]*\}", "", text))
 
 
-@pytest.mark.parametrize("paper", [name for name in REPRODUCTIONS if name != "nao-claims"])
+@pytest.mark.parametrize("paper", REPRODUCTIONS)
 def test_a_folder_that_cannot_be_written_to_fails_before_the_work(paper: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     reproduction = load_reproduction(paper)

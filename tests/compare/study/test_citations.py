@@ -75,7 +75,7 @@ def test_the_command_prints_bibtex() -> None:
     assert keys([whole]) == ["nlp-gait", "Gupta2023", "Goswami2008", "Bhardwaj", "gaitbench"]
     assert whole.count("{") == whole.count("}") and f"note = {{Version {CFF['version']}}}" in whole
     assert "author = {Gupta, Pushpendra and Pratihar, Dilip Kumar and Deb, Kalyanmoy}" in whole
-    assert keys(as_json("cite", "nao-pareto")["entries"]) == ["nlp-gait", "Gupta2023"]
+    assert keys(as_json("cite", "nao")["entries"]) == ["nlp-gait", "Gupta2023"]
     assert "unknown problem, paper or instance 'walk13'; did you mean 'walk12'" in one_sentence("cite", "walk13")
     assert "known: " in one_sentence("cite", "0")
 

@@ -1,22 +1,24 @@
-"""Several objectives: protocols of objectives and algorithms, and the loop, which takes snapshots on the way."""
+"""Minimisation of several objectives at once, by algorithms of the package pymoo.
 
-from collections.abc import Callable, Sequence
+snapshots = minimize_many(objectives, make_front_algorithm("NSGA2"), evaluations=(1_000, 10_000), seed=1)
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from time import process_time
-from typing import Any, Protocol
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 
+from metaheuristics.adapters.pymoo import FRONT_MODULES, MultiObjective
 from metaheuristics.errors import SearchError
 from metaheuristics.interface import UNKNOWN, Array, Bounded, Start
 from metaheuristics.preparation import prepare_start, seed_sequence
+from metaheuristics.registry import make_by_name
 
 
 class ManyObjectives(Bounded, Protocol):
-    """Objectives to be minimised within bounds, called on many points at once.
-
-    It may separate its constraints by `inequalities` and `groups`, see `metaheuristics.interface.Constraints`.
-    """
+    """Objectives to be minimised within bounds, called on many points at once."""
 
     @property
     def count(self) -> int:
@@ -30,7 +32,7 @@ class FrontSearch(Protocol):
     """A run in progress: `ask`, evaluate, `tell`, and again; `front` at any time between."""
 
     def ask(self) -> Array:
-        """Points (P, n) within the bounds: a generation, or one point where each is learned from at once."""
+        """Points (P, n) of a generation, within the bounds."""
 
     def tell(self, X: Array, F: Array, violation: Array, /) -> None:
         """Learn from the points of the last `ask`: objectives (P, m), violations (P,), 1e30 where an evaluation failed."""
@@ -40,11 +42,7 @@ class FrontSearch(Protocol):
 
 
 class FrontAlgorithm(Protocol):
-    """Settings of an algorithm for several objectives, immutable; SearchError as for `metaheuristics.interface.Algorithm`."""
-
-    @property
-    def name(self) -> str:
-        """Short name, as in `FRONT_ALGORITHMS`."""
+    """Settings of an algorithm for several objectives, immutable."""
 
     @property
     def population(self) -> int:
@@ -52,6 +50,17 @@ class FrontAlgorithm(Protocol):
 
     def start(self, start: Start, objectives: int, /) -> FrontSearch:
         """Begin a run for a number of objectives; SearchError for a setting that it cannot work with."""
+
+
+FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = {
+    name: partial(MultiObjective, algorithm=name) for name in FRONT_MODULES
+}
+"""Algorithms by name; `pip install 'nlp-gait[algorithms]'` installs pymoo, which they need."""
+
+
+def make_front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
+    """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `make_algorithm` does."""
+    return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
 
 def check_budgets(algorithm: FrontAlgorithm, evaluations: Sequence[int]) -> None:
@@ -68,10 +77,6 @@ class Snapshot:
     """Feasible points of a run that no other point of its population betters in all objectives."""
 
     evaluations: int  #: used until then
-    feasible: int  #: of these, without violation
-    first_feasible: int | None  #: the first of these, counted from 1; None until there is one
-    time_s: float  #: processor time until then [s]
-    objective_time_s: float  #: part of it spent in the objectives [s]
     X: Array  #: (k, n) points; none as long as the population has no feasible one
     F: Array  #: (k, m) objectives
 
@@ -82,18 +87,14 @@ def minimize_many(
     *,
     evaluations: Sequence[int] = (10_000,),
     seed: int = 0,
-    progress: Callable[[int], None] = lambda used: None,
 ) -> tuple[Snapshot, ...]:
-    """Run an algorithm once and take a snapshot at each budget.
-
-    For an algorithm that does not know its budget each snapshot equals a run of that budget; DCNSGA3 plans for the last one.
+    """Run an algorithm once and take a snapshot at each budget, which equals a run of that budget.
 
     Args:
         objectives: what to minimise.
         algorithm: settings.
-        evaluations: budgets, rising; each at least the population. Of the last generation before each only whole ones count.
+        evaluations: budgets, rising; each at least the population. Only whole generations are run.
         seed: of starting points and search; equal seeds start alike whatever the algorithm.
-        progress: called with the evaluations used after each generation.
 
     Returns:
         A snapshot for each budget.
@@ -102,37 +103,34 @@ def minimize_many(
         SearchError: an argument is not allowed, all variables are fixed, or an objective is not finite.
     """
     check_budgets(algorithm, evaluations)
-    budgets = list(evaluations)
-    start = prepare_start(objectives, algorithm.population, budgets[-1], seed_sequence(seed))
+    start = prepare_start(objectives, algorithm.population, evaluations[-1], seed_sequence(seed))
     if not (start.upper > start.lower).any():
         raise SearchError("all variables are fixed, so there is no front; widen the bounds of one")
-    began, in_objectives = process_time(), 0.0
     search = algorithm.start(start, objectives.count)
 
     snapshots: list[Snapshot] = []
-    used = feasible = 0
-    first: int | None = None
+    used = 0
     while True:
         X = search.ask()
-        while budgets and used + len(X) > budgets[0]:
+        while used + len(X) > evaluations[len(snapshots)]:
             points, values = search.front()
-            counts: dict[str, Any] = {"evaluations": used, "feasible": feasible, "first_feasible": first}
-            counts |= {"time_s": process_time() - began, "objective_time_s": in_objectives}
-            snapshots.append(Snapshot(**counts, X=points, F=values))
-            budgets.pop(0)
-        if not budgets:
-            return tuple(snapshots)
-        called = process_time()
+            snapshots.append(Snapshot(evaluations=used, X=points, F=values))
+            if len(snapshots) == len(evaluations):
+                return tuple(snapshots)
         F, violation = objectives(X)
-        in_objectives += process_time() - called
         if not np.all(np.isfinite(F)):
             raise SearchError("an objective is not finite; give a large finite number where it has no value")
         # A violation that is not finite counts as the worst.
-        violation = np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN)
-        good = np.flatnonzero(violation == 0.0)
-        if first is None and len(good):
-            first = used + int(good[0]) + 1
-        feasible += len(good)
-        search.tell(X, F, violation)
+        search.tell(X, F, np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN))
         used += len(X)
-        progress(used)
+
+
+__all__ = [
+    "FRONT_ALGORITHMS",
+    "FrontAlgorithm",
+    "ManyObjectives",
+    "Snapshot",
+    "check_budgets",
+    "make_front_algorithm",
+    "minimize_many",
+]
