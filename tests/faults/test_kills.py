@@ -1,4 +1,4 @@
-"""kill -9 at random moments in what is kept step by step; more: ``python -m benchmarks.faults.kill_and_resume``."""
+"""kill -9 at random moments in what is kept step by step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One process or several, one thread or several: the same numbers; more: `python -m benchmarks.faults.together`."""
+"""One process or several, one thread or several: the same numbers."""
 
 from __future__ import annotations
 
@@ -88,6 +88,10 @@ def inherited(_):
 def sent(given):
     return given(X)[0].tolist()
 
+def solved(k):
+    found = nlp_gait.solve(problem, x0=problem.start_point(np.random.default_rng(k)))
+    return found.status, found.objective, list(found.x.values()), problem.signals(found.x).arrays["q"].tobytes()
+
 if __name__ == "__main__":
     for _ in range(3):
         expected = objective(X)[0].tolist()  # the threads of the parent have worked
@@ -95,6 +99,7 @@ if __name__ == "__main__":
         assert pool.map(sent, [objective] * 4) == [expected] * 4
         if sys.argv[1] == "fork":
             assert pool.map(inherited, range(4)) == [expected] * 4
+            assert pool.map(solved, range(4)) == [solved(k) for k in range(4)]
     print("equal")
 """
 

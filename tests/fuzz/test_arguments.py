@@ -1,4 +1,4 @@
-"""Any value as an argument or a plug-in's answer is refused in one sentence or taken; `python -m benchmarks.faults.fuzz`."""
+"""Any value as an argument or a plug-in's answer is refused in one sentence or taken."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mutated command lines end with status 0, 1 or 2 and a sentence; `python -m benchmarks.faults.fuzz` tries more."""
+"""Mutated command lines end with status 0, 1 or 2 and a sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Damaged files are refused in one sentence, or accepted for what they say; `python -m benchmarks.faults.fuzz` tries more."""
+"""Damaged files are refused in one sentence, or accepted for what they say."""
 
 from __future__ import annotations
 

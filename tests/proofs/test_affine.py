@@ -14,7 +14,7 @@ from nlp_gait.proofs.affine import AffineFunction
 from tests.proofs.enclosed_operations import AFFINE, QUADRATIC, find_lost_values
 
 SEED = 7
-EACH = 50  # points of each operation; `python -m benchmarks.guarantees.enclosures` takes 100,000
+EACH = 50  # points of each operation
 POINTS = 200
 # Of values as computed in double precision, relative: they err themselves.
 ROUNDING = 1e-9

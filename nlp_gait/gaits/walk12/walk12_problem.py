@@ -25,7 +25,7 @@ F1MAX = 442.522  # the paper's largest f1, section 7 [1/(m^2 s)]
 F2MAX = 0.13  # [m]
 PRINTED_STEPS = 10_000
 # Nodes of Gauss's rule over a step, and the fewest on a panel. A nearly straight leg makes the integrand spike: over all gaits
-# that reach, f is within 2e-7, by Simpson's rule on 20 intervals within 9e-3 (``python -m benchmarks.guarantees.quadrature``).
+# that reach, f is within 2e-7, by Simpson's rule on 20 intervals within 9e-3.
 GAUSS_NODES, FEWEST_NODES = 160, 3
 LARGEST_TURN = math.radians(8.0)  # section 5.4
 

@@ -120,7 +120,7 @@ def test_horizon_of_one_second() -> None:
     assert values(second.with_values(**half), x)[2]["Q_m2s"] == pytest.approx(2 * Q, rel=1e-12)
 
 
-# Gaits with nearly straight legs, near the worst for Gauss's rule (``python -m benchmarks.guarantees.quadrature``).
+# Gaits with nearly straight legs, near the worst for Gauss's rule by differential evolution.
 STRAIGHT = ([0.098, 0.0255, 0.1299, 0.0013], [0.0517346, 0.12883558, 0.03921078, 0.0094602])
 
 

@@ -1,1 +1,0 @@
-"""Checks and proofs behind the guarantees: sound enclosures, narrow bounds, verdicts between samples, certificates."""
