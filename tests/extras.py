@@ -12,7 +12,7 @@ PACKAGES = {
     "algorithms": ("cma", "pymoo"),
     "bayes": ("egobox",),
     "cluster": ("dask", "distributed"),
-    "qp": ("clarabel", "daqp"),
+    "qp": ("daqp",),
     "sim": ("mujoco",),
     "suites": ("pymoo", "cma", "ioh", "optuna", "optunahub", "nevergrad", "pygmo"),
     "tune": ("optuna",),

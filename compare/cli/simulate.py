@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from compare.analysis.units import format_millimetres, with_unit
@@ -54,39 +53,17 @@ class DriveOptions:
     ] = None
     feedback: Annotated[
         str,
-        typer.Option(
-            help="none, in open loop; torso-spring: balance by measured place and attitude of the "
-            "torso; replan: the rest of each phase is planned again from what is measured, with"
-            " the next foothold, for walks of NAO."
-        ),
+        typer.Option(help="none, in open loop; torso-spring: balance by measured place and attitude of the torso."),
     ] = "none"
     feedback_delay_ms: Annotated[
         float | None, typer.Option(help="From measuring to acting (default: the feedback's).")
     ] = None
     feedback_noise: Annotated[float, typer.Option(help="Factor on the noise of its sensors; 0 for none.")] = 1.0
     feedback_seed: Annotated[int, typer.Option(min=0, help="Of this noise: same seed, same walk.")] = 0
-    replan_hz: Annotated[float, typer.Option(help="Plans per second of the feedback replan.")] = 100.0
-    replan_free: Annotated[
-        str,
-        typer.Option(
-            metavar="WHAT",
-            help="What of the next step it may change: some of length, width, time, separated by "
-            "commas; empty for the hip's motion alone.",
-        ),
-    ] = "length,width,time"
-    speed_factor: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            max=2.0,
-            help="On the length of the steps in the second half of the walk, with the feedback replan.",
-        ),
-    ] = 1.0
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
         from nlp_gait.simulation.drive import DRIVES, FEEDBACKS
-        from nlp_gait.simulation.replanning import Replanning
 
         for kind, name, known in (("drive", self.drive, DRIVES), ("feedback", self.feedback, FEEDBACKS)):
             if name not in known:
@@ -95,12 +72,6 @@ class DriveOptions:
         if feedback is not None:
             delay_s = feedback.delay_s if self.feedback_delay_ms is None else self.feedback_delay_ms / 1000.0
             feedback = replace(feedback.with_noise(self.feedback_noise), delay_s=delay_s, seed=self.feedback_seed)
-        if isinstance(feedback, Replanning):
-            if not self.replan_hz > 0.0:
-                raise InputError(f"--replan-hz must be > 0, got {self.replan_hz:g}")
-            feedback = replace(
-                feedback, period_s=1.0 / self.replan_hz, free=self.replan_free, speed_factor=self.speed_factor
-            )
         period_s = None if self.period_ms is None else self.period_ms / 1000.0
         names = ("interpolation", "feed_forward", "torque_limits")
         settings = {"period_s": period_s, **{name: getattr(self, name) for name in names}}
@@ -182,12 +153,6 @@ def simulate(
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
-    share_loads: Annotated[
-        bool, typer.Option("--share-loads", help="Redistribute loads in double support for least power (extra qp).")
-    ] = False,
-    load_rate: Annotated[
-        float, typer.Option(min=0.0, help="With --share-loads: fastest change of a foot's load [robot weights/s].")
-    ] = 12.5,
     film: FilmOptions,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
@@ -205,8 +170,6 @@ def simulate(
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.film.film import parse_picture_size
     from nlp_gait.simulation.film.recording import show_in_window
-    from nlp_gait.simulation.load_sharing import Sharing
-    from nlp_gait.simulation.load_sharing import share_loads as redistribute
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
     from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, simulate_plan
@@ -223,8 +186,6 @@ def simulate(
     gaits = [(stored.result, stored.load())]
     gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
     plans = [make_plan(gait, steps) for _, gait in gaits]
-    if share_loads:
-        plans = [redistribute(plan, Sharing(load_rate_1_s=load_rate)) for plan in plans]
     if film.video is not None:
         for each in plans:
             check_frames((each.duration_s + SETTLE_TIME) / film.speed, film.frames_per_s)
@@ -261,7 +222,6 @@ def simulate(
             if len(gaits) > 1:
                 stdout.print(f"{path}:")
             _print(report, survival if i == 0 else None)
-            _print_planning(traces[i])
             if walk is not None:
                 _print_course(walk, open_loop=drive.feedback is None)
         print_written(*written)
@@ -343,15 +303,6 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
         for title, outcomes in (("friction", survival.friction), ("mass factor", survival.mass_factor)):
             values = ", ".join(f"{value:g} {'stays up' if up else 'falls'}" for value, up in outcomes.items())
             stdout.print(f"{title}: {values}")
-
-
-def _print_planning(trace: Simulation) -> None:
-    if trace.plans is not None and len(trace.plans):
-        _, wall, converged, followed = trace.plans.T
-        stdout.print(
-            f"Planned {len(wall)} times: {np.mean(converged):.1%} converged, {np.mean(followed):.1%} followed, "
-            f"{1000.0 * np.median(wall):.1f} ms each (99th percentile {1000.0 * np.percentile(wall, 99):.1f} ms)"
-        )
 
 
 def _print_course(walk: Walk, *, open_loop: bool) -> None:

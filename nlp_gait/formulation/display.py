@@ -53,8 +53,6 @@ class SimulationModel:
     #: From a point and a number of steps to the stairs; None for a flat floor
     ground: Callable[[NumericPoint, int], tuple[Tread, ...]] | None = None
     planar: bool = False  #: the root moves in the sagittal plane only
-    #: A ``gaits.biped.Body`` whose phases can be planned again while it walks; this package only passes it on
-    body: Any = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from nlp_gait.robots import Joint
 from nlp_gait.simulation.engine import check_period
 from nlp_gait.simulation.feedback import BalanceController, Feedback
 from nlp_gait.simulation.plan import Plan
-from nlp_gait.simulation.replanning import Replanning, StepPlanner
 
 # Published limits of NAO's joints differ by a factor of four: from the robot's file (the manufacturer's URDF), or from the motor
 # at stall or in continuous service, times the gear ratio.
@@ -40,7 +38,7 @@ class Drive:
     interpolation: str = "linear"
     feed_forward: str = "torque"  #: ``torque`` (and velocity), ``velocity``, or ``none``
     torque_limits: str = "urdf"  #: source of the limits
-    feedback: Feedback | Replanning | None = None  #: corrects the set-points; None for open loop
+    feedback: Feedback | None = None  #: corrects the set-points; None for open loop
 
     def __post_init__(self) -> None:
         for name in ("full_error_rad", "time_constant_s", "period_s"):
@@ -83,13 +81,11 @@ class Drive:
             return shifted
         return shifted + tau / np.array([self.stiffness(joint) for joint in joints])
 
-    def balance(self, plan: Plan, model: Any) -> BalanceController | StepPlanner | None:
+    def balance(self, plan: Plan, model: Any) -> BalanceController | None:
         """Return the controller of one simulation, if the drive has a feedback."""
         if self.feedback is None:
             return None
         joints = [plan.robot.joint(name) for name in plan.joints]
-        if isinstance(self.feedback, Replanning):
-            return StepPlanner(self.feedback, plan, partial(self._shift, joints), model)
         stiffness = np.array([self.stiffness(joint) for joint in joints])
         return BalanceController(self.feedback, plan, stiffness, model)
 
@@ -110,4 +106,4 @@ def find_stall_torque(joint: Joint) -> float:
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}
 # Feedbacks by name; every drive has none by default.
-FEEDBACKS = {"none": None, "torso-spring": Feedback(), "replan": Replanning()}
+FEEDBACKS = {"none": None, "torso-spring": Feedback()}

@@ -1,17 +1,22 @@
 """Balance feedback: a virtual spring between the torso and its planned place, with sensor noise and delay."""
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections import deque
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.simulation.engine import Addresses, Sensing, SensorValues, TorsoSensor, load_mujoco
+from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
+
+NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Feedback(Sensing):
+class Feedback:
     """A spring and a damper between the torso and its planned place over the feet, and between both attitudes.
 
     Force and moment act on the ground through the legs that are planned to stand, each with its planned share of the load, and
@@ -23,8 +28,17 @@ class Feedback(Sensing):
         Virtual model control: Pratt, Chew, Torres, Dilworth, Pratt (2001). Gain k: Caron, Kheddar, Tempier (2019), whose
         controller of HRP-4 has 1 + 5 / w with w = 3.55 / s, and an integral, whose gain is
         an assumption. `python -m benchmarks.engine feedback` shows their effects.
+        Noise: joint sensors that round to 0.1 degrees (data sheet), three in a row, over 0.3 m of leg and over 30 ms; the
+        gyrometer's 10 mrad/s are an assumption.
     """
 
+    period_s: float = 0.01  # between two measurements, each of which acts until the next
+    delay_s: float = 0.01  # from a measurement to the drives: one more cycle of the controller
+    position_noise_m: float = 2.5e-4  # standard deviation of the measured place of the torso over the feet
+    velocity_noise_m_s: float = 0.012  # of its velocity
+    tilt_noise_rad: float = 1e-3  # of its attitude about each axis
+    rate_noise_rad_s: float = 0.01  # of its rates
+    seed: int = 0
     spring_N_per_m: float = 500.0  # towards the planned place
     damper_Ns_per_m: float = 50.0  # towards the planned velocity
     tilt_spring_Nm_per_rad: float = 30.0  # towards the planned attitude
@@ -33,6 +47,67 @@ class Feedback(Sensing):
     # of the integral, along each axis: of the force as a share of the weight, of the moment as that share of the weight
     # at the height of the torso; 0.05 compensates a slope of 3 degrees
     growth_limit: float = 0.05
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            least = "> 0" if each.name == "period_s" else ">= 0"
+            if isinstance(value, bool | str):
+                continue
+            if not (math.isfinite(value) and (value > 0.0 or (value == 0.0 and least == ">= 0"))):
+                raise InputError(f"{each.name} of a feedback must be {least}, got {value!r}")
+        check_period("feedback", self.period_s)
+
+    def with_noise(self, factor: float) -> Self:
+        """Return the same with the noise times a factor."""
+        return replace(self, **{name: factor * getattr(self, name) for name in NOISES})
+
+
+class SensorValues(NamedTuple):
+    """Sensor values of the torso at one instant."""
+
+    step: int  # number of the engine's step
+    places: Array  # (2, 3) of its origin from the left and the right sole [m]
+    velocity: Array  # (3,) [m/s]
+    attitude: Array  # (3, 3) rotation from its axes to those of the floor
+    tilt_error: Array  # (3,) error of the attitude, about the axes of the floor [rad]
+    rate: Array  # (3,) about the axes of the floor [rad/s]
+
+
+class TorsoSensor:
+    """Sensors of one simulation."""
+
+    def __init__(self, feedback: Feedback, plan: Plan, model: Any) -> None:
+        self._feedback, self._model, self._engine = feedback, model, load_mujoco()
+        self._at = Addresses(model, plan)
+        self.step_s = float(model.opt.timestep)
+        self._every = max(1, round(feedback.period_s / self.step_s))
+        self._late = round(feedback.delay_s / self.step_s)
+        self._noise = np.random.default_rng(feedback.seed)
+        self._waiting: deque[SensorValues] = deque()
+        self._steps = 0
+
+    def read(self, data: Any) -> SensorValues | None:
+        """Return values that arrive at this step of the engine, None if there are none; call it once in each step."""
+        if self._steps % self._every == 0:
+            self._waiting.append(self._measure(data))
+        arrived = bool(self._waiting) and self._waiting[0].step + self._late <= self._steps
+        self._steps += 1
+        return self._waiting.popleft() if arrived else None
+
+    def _measure(self, data: Any) -> SensorValues:
+        settings, noise = self._feedback, self._noise.standard_normal((4, 3))
+        turning = np.zeros(6)  # rates, then velocity, along the floor's axes
+        body = self._engine.mjtObj.mjOBJ_XBODY
+        self._engine.mj_objectVelocity(self._model, data, body, self._at.torso, turning, 0)
+        return SensorValues(
+            step=self._steps,
+            places=data.xpos[self._at.torso] - data.site_xpos[self._at.soles] + settings.position_noise_m * noise[0],
+            velocity=turning[3:] + settings.velocity_noise_m_s * noise[1],
+            attitude=data.xmat[self._at.torso].reshape(3, 3).copy(),
+            tilt_error=settings.tilt_noise_rad * noise[2],
+            rate=turning[:3] + settings.rate_noise_rad_s * noise[3],
+        )
 
 
 class BalanceController:

@@ -33,7 +33,6 @@ class Plan:
     ground: tuple[Tread, ...] = ()  #: stairs on the floor, which is at z = 0
     steps: int | None = None  #: that the motion has; None for one phase or one cycle
     planar: bool = False  #: the robot's root stays in the plane y = 0
-    body: Any = None  #: whose phases can be planned again, see ``replanning``
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -168,5 +167,4 @@ def make_plan(result: Result, steps: int | None = None) -> Plan:
         ground=() if model.ground is None else model.ground(at, steps or 1),
         steps=steps or model.steps,
         planar=model.planar,
-        body=model.body,
     )

@@ -13,7 +13,6 @@ from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import Addresses, load_mujoco
 from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP, make_plan_model
 from nlp_gait.simulation.plan import SIDES, Plan
-from nlp_gait.simulation.replanning import StepPlanner
 
 SETTLE_TIME = 1.0  # [s] after the phase with the last set-point held: a robot that has lost its balance falls within it
 FALLEN_TILT = math.radians(45.0)
@@ -88,8 +87,6 @@ class Simulation:
     loads: Array  #: (T, 2) force of the floor on the left and right foot, along its normal [N]
     pressure: Array  #: (T, 2) centre of pressure of both feet [m]; NaN in flight
     fell_at_s: float | None  #: None if the robot stayed up
-    #: (N, 4) of planning again: time and wall time of each plan [s], whether it converged, and whether it was followed
-    plans: Array | None = None
 
     def signals(self, joints: tuple[str, ...]) -> Signals:
         """Return the time histories, for an archive."""
@@ -143,8 +140,7 @@ def simulate_plan(
     measured = dict(zip(("q", "qd", "torque", *COLUMNS), columns, strict=True))
     measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
     n = len(rows)
-    plans = np.array(balance.plans) if isinstance(balance, StepPlanner) else None
-    return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s, plans=plans)
+    return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)
 
 
 def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tuple[Any, Any]:

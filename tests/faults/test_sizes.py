@@ -18,7 +18,6 @@ from nlp_gait.formulation.result import LONGEST_S, SHORTEST_S, load_result, samp
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
 from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
-from nlp_gait.simulation.load_sharing import Sharing
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
 from nlp_gait.simulation.plan import MOST_STEPS, make_plan
 
@@ -70,7 +69,7 @@ def test_the_length_of_a_simulated_walk_is_limited(steps: int, step_time_s: floa
         make_plan(Result(problem=walk, x=walk.check_x(WALK)), steps)
 
 
-@pytest.mark.parametrize("owner", [Drive, Feedback, Sharing])
+@pytest.mark.parametrize("owner", [Drive, Feedback])
 @pytest.mark.parametrize("period_s", [1e-12, 1e6])
 def test_no_controller_commands_every_picosecond_or_once_a_month(owner: type, period_s: float) -> None:
     with pytest.raises(InputError, match=f"must be from 0.0001 to 1 s, got {period_s!r}"):

@@ -67,7 +67,7 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (3, ("simulate", "walk.json", "--steps", "1", "--mass-factor", "1.1", "--slope-deg", "1,0", "--push", "0.1,0")),
     (3, ("simulate", "walk.json", "--drive", "held", "--period-ms", "20", "--stiffness-factor", "0.9", "--json")),
     (3, ("simulate", "walk.json", "--feedback", "torso-spring", "--feedback-delay-ms", "20", "--feedback-noise", "2")),
-    (2, ("simulate", "result.json", "--share-loads", "--load-rate", "20", "--interpolation", "held", "--json")),
+    (2, ("simulate", "result.json", "--interpolation", "held", "--json")),
     (1, ("simulate", "walk.json", "--steps", "1", "--out", "out/played")),
     (1, ("bench", "--instances", "walk12-w015", "--out", "benched", "--json")),
     (

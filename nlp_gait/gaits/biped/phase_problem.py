@@ -94,7 +94,6 @@ def add_robot(
         repeats=repeats,
         steps=steps,
         ground=ground,
-        body=body,
     )
     display = replace(problem.display, robot=body.full, skeleton=body.draw, simulation_model=model)
     return replace(problem, display=display)
