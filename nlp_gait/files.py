@@ -32,6 +32,8 @@ SHOWN = 60  # characters of a value in a message
 BYTE_ORDER_MARK = "\ufeff"
 # Writing takes far less, so an older temporary file belongs to no running process.
 LEFTOVER_AGE_S = 60.0
+LOCK = ".lock"  # stays in its folder: removed, it could be locked twice
+LOCK_CHECKED_EVERY_S = 0.01
 TEMPORARY = re.compile(r"\.[0-9a-f]{16}\.tmp")
 FORMULA = tuple("=+-@")  # a spreadsheet computes a cell that begins with one of these
 # Errors of systems on which a folder cannot be opened or flushed.
@@ -65,19 +67,16 @@ def flush(path: Path) -> None:
 
 @contextmanager
 def lock_folder(path: Path) -> Iterator[None]:
-    """Let one process at a time into such a block for a folder; no lock where the system or the file system has none."""
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl
+    """Let one process at a time into such a block for a folder, by a file in it; no lock where that cannot be written."""
+    from filelock import FileLock  # on first use: most commands lock nothing
 
-    descriptor = os.open(path, os.O_RDONLY)
+    lock = FileLock(path / LOCK)
+    with suppress(OSError):  # a folder that may only be read, a full disk
+        lock.acquire(poll_interval=LOCK_CHECKED_EVERY_S)
     try:
-        with suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
-        os.close(descriptor)
+        lock.release()
 
 
 def make_folder(path: Path, mode: int = 0o777) -> None:
