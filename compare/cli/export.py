@@ -13,11 +13,8 @@ from compare.cli.printing import print_result, print_written
 from compare.study.references import find_reference
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import identify_problem
-from nlp_gait.backends.solve import solve
-from nlp_gait.errors import InputError
 from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.set_points import PERIOD_MS
-from nlp_gait.export.solver import check_planner
 from nlp_gait.export.solver import export_solver as write
 from nlp_gait.gaitbench import c_export
 from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
@@ -69,12 +66,6 @@ def export_solver(
     to: Annotated[Path, typer.Option("--to", help="Folder for the files."), OUTPUT],
     *,
     problem: NamedProblem,
-    planner: Annotated[
-        bool,
-        typer.Option(
-            "--planner", help="Write a solver in C, too: plans again for changed parameters, within milliseconds."
-        ),
-    ] = False,
     nl: Annotated[
         bool,
         typer.Option("--nl", help="Write an .nl file for AMPL's solvers instead, with names and best known value."),
@@ -85,22 +76,14 @@ def export_solver(
 
     The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
 
-    With `--planner` the problem is solved first, and a solver in C is written that plans again from there.
-
     Examples: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
-    `nlp-gait export-solver nao-ssp --to DIR --planner`, then `sh DIR/build.sh && DIR/plan`,
     `nlp-gait export-solver nao-ssp --to DIR --nl`
     """
-    if planner and nl:
-        raise InputError("--planner writes C code and --nl an .nl file; give one of them")
-    loaded, near = problem.spec().load(), None
-    if planner:
-        check_planner(loaded)
-        near = min(solve(loaded).starts, key=lambda outcome: outcome.rank)
+    loaded = problem.spec().load()
     if nl:
         written = export_nl(loaded, to, find_reference(identify_problem(loaded)).to_json())
     else:
-        written = write(loaded, to, near=near)
+        written = write(loaded, to)
     print_result(as_json, {"problem": loaded.address}, written, lambda: None)
 
 

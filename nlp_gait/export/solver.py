@@ -1,64 +1,37 @@
-"""Export of a problem's NLP with its derivatives as C++ with a C header, for a solver on board, and of a planner on it.
+"""Export of a problem's NLP with its derivatives as C++ with a C header, for a solver on board; it needs only libc and libm."""
 
-The planner, in C, solves again for changed parameters. Both need only libc and libm.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
-from casadi import SX
 
-from nlp_gait.backends.derivatives import plan as derivatives
 from nlp_gait.backends.derivatives.assembly import NlpPlan, make_nlp_plan
 from nlp_gait.backends.derivatives.compiled import FLAGS, write_array, write_nlp_source
 from nlp_gait.backends.derivatives.plan import format_number
 from nlp_gait.backends.derivatives.structure import split_nlp
-from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.backends.nlp import WIDTHS, NlpModel, build_nlp
-from nlp_gait.errors import InputError
 from nlp_gait.export.c_files import format_comment, write_c_files
-from nlp_gait.formulation import Array, GaitProblem, InstantPoint
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Outcome
-from nlp_gait.symbolic.tape import simplify
 
 # Name of each file by its template; the C++ file is assembled from the plan.
 TEMPLATES = {"{prefix}.h": "solver.h.in", "main.c": "solver_main.c.in", "build.sh": "solver_build.sh.in"}
-# In addition for a planner in C.
-PLANNER_TEMPLATES = {
-    "{prefix}_planner.h": "planner.h.in",
-    "{prefix}_planner.c": "planner.c.in",
-    "dense.h": "dense.h",
-    "plan.c": "planner_main.c.in",
-}
-BUILD = """${{CC:-cc}} -std=c99 -O3 -fno-math-errno -ffp-contract=off $CFLAGS -fPIC -c -o {prefix}_planner.o {prefix}_planner.c
-${{CC:-cc}} -shared -o lib{prefix}_planner.so {prefix}_planner.o {prefix}.o -lm
-${{CC:-cc}} -std=c99 -O2 -o plan plan.c {prefix}_planner.o {prefix}.o -lm
-"""
-MOST_VARIABLES, MOST_LIFTED = 60, 2000  # programs are dense
-MOTION = ("q", "qd", "tau", "zmp")  # at any time
 BOUNDS = {"w_lower": "lbx", "w_upper": "ubx", "g_lower": "lbg", "g_upper": "ubg"}
 
 
 @lock_casadi
-def export_solver(problem: GaitProblem, folder: Path, *, near: Outcome | None = None) -> list[Path]:
+def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
     """Write source, header, example and build line of a problem's NLP with its parameter values; return the files.
 
-    With ``near``, an optimum by IPOPT, also a planner in C that begins there and solves again for other parameter values.
-    Raises CompilerError for an operation without C++ code, InputError as ``describe_planner``, or OutputError.
+    Raises CompilerError for an operation without C++ code, or OutputError.
     """
     model = build_nlp(problem)
     found = make_nlp_plan(split_nlp(model.nlp))
     prefix = f"{problem.name.replace('-', '_')}_nlp"
     words = _format_words(problem, model, found, prefix)
     source = _read_source(problem, model, found, prefix)
-    if near is None:
-        return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
-    words = {**words, **describe_planner(problem, model, found, prefix, near)}
-    return write_c_files(folder, "nlp_gait.export", TEMPLATES | PLANNER_TEMPLATES, words, source)
+    return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
 
 
 def _read_source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
@@ -115,7 +88,6 @@ def _format_words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix:
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(FLAGS),
-        "PLANNER": "",
         "VARIABLES": format_comment(
             f"{k:4d}  {v.name} [{v.unit}]: {v.description}" for k, v in enumerate(problem.variables)
         ),
@@ -124,114 +96,3 @@ def _format_words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix:
             for k, (q, value) in enumerate(zip(problem.parameters, problem.p, strict=True))
         ),
     }
-
-
-def check_planner(problem: GaitProblem) -> None:
-    """Raise InputError if no planner in C can be written for a problem."""
-    model = build_nlp(problem)
-    first, n = len(model.row_names), model.variables
-    if n > MOST_VARIABLES or model.lifted > MOST_LIFTED:
-        raise InputError(
-            f"{problem.name} has {n} variables and {model.lifted} lifted ones; a planner in C has at most {MOST_VARIABLES} "
-            f"and {MOST_LIFTED}: use nlp_gait.make_replanner"
-        )
-    # Each lifted variable must depend on earlier ones only, so that one substitution after another finds all.
-    for row, column in zip(*ca.jacobian_sparsity(model.nlp["g"], model.nlp["x"]).get_triplet(), strict=True):
-        if row >= first and column - n > model.tie_owner[row - first]:
-            raise InputError(
-                f"{problem.name} solves equations within its motion, which a planner in C cannot; use nlp_gait.make_replanner"
-            )
-
-
-def describe_planner(
-    problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str, near: Outcome
-) -> Mapping[str, str]:
-    """Return the words of the templates; raises InputError if ``near`` is not an optimum, or as ``check_planner``."""
-    check_planner(problem)
-    if near.guess is None or not near.converged:
-        raise InputError(f"{problem.name}: a planner begins from an optimum by IPOPT; it {near.status}")
-    functions = []
-    for each in (model.row_bounds, model.lift_start):  # with the prefix in their names
-        inputs = each.mx_in()
-        functions.append(ca.Function(f"{prefix}_{each.name()}", inputs, each.call(inputs, True, False)))
-    joints: tuple[str, ...] = ()
-    if problem.display.at_time is not None:
-        functions.append(_make_motion(problem, problem.display.at_time, prefix))
-        joints = problem.signals(near.x).joints
-    writer = ca.CodeGenerator(f"{prefix}_functions", {"with_header": False})
-    for function in functions:
-        writer.add(function)
-    first = len(model.row_names)
-    constants = [
-        write_array("int", "tie_owner", model.tie_owner.tolist()),
-        _write_numbers("static ", "tie_upper", model.tie_upper),
-        _write_numbers("static ", "lift_sense", model.lift_sense),
-        _write_numbers("static ", "row_scale", build_exact_model(problem).row_scales[:first]),
-        _write_numbers("", f"{prefix}_x", near.x),
-        _write_numbers("", f"{prefix}_multipliers", near.guess.rows),
-    ]
-    return {
-        "OWN": str(len(problem.p)),
-        "FIRST": str(first),
-        "TOLERANCE": repr(FEASIBILITY_TOLERANCE),
-        "CONSTANTS": "\n".join(constants),
-        "FUNCTIONS": writer.dump(),
-        "COUNTS": format_comment(_count_parts(model, found)),
-        "CASADI_NUMBERS": str(max(1, *(function.sz_w() for function in functions))),
-        "CASADI_INTEGERS": str(max(1, *(function.sz_iw() for function in functions))),
-        "CASADI_ARGUMENTS": str(max(function.sz_arg() for function in functions)),
-        "CASADI_RESULTS": str(max(function.sz_res() for function in functions)),
-        "PARAMETER_NAMES": ", ".join(f'"{parameter.name}"' for parameter in problem.parameters),
-        "JOINTS": str(len(joints)),
-        "JOINT_NAMES": ", ".join(joints) or "none",
-        "PLANNER": BUILD.format(prefix=prefix),
-    }
-
-
-def _make_motion(
-    problem: GaitProblem, at_time: Callable[[InstantPoint, SX], Mapping[str, SX]], prefix: str
-) -> ca.Function:
-    """Return a function of x, p and a time to joint angles, rates, torques and ZMP."""
-    names = [parameter.name for parameter in problem.parameters]
-    x, p, t = SX.sym("x", len(problem.names)), SX.sym("p", len(names)), SX.sym("t")
-    found = at_time(InstantPoint.of(x, p, problem.names, names), t)
-    return ca.Function(f"{prefix}_motion", [x, p, t], simplify([ca.densify(found[name]) for name in MOTION]))
-
-
-def _count_parts(model: NlpModel, found: NlpPlan) -> list[str]:
-    """Return lines with the number of operations of a step's parts."""
-    n, lifted, rows = model.variables, model.lifted, len(model.row_names) + len(model.tie_upper)
-    by_lifted = found.jacobian.nnz() - found.jacobian.colind()[n]
-    reduction = 2 * (by_lifted * 2 * (n + 1) + 2 * found.hessian.nnz() * n + lifted * n * (n + 1))
-    parts = {
-        "values of all functions": _count(found.plan, derivatives.VALUES),
-        "first derivatives, in addition": _count(found.plan, derivatives.FIRST),
-        "second derivatives, in addition": _count(found.plan, derivatives.SECOND),
-        "elimination of the lifted variables": reduction,
-        "eigenvectors of the curvature, four times": 4 * 30 * 6 * n**3,
-        "a change of the program's active rows, with r variables kept": 0,
-    }
-    *others, last = parts
-    return [
-        *(f"{parts[name]:10d}  {name}" for name in others),
-        f"14 q^2 + 2 q a  {last}: q = {n + 1} + r, a <= {rows} rows",
-        "A step needs derivatives once, values at most 20 times (5 lengths, 4 evaluations each), and at most 30 programs, each",
-        f"with at most 2 q + {10 * (n + lifted + 100)} changes; typically 1 or 2 programs and {n} changes.",
-    ]
-
-
-def _count(plan: derivatives.DerivativePlan, phase: int) -> int:
-    """Count a phase's additions, multiplications and functions."""
-    total = 0
-    for kind, first, last in plan.steps[phase]:
-        if kind == derivatives.TAPE:
-            total += last - first
-        elif kind == derivatives.RUNS:
-            total += sum(2 * length for *_, length in plan.runs[first:last])
-        elif kind == derivatives.PRODUCTS:
-            total += sum(1 + 2 * length for *_, length in plan.products[first:last])
-        elif kind == derivatives.CALL:
-            call = plan.calls[first]
-            times = call.samples if call.directions is None else int(call.directions.sum())
-            total += times * plan.functions[call.function].n_instructions()
-    return total

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from casadi import SX
 
-from nlp_gait.formulation.assembly import InstantPoint, NumericPoint
+from nlp_gait.formulation.assembly import NumericPoint
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
@@ -129,8 +128,6 @@ class Display:
     """What shows the gaits of a problem; no solver reads it."""
 
     motion: Callable[[NumericPoint], Signals] | None = None  #: time histories at a point of numbers
-    #: Some of them (``q``, ``qd``, ``tau``, ``zmp``) as expressions, from a point and a time [s], for code on board
-    at_time: Callable[[InstantPoint, SX], Mapping[str, SX]] | None = None
     #: Stick figures from time histories and the parameters by name
     skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
     simulation_model: SimulationModel | None = None  #: what a physics engine needs

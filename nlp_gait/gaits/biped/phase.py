@@ -175,18 +175,6 @@ class Phase:
         columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
         return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
 
-    def at_time(self, at: InstantPoint, t: SX) -> Mapping[str, SX]:
-        """Return q, qd and tau (J,) and the ZMP (2,) at a time [s]; before the phase and after it, those of its ends."""
-        phase = ca.fmin(ca.fmax(t / ca.fmax(at[self.duration], LEAST_DURATION), 0.0), 1.0)
-        now = self.loads(self.plan(at, phase, Exact()))
-        names = self.body.joints
-        return {
-            "q": ca.vertcat(*(now.joints[name].position for name in names)),
-            "qd": ca.vertcat(*(now.joints[name].velocity for name in names)),
-            "tau": ca.vertcat(*(now.torques[name] for name in names)),
-            "zmp": now.zmp,
-        }
-
     @cached_property
     def moving(self) -> tuple[str, ...]:
         """Joints whose angle changes over the phase."""

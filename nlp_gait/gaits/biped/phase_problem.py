@@ -60,7 +60,6 @@ def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool 
     if not body.closed_form:
         usual = [body.narrow(variable) for variable in phase.variables]
         start = make_start_within_reach(usual, phase.known[1:], lambda at: phase.sample(at, Exact()).reach, start)
-    at_time = phase.at_time if phase.derivatives == "analytic" else None
     problem = GaitProblem(
         name=f"{body.family}-{name}",
         title=f"{body.title}, {title}",
@@ -70,7 +69,7 @@ def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool 
         assemble=phase.assemble,
         grid=phase.grid,
         rows_over_time=phase.rows_over_time() if body.closed_form else (),
-        display=Display(motion=phase.signals, at_time=at_time, durations=(phase.duration,)),
+        display=Display(motion=phase.signals, durations=(phase.duration,)),
         hints=SolverHints(start=start, searchable=searchable),
     )
     return add_robot(problem, body)
