@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from nlp_gait.backends.functions.compiled_function import compile_function as compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective as CompiledObjective
     from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
-    from nlp_gait.backends.onboard.replanner import Replan as Replan
-    from nlp_gait.backends.onboard.replanner import Replanner as Replanner
-    from nlp_gait.backends.onboard.replanner import make_replanner as make_replanner
     from nlp_gait.backends.optima.gait_library import GaitLibrary as GaitLibrary
     from nlp_gait.backends.optima.gait_library import LibraryGait as LibraryGait
     from nlp_gait.backends.optima.gait_library import load_library as load_library
@@ -46,7 +43,6 @@ _PUBLIC = {
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",
     "nlp_gait.backends.optima.gait_library": "GaitLibrary LibraryGait load_library",
-    "nlp_gait.backends.onboard.replanner": "Replan Replanner make_replanner",
 }
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
 __all__ = sorted(_PLACES)

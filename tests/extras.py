@@ -12,7 +12,6 @@ PACKAGES = {
     "algorithms": ("cma", "pymoo"),
     "bayes": ("egobox",),
     "cluster": ("dask", "distributed"),
-    "qp": ("daqp",),
     "sim": ("mujoco",),
     "suites": ("pymoo", "cma", "ioh", "optuna", "optunahub", "nevergrad", "pygmo"),
     "tune": ("optuna",),

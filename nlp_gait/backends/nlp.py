@@ -13,13 +13,11 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 from casadi import MX
-from numpy.typing import NDArray
 
 from nlp_gait.errors import InputError, LiftedSenseError
 from nlp_gait.formulation import Array, GaitProblem, Point
 from nlp_gait.symbolic.nonsmooth import Lift, Lifted
 
-IntArray = NDArray[np.intp]
 # Sigmoid widths of the stages in which a jump is approached, in units of the switch (metres for a balance margin).
 WIDTHS = (1e-2, 5e-4)
 # The sense of the lifting is checked at these fractions of the default ranges; a derivative below the tolerance is zero.
@@ -41,7 +39,6 @@ class NlpModel:
     lifted: int  #: number of lifted variables
     #: Upper bounds of the rows that tie them, the last rows of g: infinite, or 0 for an equation; the lower is 0
     tie_upper: Array
-    tie_owner: IntArray  #: number of the lifted variable that each of these rows ties
     #: (lifted,) 1 for a lifted variable that is its exact value or more, -1 for one that is it or less, 0 for one equal to it
     lift_sense: Array
     smoothed: bool  #: whether a jump is smoothed, so that the width matters
@@ -99,13 +96,9 @@ def _build(problem: GaitProblem) -> NlpModel:
     lifted = ca.vertcat(*(lift.variable for lift in ops.lifts))
     ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
     exact: list[MX] = []
-    owners, count = [np.zeros(0, np.intp)], 0
     for i, lift in enumerate(ops.lifts):
         earlier = [other.variable for other in ops.lifts[:i]]  # which a lift may contain
         exact += ca.graph_substitute([lift.value], earlier, exact) if earlier else [lift.value]
-        # Rows of a lift repeat the order of its variables.
-        owners.append(count + np.arange(lift.rows.shape[0]) % max(1, lift.variable.shape[0]))
-        count += lift.variable.shape[0]
     model = NlpModel(
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
         variables=n,
@@ -116,7 +109,6 @@ def _build(problem: GaitProblem) -> NlpModel:
         lift_start=ca.Function("lift_start", [z, p, width], [ca.vertcat(*exact)]),
         lifted=lifted.shape[0],
         tie_upper=_repeat([0.0 if lift.tight else np.inf for lift in ops.lifts], [lift.rows for lift in ops.lifts]),
-        tie_owner=np.concatenate(owners),
         lift_sense=_repeat([lift.sense for lift in ops.lifts], [lift.variable for lift in ops.lifts]),
         smoothed=ops.smoothed,
         build_s=0.0,

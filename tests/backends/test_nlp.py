@@ -115,11 +115,6 @@ def test_lifting_against_the_sense_is_an_error(mathematics: Mathematics, where: 
         build_nlp(toy(mathematics))
 
 
-def test_each_row_of_a_lift_belongs_to_its_variable() -> None:
-    """Two rows hold each of two absolute values and a minimum."""
-    np.testing.assert_array_equal(build_nlp(toy(corner)).tie_owner, [0, 0, 1, 1, 2, 2])
-
-
 def test_the_sense_of_the_objective_counts() -> None:
     def mathematics(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
         return ops.abs(x), ()

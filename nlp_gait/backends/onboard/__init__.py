@@ -1,1 +1,0 @@
-"""Plan again within milliseconds: steps of sequential quadratic programming on a problem's NLP."""
