@@ -13,7 +13,7 @@ PACKAGES = {
     "bayes": ("egobox",),
     "cluster": ("dask", "distributed"),
     "sim": ("mujoco",),
-    "suites": ("pymoo", "cma", "ioh", "optuna", "optunahub", "nevergrad", "pygmo"),
+    "suites": ("pymoo", "cma", "ioh", "pygmo"),
     "tune": ("optuna",),
     "urdf": ("urdf_parser_py", "lxml"),
     "video": ("imageio_ffmpeg",),

@@ -56,13 +56,8 @@ class Verification(NamedTuple):
     records: list[RunRecord]
 
 
-def verify_archive(
-    path: Path, *, share: float = 0.0, has_report: bool = True, progress: Progress = ignore_progress
-) -> Verification:
-    """Check an archive as ``verify_folder``, its hashes and its user code; raises InputError if it cannot be unpacked.
-
-    ``has_report`` says whether its report must follow from the records.
-    """
+def verify_archive(path: Path, *, share: float = 0.0, progress: Progress = ignore_progress) -> Verification:
+    """Check an archive as ``verify_folder``, and its hashes, user code and report; raises InputError if it cannot be unpacked."""
     with make_temporary_folder("nlp-gait-verify-") as folder:
         manifest, differences = unpack_archive(path, folder)
         detail = "; ".join(differences) or f"{len(manifest.files)} files have their SHA-256 of the manifest"
@@ -70,7 +65,6 @@ def verify_archive(
         findings = [Finding("manifest", not differences, detail), *found.findings]
         if found.records:
             findings += _check_code_files(folder, found.records)
-        if found.records and has_report:
             findings.append(_judge(REPORT, lambda: _check_report(folder, found.records)))
         return Verification(findings, found.records)
 

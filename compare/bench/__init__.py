@@ -1,1 +1,1 @@
-"""GaitBench's leaderboard: runs of a solver on the suite against shipped records of others."""
+"""GaitBench's ranking: runs of a solver on the suite against shipped records of others."""

@@ -10,18 +10,15 @@ from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
-from compare.cli.endings import fail, report_interrupts
-from compare.cli.exchange import print_findings
-from compare.cli.options import AsJson, Code, Evaluations, Jobs, name_all, parse_names
-from compare.cli.outputs import check_output_file
-from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
+from compare.cli.endings import report_interrupts
+from compare.cli.options import AsJson, Evaluations, Jobs, parse_names
+from compare.cli.printing import describe_command, print_result, print_table, show_progress, stdout
 from compare.study.settings import SolverSpec
 from compare.study.task import check_task
 from nlp_gait import gaitbench
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
-from nlp_gait.user_code import is_reference
 
 # Solvers that run beside yours on instances or with a budget for which no baseline is shipped.
 RIVALS = "random,pso,de,cma"
@@ -56,38 +53,6 @@ class InstanceOptions:
     def title(self) -> str:
         """What was chosen, in words."""
         return "chosen instances" if self.instances or self.families else f"suite {self.suite}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class SubmissionOptions:
-    """Submissions: to write one, to check one, or to show all of a folder."""
-
-    submit: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Write the submission of this folder of an earlier bench, as one file; name user code by --algorithm.",
-        ),
-    ] = None
-    verify: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Check a submission: every final point is judged again, some runs are repeated."
-        ),
-    ] = None
-    rerun: Annotated[
-        float,
-        typer.Option(
-            min=0, max=1, help="With --verify: share of the runs to repeat; only repeated runs prove their histories."
-        ),
-    ] = 0.1
-    code: Code = None
-    leaderboard: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Write static pages (to --out) of all submissions in this folder that hold."
-        ),
-    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +104,6 @@ def bench(
             "middle, or clip to bounds?"
         ),
     ] = False,
-    submission: SubmissionOptions,
     label: Annotated[str, typer.Option(help="Name of your algorithm on the page (default: its own name).")] = "",
     effort: BenchEffort,
     as_json: AsJson = False,
@@ -151,39 +115,14 @@ def bench(
 
     Examples: `nlp-gait bench --algorithm my.py:MyAlgo --suite small --out DIR`,
     `nlp-gait bench --algorithm my.py:MyAlgo --families walk12-long,ssp --seeds 0:5 --out DIR`,
-    `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`,
-    `nlp-gait bench --submit DIR --algorithm my.py:MyAlgo`, `nlp-gait bench --verify submission.zip`
+    `nlp-gait bench --algorithm pso --label pso-again`, `nlp-gait bench --audit --algorithm my.py:MyAlgo`
     """
-    if submission.submit is not None or submission.verify is not None:
-        _submit_or_verify(submission, algorithm, as_json)
-    elif submission.leaderboard is not None:
-        _write_public_pages(submission.leaderboard, effort.out, as_json)
-    elif audit:
+    if audit:
         _audit(algorithm, as_json)
     elif objectives == "2":
         _rank_on_fronts(algorithm, chosen.instances, effort, as_json)
     else:
         _rank(algorithm, label, chosen, effort, tune, as_json)
-
-
-def _submit_or_verify(options: SubmissionOptions, algorithm: str | None, as_json: bool) -> None:
-    from compare.bench.submission import SUFFIX, pack_submission, verify_submission
-
-    name_all([*(options.code or ()), *([algorithm] if algorithm and is_reference(algorithm) else ())])
-    if options.submit is not None:
-        file = check_output_file(options.submit.with_name(f"{options.submit.name}-submission{SUFFIX}"))
-        print_written(pack_submission(options.submit, file))
-    if options.verify is not None:
-        print_findings(verify_submission(options.verify, share=options.rerun, progress=say).findings, as_json)
-
-
-def _write_public_pages(submissions: Path, out: Path, as_json: bool) -> None:
-    from compare.bench.submission import write_public_pages
-
-    written, rejected = write_public_pages(submissions, make_writable_folder(out), progress=say)
-    print_result(as_json, {"rejected": rejected}, written, lambda: None)
-    if rejected:
-        fail(f"rejected: {'; '.join(rejected)}")
 
 
 def _rank(

@@ -33,7 +33,6 @@ MOST_VARIABLES = 400  # of a problem that becomes an instance by its name, if eq
 STARTS = 20  # of IPOPT, for the best known point of such an instance
 # Training seeds are below, test seeds follow from a date: TEST_SEEDS * YYYYMMDD + number.
 TEST_SEEDS = 1000
-LEAST_TEST_SEED = TEST_SEEDS * 10_000_000
 # The box, in units of the range of each variable: its width, the share of it that stays free on both sides of where the best
 # points of the family are, and the angle by which two variables are mixed [rad].
 WIDTHS: Range = (1.2, 1.6)
@@ -118,11 +117,6 @@ def list_test_seeds(day: date, count: int) -> tuple[int, ...]:
     """Return the test seeds of a day; no training seed is among them."""
     count = check_count("count", count, at_most=TEST_SEEDS)
     return tuple(int(f"{day:%Y%m%d}") * TEST_SEEDS + k for k in range(count))
-
-
-def find_test_day(seed: int) -> int | None:
-    """Return the day of a test seed as YYYYMMDD; None for smaller ones, which are for training and tuning."""
-    return seed // TEST_SEEDS if seed >= LEAST_TEST_SEED else None
 
 
 def is_generated(id: str) -> bool:

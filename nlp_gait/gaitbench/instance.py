@@ -172,8 +172,6 @@ class Instance:
         - ``ioh``: problem with the optimum; the total violation is a soft constraint, which adds to the objective
         - ``pygmo``: problem with every row as an inequality, with gradients and batches
         - ``pymoo``: vectorised problem; G is the total violation, or every row with ``rows=True``
-        - ``optuna``: benchmark problem of OptunaHub, an objective of Optuna; the total violation is its constraint
-        - ``nevergrad``: experiment function with a method ``violation``
 
         Raises UnknownNameError, or MissingExtraError without the package.
         """

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import runpy
 import sys
 import warnings
 from pathlib import Path
@@ -143,69 +142,7 @@ def test_pycma(instance: gaitbench.Instance, tmp_path: Path, monkeypatch: pytest
     assert best is not None and instance(np.array(best)[None])[1][0] == 0.0
 
 
-@pytest.mark.slow
-def test_optuna(instance: gaitbench.Instance, X: Array) -> None:
-    """Parameters by name, one constraint, and a sampler that knows it."""
-    package("optunahub")
-    import optunahub
-
-    optuna = package("optuna")
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    problem = instance.to("optuna")
-    root = Path(__file__).parents[2] / "examples" / "optunahub"
-    registered = optunahub.load_local_module("benchmarks/gaitbench", registry_root=str(root))
-    assert registered.Problem(instance.id).search_space == problem.search_space
-    assert set(registered.Problem.available_problem_names) == set(gaitbench.list_instances())
-    params = dict(zip(instance.names, X[0].tolist(), strict=True))
-    f, violation = instance(X[:1])
-    assert problem.evaluate(params) == f[0]
-    assert problem.evaluate_constraints(params) == {"violation": violation[0]}
-    assert list(problem.search_space) == list(instance.names)
-    study = optuna.create_study(directions=problem.directions, sampler=optuna.samplers.RandomSampler(seed=0))
-    study.optimize(problem, n_trials=15)
-    for trial in study.trials:
-        x = np.array([[trial.params[name] for name in instance.names]])
-        assert trial.value == instance(x)[0][0]
-
-
-@pytest.mark.slow
-def test_the_package_of_optunahub(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Its example runs with the real package, generated ids are accepted, and trials know whether they are feasible."""
-    package("optunahub")
-    optuna = package("optuna")
-    import optunahub
-
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    root = Path(__file__).parents[2] / "examples" / "optunahub"
-    monkeypatch.chdir(root)
-    found = runpy.run_path("benchmarks/gaitbench/example.py")
-    best, known = found["study"].best_trial, found["problem"].instance
-    x = [best.params[name] for name in known.names]
-    assert known.violation(x) == 0 and best.value == known.objective(x) >= known.best_known
-    assert capsys.readouterr().out == f"best feasible: {best.value:.4f} W, best known: {known.best_known:.4f} W\n"
-    problem = optunahub.load_local_module("benchmarks/gaitbench", registry_root=".").Problem("gb2:walk12-long:3")
-    study = optuna.create_study(directions=problem.directions, sampler=optuna.samplers.RandomSampler(seed=0))
-    study.optimize(problem, n_trials=10)
-    for trial in study.trials:
-        assert trial.constraints == problem.evaluate_constraints(trial.params)
-
-
-@pytest.mark.slow
-def test_nevergrad(instance: gaitbench.Instance, X: Array) -> None:
-    package("nevergrad")
-    import nevergrad as ng
-
-    function = instance.to("nevergrad")
-    f, violation = instance(X)
-    assert function(X[0]) == f[0] and function.violation(X[0]) == violation[0]
-    optimizer = ng.optimizers.OnePlusOne(parametrization=function.parametrization, budget=60)
-    optimizer.parametrization.random_state.seed(1)
-    found = optimizer.minimize(function, constraint_violation=[function.violation]).value
-    assert ((found >= instance.lower) & (found <= instance.upper)).all()
-    assert instance(found[None])[1][0] <= np.median(violation)
-
-
-@pytest.mark.parametrize("name", ["pymoo", "pygmo", "ioh", "cma", "optuna", "nevergrad"])
+@pytest.mark.parametrize("name", ["pymoo", "pygmo", "ioh", "cma"])
 def test_a_package_that_lacks_is_named(
     name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -225,4 +162,4 @@ def test_loading_an_instance_imports_none_of_them() -> None:
 
     program = "import sys; from nlp_gait import gaitbench; gaitbench.list_instances(); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
-    assert not {"pymoo", "pygmo", "ioh", "cma", "optuna", "nevergrad", "scipy.optimize", "matplotlib"} & set(loaded)
+    assert not {"pymoo", "pygmo", "ioh", "cma", "scipy.optimize", "matplotlib"} & set(loaded)

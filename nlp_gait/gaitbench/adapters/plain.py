@@ -1,4 +1,4 @@
-"""Adapters that need no base class of the package: SciPy, pycma, ioh, pygmo and nevergrad."""
+"""Adapters that need no base class of the package: SciPy, pycma, ioh and pygmo."""
 
 from __future__ import annotations
 
@@ -76,18 +76,6 @@ def to_ioh(instance: Instance) -> Any:
     )
     problem.bounds.lb, problem.bounds.ub = instance.lower.tolist(), instance.upper.tolist()
     return problem
-
-
-def to_nevergrad(instance: Instance) -> Any:
-    """Return an experiment function of nevergrad with a method ``violation``."""
-    import nevergrad as ng
-    from nevergrad.functions import ExperimentFunction
-
-    middle = (instance.lower + instance.upper) / 2
-    array = ng.p.Array(init=middle, lower=instance.lower, upper=instance.upper)
-    function = ExperimentFunction(instance.objective, array.set_name(instance.id))
-    function.violation = instance.violation
-    return function
 
 
 def to_pygmo(instance: Instance) -> Any:

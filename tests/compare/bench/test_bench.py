@@ -18,7 +18,7 @@ from compare.bench.baseline import (
     list_drawn,
     load_baseline,
 )
-from compare.bench.leaderboard import make_leaderboard_page, make_leads, rank_solvers
+from compare.bench.leaderboard import filter_instances, make_leaderboard_page, make_leads, rank_solvers
 from compare.report.writing import write_document
 from nlp_gait import gaitbench
 
@@ -137,3 +137,11 @@ def test_drawn_instances_have_a_baseline_and_a_table_of_who_leads_where() -> Non
     rows = {row[0]: row[2:] for table in section.parts for row in table.rows}  # of the searches alone, the last table
     assert set(rows) >= {"all instances", "family walk12-long", "family dsp-timed"}
     assert not any("slsqp" in cell or "ipopt" in cell for cells in rows.values() for cell in cells)
+
+
+def test_filters_are_parts_of_the_instances() -> None:
+    found = filter_instances(["walk12-w015", "ssp-v5", "gb2:ssp:0", "gb2:humanoid-ssp:0"])
+    assert found["all instances"] == ("walk12-w015", "ssp-v5", "gb2:ssp:0", "gb2:humanoid-ssp:0")
+    assert found["family ssp"] == ("gb2:ssp:0",) and found["family nao-ssp"] == ("ssp-v5",)
+    assert found["more than 10 variables"] == ("gb2:humanoid-ssp:0",)
+    assert set(filter_instances(["ssp-v5"])) == {"all instances"}

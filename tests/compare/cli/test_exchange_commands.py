@@ -106,7 +106,6 @@ def test_bench_shows_the_baseline_alone(tmp_path: Path) -> None:
         (("--instances", "ssp-v55"), "unknown instance of GaitBench 'ssp-v55'"),
         (("--families", "ssp", "--seeds", "5:3"), "--seeds takes FIRST:END, test:COUNT"),
         (("--instances", ID, "--tune", "3"), "--tune needs a search that runs here"),
-        (("--verify", "none.zip", "--code", "mine"), "--code takes FILE.py:NAME"),
     ],
 )
 def test_bench_refuses_in_one_sentence(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
