@@ -11,7 +11,7 @@ import platform
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks import derivatives, functions, ipopt, kernel, process, search, solvers
+from benchmarks import functions, ipopt, kernel, process
 from benchmarks.gaitbench import overhead
 from benchmarks.rows import Row, table
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
@@ -32,17 +32,12 @@ def main() -> None:
         lambda: kernel.torques(rounds),
         lambda: kernel.growth(rounds),
         lambda: functions.rows(max(5, rounds // 2)),
-        lambda: search.swarms(max(3, rounds // 5)),
-        lambda: derivatives.iteration(rounds),
-        lambda: [] if arguments.quick else derivatives.long_starts(),
-        lambda: ipopt.compiled_derivatives(starts),
-        lambda: ipopt.formulations(starts),
-        lambda: solvers.few_rows(starts, required=50.0),
-        lambda: solvers.few_rows(starts, "nao-dsp"),
-        lambda: [] if arguments.quick else solvers.few_rows(starts, "nao-cycle"),
-        lambda: solvers.stairs_plan(starts),
-        lambda: solvers.expected_times(max(5, rounds // 2)),
-        lambda: solvers.starts_at_once(3),
+        lambda: kernel.swarms(max(3, rounds // 5)),
+        lambda: ipopt.iteration(rounds),
+        lambda: ipopt.few_rows(starts, required=50.0),
+        lambda: ipopt.few_rows(starts, "nao-dsp"),
+        lambda: [] if arguments.quick else ipopt.few_rows(starts, "nao-cycle"),
+        lambda: ipopt.starts_at_once(3),
         lambda: process.starts(rounds),
         lambda: overhead.adapter(max(5, rounds // 2)),
     ):

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import compare.study
-from benchmarks.difficulty import difficulties
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import HASH, identify_problem
@@ -28,6 +27,7 @@ from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.certificate import find_certificate, load_certificates
 
 FILE = Path(str(compare.study.__file__)).with_name("best_known.json")
+DIFFICULTY = Path(__file__).parents[1] / "docs" / "difficulty.json"
 # A point with a violation below the tolerance may be better than the optimum by about this, relatively.
 ALIKE = 1e-6
 
@@ -58,9 +58,9 @@ def from_gaitbench() -> Iterator[Found]:
 
 def from_difficulty() -> Iterator[Found]:
     """Yield the problems with their defaults."""
-    for name, found in difficulties().items():
-        runs = [f"{solver.runs} runs of {title}" for title, solver in found.solvers.items()]
-        yield Found(load(name), list(found.best.x.values()), ", ".join(runs))
+    for name, found in read_json(DIFFICULTY, "difficulty").items():
+        runs = [f"{solver['runs']} runs of {title}" for title, solver in found["solvers"].items()]
+        yield Found(load(name), list(found["best"]["x"].values()), ", ".join(runs))
 
 
 def from_files() -> Iterator[Found]:

@@ -1,54 +1,123 @@
-"""Compiled functions that are not gaits against CasADi, NumPy and JAX: ``python -m benchmarks.functions [--rounds N]``.
+"""Compiled functions that are not gaits against CasADi, NumPy and JAX.
 
-One core for all but the last columns; ratios are medians over rounds in which the paths take turns, of processor time. CasADi is
-called with NumPy arrays, as ours is, and through its buffers, without conversions (columns with a star); its C code is compiled
+One core; ratios are medians over rounds in which the paths take turns, of processor time. CasADi is called with
+NumPy arrays, as ours is, and through its buffers, without conversions (columns with a star); its C code is compiled
 with -O2 -march=native and called by its map.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 import nlp_gait
 from benchmarks.casadi_code import compiled_functions
-from benchmarks.plain_functions import PlainFunction, plain_functions
 from benchmarks.rows import Array, Row, ratio, side_by_side
-from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.compiler import native_lanes
 
-BATCH, SHARE, LARGE_BATCH = 4096, 16, 200_000  # CasADi's paths get a share of the batch
+BATCH, SHARE = 4096, 16  # CasADi's paths get a share of the batch
 REPEATS = 20  # calls of a path in its turn, so that its data are in the cache
 C_FLAGS = ("-O2", "-march=native", "-fvisibility=hidden", "-DGCC_HASCLASSVISIBILITY", "-w")
+VARIABLES, STEPS, SAMPLES, HIDDEN = 20, 40, 50, 32
+RNG = np.random.default_rng(0)
+WEIGHTS = [RNG.normal(0.0, 0.4, size) for size in ((HIDDEN, 8), (HIDDEN, HIDDEN), (1, HIDDEN))]
+TIMES = np.linspace(0.0, 5.0, SAMPLES)
+DATA = 2.0 * np.exp(-0.7 * TIMES) + np.exp(-2.5 * TIMES) + RNG.normal(0.0, 0.01, SAMPLES)
+PATHS = {
+    "machine": "CasADi's map",
+    "machine, buffers": "CasADi's map through buffers",
+    "c": "CasADi's C code, -O2 -march=native",
+    "c, buffers": "CasADi's C code through buffers",
+    "numpy": "NumPy",
+    "jax": "JAX",
+}
+REQUIRED = {"machine": 25, "c": 10}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measurement:
-    """One function by all paths."""
+class PlainFunction(NamedTuple):
+    """A function of one vector, and the same for all rows of a batch over a module such as NumPy."""
 
     name: str
-    variables: int
-    time_us: float  #: of one row, ours
-    machine: float  #: ratios: how many times longer the others take; CasADi's virtual machine
-    machine_buffers: float
-    c_code: float
-    c_buffers: float
-    numpy: float
-    jax: float | None  #: None where it is not installed
-    threads: dict[int, float]  #: speed of several threads against one
-    difference: float  #: largest to the virtual machine, relative to max(1, |value|)
+    function: ca.Function  # (n,) to (m,)
+    vectorised: Callable[[Any, Any], Any]  # module, and X (P, n), to (P, m)
+    lower: float  # of all entries of x
+    upper: float
 
 
-def measure(plain: PlainFunction, rounds: int) -> Measurement:
-    """Time a function by all paths, and compare its values."""
+def make_functions() -> list[PlainFunction]:
+    """Return the functions: SX and MX, with and without a loop."""
+    x, u, w = ca.SX.sym("x", VARIABLES), ca.SX.sym("u", STEPS), ca.MX.sym("w", 8)
+    rate, t, y, rates = ca.SX.sym("rate", 4), ca.SX.sym("t"), ca.SX.sym("y"), ca.MX.sym("rates", 4)
+    error = ca.Function("error", [rate, t, y], [_decay(ca, rate.elements(), t, y)]).map(SAMPLES)
+    errors = error(ca.repmat(rates, 1, SAMPLES), TIMES[None], DATA[None])
+    first, second, third = WEIGHTS
+    network = third @ ca.tanh(second @ ca.tanh(first @ w))
+    return [
+        PlainFunction(
+            "rosenbrock",
+            ca.Function("rosenbrock", [x], [_rosenbrock(x.elements())]),
+            lambda xp, X: _rosenbrock(list(X.T)),
+            -2.0,
+            2.0,
+        ),
+        PlainFunction(
+            "cart-pole",
+            ca.Function("cart_pole", [u], [_cart_pole(ca, u.elements())]),
+            lambda xp, X: _cart_pole(xp, list(X.T)),
+            -10.0,
+            10.0,
+        ),
+        PlainFunction(
+            "network",
+            ca.Function("network", [w], [network]),
+            lambda xp, X: xp.tanh(xp.tanh(X @ first.T) @ second.T) @ third.T,
+            -2.0,
+            2.0,
+        ),
+        PlainFunction(
+            "decay fit",
+            ca.Function("fit", [rates], [ca.sum2(errors)]),
+            lambda xp, X: _decay(xp, [X[:, i, None] for i in range(4)], TIMES, DATA).sum(axis=1),
+            0.0,
+            3.0,
+        ),
+    ]
+
+
+def _rosenbrock(x: list[Any]) -> Any:
+    """Sum of 100 (x[i+1] - x[i]^2)^2 + (1 - x[i])^2."""
+    return sum(100.0 * (b - a * a) ** 2 + (1.0 - a) ** 2 for a, b in zip(x, x[1:], strict=False))
+
+
+def _cart_pole(xp: Any, forces: list[Any]) -> Any:
+    """Cost of a rollout of a cart (1 kg) with a pole (0.1 kg, half length 0.5 m) from rest, semi-implicit Euler, 20 ms."""
+    position, angle, speed, rate, cost = 0.0, 0.1 + 0.0 * forces[0], 0.0, 0.0, 0.0
+    for force in forces:
+        s, c = xp.sin(angle), xp.cos(angle)
+        push = (force + 0.05 * rate * rate * s) / 1.1
+        turn = (9.81 * s - c * push) / (0.5 * (4.0 / 3.0 - 0.1 * c * c / 1.1))
+        speed = speed + 0.02 * (push - 0.05 * turn * c / 1.1)
+        rate = rate + 0.02 * turn
+        position = position + 0.02 * speed
+        angle = angle + 0.02 * rate
+        cost = cost + position * position + 10.0 * angle * angle + 1e-3 * force * force
+    return cost
+
+
+def _decay(xp: Any, rates: list[Any], t: Any, y: Any) -> Any:
+    """Squared error of the sum of two exponentials at a time."""
+    return (rates[0] * xp.exp(-rates[1] * t) + rates[2] * xp.exp(-rates[3] * t) - y) ** 2
+
+
+def measure(plain: PlainFunction, rounds: int) -> tuple[float, dict[str, float], float]:
+    """Return the time of a row [us], how many times longer the others take, and the largest difference of a value."""
     f, n = plain.function, plain.function.size1_in(0)
     X = np.random.default_rng(1).uniform(plain.lower, plain.upper, (BATCH, n))
     ours = nlp_gait.compile_function(f, threads=1)
@@ -72,19 +141,12 @@ def measure(plain: PlainFunction, rounds: int) -> Measurement:
     found = np.asarray(ours(few)).reshape(len(few), -1)
     by_numpy = np.asarray(plain.vectorised(np, few)).reshape(len(few), -1)
     np.testing.assert_allclose(by_numpy, expected, rtol=1e-9, atol=1e-9)  # all paths compute the same function
-    return Measurement(
-        name=plain.name,
-        variables=n,
-        time_us=float(np.median(times["ours"])) / BATCH / REPEATS * 1e6,
-        machine=ratio(times["machine"], times["ours"], SHARE),
-        machine_buffers=ratio(times["machine, buffers"], times["ours"], SHARE),
-        c_buffers=ratio(times["c, buffers"], times["ours"], SHARE),
-        c_code=ratio(times["c"], times["ours"], SHARE),
-        numpy=ratio(times["numpy"], times["ours"]),
-        jax=ratio(times["jax"], times["ours"]) if "jax" in times else None,
-        threads=_scale(f, np.resize(X, (LARGE_BATCH, n)), rounds),
-        difference=float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max()),
-    )
+    casadis = ("machine", "machine, buffers", "c", "c, buffers")
+    ratios = {
+        name: ratio(times[name], times["ours"], SHARE if name in casadis else 1) for name in times if name != "ours"
+    }
+    difference = float((np.abs(found - expected) / np.maximum(1.0, np.abs(expected))).max())
+    return float(np.median(times["ours"])) / BATCH / REPEATS * 1e6, ratios, difference
 
 
 def _repeat(path: Callable[[], object]) -> Callable[[], None]:
@@ -131,49 +193,21 @@ def _one_core() -> Iterator[None]:
         os.sched_setaffinity(0, cores)
 
 
-def _scale(f: ca.Function, X: Array, rounds: int) -> dict[int, float]:
-    counts = [count for count in (1, 2, 4, 8, 16) if count <= available_cores()]
-    paths = {str(count): nlp_gait.compile_function(f, threads=count) for count in counts}
-    times = side_by_side({name: (lambda g=g: g(X)) for name, g in paths.items()}, max(3, rounds // 3))
-    return {count: ratio(times["1"], times[str(count)]) for count in counts[1:]}
-
-
 def rows(rounds: int) -> list[Row]:
     """Rows of the benchmarks' table."""
     found = []
-    for each in (measure(plain, rounds) for plain in plain_functions()):
-        note = f"{each.time_us:.3f} us a row of {each.variables}, {native_lanes()} lanes, one core"
-        name = f"{each.name}, compiled function"
+    for plain in make_functions():
+        time_us, ratios, difference = measure(plain, rounds)
+        note = f"{time_us:.3f} us a row of {plain.function.size1_in(0)}, {native_lanes()} lanes, one core"
         found += [
-            Row(name=f"{name} against CasADi's map", value=each.machine, unit="x", required=25, note=note),
-            Row(name=f"{name} against CasADi's C code, -O2 -march=native", value=each.c_code, unit="x", required=10),
-            Row(name=f"{name} against CasADi's map through buffers", value=each.machine_buffers, unit="x"),
-            Row(name=f"{name} against CasADi's C code through buffers", value=each.c_buffers, unit="x"),
-            Row(name=f"{name} against NumPy", value=each.numpy, unit="x"),
-            Row(name=f"{name}: difference", value=each.difference, unit="", required=1e-12, at_most=True),
-            *(Row(name=f"{name}, {count} threads", value=value, unit="x") for count, value in each.threads.items()),
+            Row(
+                name=f"{plain.name} against {PATHS[path]}",
+                value=value,
+                unit="x",
+                required=REQUIRED.get(path),
+                note=note,
+            )
+            for path, value in ratios.items()
         ]
-        if each.jax is not None:
-            found.append(Row(name=f"{name} against JAX", value=each.jax, unit="x"))
+        found.append(Row(name=f"{plain.name}: difference", value=difference, unit="", required=1e-12, at_most=True))
     return found
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.functions", description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=15, help="rounds in which the paths take turns")
-    rounds = parser.parse_args().rounds
-    print(f"{native_lanes()} lanes, batch {BATCH}; how many times longer the others take, on one core")
-    counts = "".join(f"  {count} threads" for count in (2, 4, 8, 16) if count <= available_cores())
-    print(f"{'function':12}  n  us a row   map  map*  C code  C code*  NumPy    JAX  difference{counts}")
-    for plain in plain_functions():
-        each = measure(plain, rounds)
-        jax = "    -" if each.jax is None else f"{each.jax:5.1f}"
-        casadi = f"{each.machine:4.0f}  {each.machine_buffers:4.0f}  {each.c_code:6.1f}  {each.c_buffers:7.1f}"
-        scaling = "".join(f"  {value:8.2f}x" for value in each.threads.values())
-        others = f"{each.numpy:5.1f}  {jax}  {each.difference:10.0e}{scaling}"
-        print(f"{each.name:12} {each.variables:2d}  {each.time_us:8.4f}  {casadi}  {others}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,138 +1,169 @@
-"""Rows about IPOPT: the lifted formulation against the naive one, interpreted against compiled derivatives."""
+"""Rows about IPOPT: our derivatives against CasADi's C code and virtual machine, few rows against all, many starts."""
 
 from __future__ import annotations
 
+import os
+import tempfile
 import time
-from functools import reduce
+from collections.abc import Callable, Mapping
+from unittest.mock import patch
 
 import casadi as ca
 import numpy as np
-from casadi import MX, SX
 
 import nlp_gait
-from benchmarks.rows import Row
-from nlp_gait.backends.derivatives.compiled import CompiledNlp
-from nlp_gait.backends.nlp import NlpModel, build_nlp
+from benchmarks.casadi_code import FLAGS, compiled_functions
+from benchmarks.rows import Array, Row, ratio, side_by_side
+from nlp_gait.backends.derivatives.compiled import DERIVATIVES, CompiledNlp
+from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
+from nlp_gait.backends.nlp import build_nlp
+from nlp_gait.backends.solve import count_workers
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.formulation import GaitProblem, Point
-from nlp_gait.symbolic.nonsmooth import Angle, Exact
+from nlp_gait.formulation.solution import Outcome
 
-QUIET = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
-LIFTED = {**QUIET, "ipopt.mu_strategy": "adaptive", "ipopt.bound_relax_factor": 0.0}
-WIDTH = 1e-2  # of the sigmoid, in the first stage
+NAMES = ("nlp_f", "nlp_g", *DERIVATIVES.values())
+SAME_OPTIMUM = 1e-4  # relative
 
 
-class Naive(Exact):
-    """What one writes first: roots in place of absolute values and minima, acos as it is."""
-
-    SMOOTHING = 1e-3
-
-    def acos(self, argument: SX, margin: SX) -> Angle:
-        """NaN beyond 1."""
-        first = -1 / ca.sqrt(1 - argument**2)
-        return Angle(ca.acos(argument), first, first * argument / (1 - argument**2))
-
-    def abs(self, v: MX) -> MX:
-        """Root of v^2 and a little more."""
-        return ca.sqrt(v**2 + self.SMOOTHING**2)
-
-    def min(self, *values: MX) -> MX:
-        """By the smooth absolute value."""
-        return reduce(lambda a, b: (a + b - self.abs(a - b)) / 2, values)
-
-    def step(self, switch: MX, below: MX, above: MX) -> MX:
-        """A sigmoid."""
-        return below + 0.5 * (1 + ca.tanh(switch / self.SMOOTHING)) * (above - below)
-
-
-def formulations(starts: int) -> list[Row]:
-    """Starts that converge and iterations, lifted and naive."""
-    problem = nlp_gait.load("nao-ssp")
-    solver, arguments = _naive(problem)
-    rng = np.random.default_rng(0)
-    converged, iterations = 0, []
-    for _ in range(starts):
-        solver(x0=rng.uniform(0.0, 1.0, len(problem.names)), **arguments)
-        converged += solver.stats()["return_status"] == "Solve_Succeeded"
-        iterations.append(solver.stats()["iter_count"])
-    solution = nlp_gait.solve(problem, starts=starts, seed=0, solver=IpoptSettings())
-    lifted = [start.iterations for start in solution.starts]
-    return [
-        Row(
-            name="starts that converge, lifted",
-            value=sum(start.converged for start in solution.starts) / starts,
-            unit="",
-            note=f"{starts} starts, median {np.median(lifted):g} iterations",
-        ),
-        Row(
-            name="starts that converge, naive",
-            value=converged / starts,
-            unit="",
-            note=f"9 variables, smoothed, plain acos; median {np.median(iterations):g} iterations, 300 at most",
-        ),
-    ]
-
-
-def _naive(problem: GaitProblem) -> tuple[ca.Function, dict[str, object]]:
-    symbols, z = problem.symbols(), MX.sym("z", len(problem.names))
-    offset = np.array([variable.lower for variable in problem.variables])
-    point = Point(x=offset + problem.scale * z, p=symbols.p, positions=symbols.positions)
-    assembly = problem.assemble(point, Naive())
-    rows = [constraint.columns for constraint in assembly.constraints]
-    g, lower, upper = (ca.vertcat(*(row[i] for row in rows)) for i in range(3))
-    bounds = ca.Function("bounds", [symbols.p], [lower, upper])(problem.p)
-    nlp = {"x": z, "p": symbols.p, "f": assembly.objective, "g": g}
-    solver = ca.nlpsol("naive", "ipopt", nlp, {**QUIET, "ipopt.max_iter": 300, "show_eval_warnings": False})
-    return solver, {"p": problem.p, "lbx": 0.0, "ubx": 1.0, "lbg": bounds[0], "ubg": bounds[1]}
-
-
-def compiled_derivatives(starts: int) -> list[Row]:
-    """One start of the first stage with interpreted and with compiled derivatives."""
+def iteration(rounds: int) -> list[Row]:
+    """All functions of one iteration at a new point, and the time to compile them."""
     problem = nlp_gait.load("nao-ssp")
     model = build_nlp(problem)
-    interpreted = ca.nlpsol("interpreted", "ipopt", model.nlp, LIFTED)
-    started = time.perf_counter()
-    native = CompiledNlp(model.nlp, np.append(problem.p, WIDTH))
-    build_s = time.perf_counter() - started
-    compiled = ca.nlpsol("compiled", "ipopt", native.nlp, {**LIFTED, **native.options})
-    rng = np.random.default_rng(0)
-    times: dict[str, list[float]] = {"interpreted": [], "compiled": []}
-    iterations = []
-    for _ in range(starts):
-        arguments = _start(problem, model, rng.uniform(0.0, 1.0, model.variables))
-        for name, solver in (("interpreted", interpreted), ("compiled", compiled)):
-            started = time.perf_counter()
-            solver(**arguments)
-            times[name].append(time.perf_counter() - started)
-        iterations.append(compiled.stats()["iter_count"])
-    fast, slow = float(np.median(times["compiled"])), float(np.median(times["interpreted"]))
+    p = np.append(problem.p, model.widths[0])
+    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {FOLDER_VARIABLE: folder}):
+        started, worked = time.perf_counter(), _processor_s()
+        CompiledNlp(model.nlp, p)
+        cold, effort = time.perf_counter() - started, _processor_s() - worked
+    usual = ca.nlpsol("usual", "ipopt", model.nlp, {"print_time": False})
+    interpreted = {name: usual.get_function(name) for name in NAMES}
+    listed = list(interpreted.values())
+    usually, optimised = (
+        dict(zip(NAMES, compiled_functions(listed, (optimisation, *FLAGS)), strict=True))
+        for optimisation in ("-O0", "-O1")
+    )
+    w = model.start(problem, (problem.lower + problem.upper) / 2, model.widths[0])
+    ours = CompiledNlp(model.nlp, p).functions
+    ways = {"ours": ours, "usually": usually, "optimised": optimised, "interpreted": interpreted}
+    callers = {name: _caller(functions, w, p) for name, functions in ways.items()}
+    times = side_by_side(
+        callers, max(rounds, 20), time.thread_time
+    )  # many calls are shorter than a slice of a busy machine
+    micro = {name: float(np.median(values)) * 1e6 for name, values in times.items()}
     return [
         Row(
-            name="lifted IPOPT, compiled, one start",
-            value=fast * 1e3,
-            unit="ms",
-            required=50,
-            ambition=30,
-            at_most=True,
-            note=f"median {np.median(iterations):g} iterations; interpreted {slow * 1e3:.0f} ms",
+            name="derivatives of an iteration, against CasADi's C code",
+            value=ratio(times["usually"], times["ours"]),
+            unit="x",
+            required=12,
+            ambition=25,
+            note=f"f, g, gradient, Jacobian, Hessian: {micro['ours']:.0f} us against {micro['usually']:.0f} us at -O0, "
+            "as they were compiled for IPOPT",
         ),
         Row(
-            name="derivatives, compiled or loaded",
-            value=build_s,
+            name="derivatives of an iteration, against CasADi's C code at -O1",
+            value=ratio(times["optimised"], times["ours"]),
+            unit="x",
+            note=f"{micro['optimised']:.0f} us; it compiles four times as long as at -O0",
+        ),
+        Row(
+            name="derivatives of an iteration, against the virtual machine",
+            value=ratio(times["interpreted"], times["ours"]),
+            unit="x",
+        ),
+        Row(
+            name="time to compile derivatives, cold",
+            value=effort,
             unit="s",
-            note=f"if compiled now, it pays from {build_s / max(slow - fast, 1e-9):.0f} starts",
+            required=3,
+            ambition=1.5,
+            at_most=True,
+            note=f"processor time; {cold:.1f} s by the clock",
         ),
     ]
 
 
-def _start(problem: GaitProblem, model: NlpModel, z: np.ndarray) -> dict[str, np.ndarray]:
-    lower, upper = (np.array(bound).ravel() for bound in model.row_bounds(problem.p))
-    free, n = np.full(model.lifted, np.inf), model.variables
-    return {
-        "x0": np.concatenate([z, np.array(model.lift_start(z, problem.p, WIDTH)).ravel()]),
-        "p": np.append(problem.p, WIDTH),
-        "lbx": np.concatenate([np.zeros(n), -free]),
-        "ubx": np.concatenate([np.ones(n), free]),
-        "lbg": np.concatenate([lower, np.zeros(len(model.tie_upper))]),
-        "ubg": np.concatenate([upper, model.tie_upper]),
+def _processor_s() -> float:
+    """Of this process and of those that it waited for."""
+    return sum(os.times()[:4])
+
+
+def _caller(functions: Mapping[str, ca.Function], w: Array, p: Array) -> Callable[[], None]:
+    """Calls all functions at a point that is new each time, with arrays that are there already."""
+    w, triggers = w.copy(), []
+    weights = (np.ones(1), np.ones(functions["nlp_g"].nnz_out(0)))
+    kept = []
+    for name in NAMES:
+        buffer, trigger = functions[name].buffer()
+        given = (w, p, *(weights if name == "nlp_hess_l" else ()))
+        for i, array in enumerate(given):
+            buffer.set_arg(i, memoryview(array))
+        results = [np.zeros(functions[name].nnz_out(i)) for i in range(functions[name].n_out())]
+        for i, array in enumerate(results):
+            buffer.set_res(i, memoryview(array))
+        kept.append((buffer, results))
+        triggers.append(trigger)
+
+    def call() -> None:
+        w[0] += 1e-9
+        for trigger in triggers:
+            trigger()
+
+    call.kept = kept  # type: ignore[attr-defined]  # the buffers live as long as the function
+    return call
+
+
+def few_rows(starts: int, name: str = "nao-ssp", required: float | None = None) -> list[Row]:
+    """Process time of a start of IPOPT that begins with the rows that matter, and with all rows, from the same points in turn."""
+    problem = nlp_gait.load(name)
+    solvers = {few: IpoptSettings(compiled=True, few_rows=few).prepare(problem) for few in (True, False)}
+    rng = np.random.default_rng(0)
+    times: dict[bool, list[float]] = {few: [] for few in solvers}
+    ends: dict[bool, list[Outcome]] = {few: [] for few in solvers}
+    for _ in range(starts):
+        x0 = problem.start_point(rng)
+        for few, solver in solvers.items():
+            started = time.process_time()
+            ends[few].append(solver.run(problem, x0))
+            times[few].append(time.process_time() - started)
+    best = min(end.cost for outcomes in ends.values() for end in outcomes if end.converged)
+    reached = {
+        few: sum(end.converged and end.cost <= best + SAME_OPTIMUM * abs(best) for end in outcomes)
+        for few, outcomes in ends.items()
     }
+    return [
+        Row(
+            name=f"a start of {name}, IPOPT, compiled",
+            value=1e3 * float(np.median(times[True])),
+            unit="ms",
+            required=required,
+            at_most=True,
+            note=f"with all rows {1e3 * np.median(times[False]):.0f} ms; of processor",
+        ),
+        Row(
+            name=f"IPOPT on few rows, starts of {name} that reach the best",
+            value=reached[True],
+            unit=f"of {starts}",
+            note=f"with all rows {reached[False]}",
+        ),
+    ]
+
+
+def starts_at_once(rounds: int) -> list[Row]:
+    """Twenty starts in one process and in as many as there are processors."""
+    problem, solver, workers = nlp_gait.load("nao-ssp"), IpoptSettings(compiled=True), count_workers()
+    times = side_by_side(
+        {
+            str(count): lambda count=count: nlp_gait.solve(problem, starts=20, solver=solver, workers=count)
+            for count in (1, workers)
+        },
+        rounds,
+    )
+    return [
+        Row(
+            name="20 starts in processes against one after the other",
+            value=ratio(times["1"], times[str(workers)]),
+            unit="x",
+            required=1.8 if workers > 1 else None,
+            note=f"{workers} processors, wall time: others' load counts",
+        )
+    ]

@@ -1,4 +1,4 @@
-"""Rows about the kernel: against the virtual machine, CasADi's own C code, NumPy with Pinocchio, and the core's limits."""
+"""Rows about the kernel and searches on it: against CasADi, NumPy with Pinocchio, and pymoo's PSO."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from casadi import MX, SX, Function, vertcat, vertsplit
+from pymoo.algorithms.soo.nonconvex.pso import PSO
+from pymoo.core.problem import Problem
+from pymoo.optimize import minimize as pymoo_minimize
 
 import nlp_gait
 from benchmarks.by_hand import ARM_SWING, ByHand, pinocchio_model
 from benchmarks.casadi_code import compiled_functions
-from benchmarks.floor import floor_s, operation_counts, operation_times
 from benchmarks.rows import Array, Row, ratio, side_by_side
+from metaheuristics import ParticleSwarm, minimize
+from metaheuristics.interface import BatchObjective
 from nlp_gait.backends.kernel.compiled import NativeKernel
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
 from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
@@ -26,6 +30,8 @@ from nlp_gait.symbolic.dynamics import newton_euler
 from nlp_gait.symbolic.tape import simplify
 
 BATCH = 1000
+EVALUATIONS, POPULATION = 10_000, 50
+SLOW_PART = 20  # the slowest search runs this part of the generations
 
 
 def candidates(problem: GaitProblem, count: int) -> Array:
@@ -58,11 +64,7 @@ def paths(rounds: int) -> list[Row]:
         rounds,
     )
     lanes = native_lanes()
-    counts, single = operation_counts(kernel.function, 11), operation_times(lanes)
     measured = float(np.median(times["kernel"])) / BATCH
-    least = floor_s(counts, single, lanes)
-    transcendental = floor_s(counts, single, lanes, ("sin", "cos", "acos", "atan2"))
-    peak = lanes / single["multiply"]
     return [
         Row(
             name="kernel, a candidate", value=measured * 1e6, unit="us", note=f"{lanes} lanes, batch {BATCH}, one core"
@@ -88,21 +90,6 @@ def paths(rounds: int) -> list[Row]:
             required=100,
             ambition=200,
             note="pin.rnea sample by sample, the rest vectorised over samples",
-        ),
-        Row(
-            name="share of the derived floor",
-            value=least / measured,
-            unit="",
-            required=0.45,
-            ambition=0.7,
-            note=f"floor {least * 1e6:.2f} us: {counts['multiply']} products, {counts['divide'] + counts['sqrt']} quotients and "
-            f"roots, {transcendental * 1e6:.2f} us for {counts['atan2'] + counts['acos']} transcendental functions",
-        ),
-        Row(
-            name="operations a second",
-            value=counts["all"] / measured / 1e9,
-            unit="G/s",
-            note=f"{counts['all']} instructions a candidate; peak of the core {peak / 1e9:.1f} G products/s",
         ),
     ]
 
@@ -208,3 +195,41 @@ def growth(rounds: int) -> list[Row]:
         )
     )
     return rows
+
+
+class PymooProblem(Problem):
+    """A batch objective as pymoo wants it."""
+
+    def __init__(self, objective: BatchObjective) -> None:
+        super().__init__(n_var=len(objective.lower), n_obj=1, n_ieq_constr=1, xl=objective.lower, xu=objective.upper)
+        self.objective = objective
+
+    def _evaluate(self, X: np.ndarray, out: dict[str, np.ndarray], *_: object, **__: object) -> None:
+        out["F"], out["G"] = (values[:, None] for values in self.objective(X))
+
+
+def swarms(rounds: int) -> list[Row]:
+    """Our PSO against pymoo's: 50 particles, 200 generations, on the kernel and on NumPy with Pinocchio."""
+    objective = nlp_gait.compile_objective(nlp_gait.load("nao-ssp"), require_compiler=True, threads=1)
+    fast, slow = PymooProblem(objective), PymooProblem(ByHand())
+    generations = EVALUATIONS // POPULATION
+
+    def pymoo(target: Problem, count: int) -> object:
+        return pymoo_minimize(target, PSO(pop_size=POPULATION), ("n_gen", count), seed=0, verbose=False)
+
+    times = side_by_side(
+        {
+            "ours": lambda: minimize(objective, ParticleSwarm(), evaluations=EVALUATIONS, seed=0),
+            "pymoo": lambda: pymoo(fast, generations),
+            "pymoo by hand": lambda: pymoo(slow, generations // SLOW_PART),
+        },
+        rounds,
+    )
+    same = ratio(times["pymoo"], times["ours"])
+    by_hand = ratio(times["pymoo by hand"], times["ours"], SLOW_PART)
+    note = f"extrapolated from {generations // SLOW_PART} generations"
+    return [
+        Row(name="PSO 50 x 200", value=float(np.median(times["ours"])) * 1e3, unit="ms"),
+        Row(name="PSO against pymoo's on the same kernel", value=same, unit="x", required=15, ambition=25),
+        Row(name="PSO against pymoo's on NumPy and Pinocchio", value=by_hand, unit="x", note=note),
+    ]

@@ -7,8 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks.difficulty import difficulties
 from compare.report.interactive import animate_gait
+from docs.difficulty import difficulties
 from docs.pages.playground import FOLDER
 from docs.pages.problems import GAITS, names
 from nlp_gait.formulation import load

@@ -1,4 +1,4 @@
-"""Figures and tables of the page on gradients and searches, from ``docs/landscape.json`` (``python -m benchmarks.landscape``)."""
+"""Figures and tables of the page on gradients and searches, from ``docs/landscape.json`` (``python -m docs.landscape``)."""
 
 from __future__ import annotations
 

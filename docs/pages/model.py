@@ -43,7 +43,7 @@ def count_constraints() -> str:
 
 
 def list_levels() -> str:
-    """Return the table of widths, as ``benchmarks.smoothing`` measured it."""
+    """Return the table of widths, as ``docs.smoothing`` measured it."""
     measured = json.loads(MEASURED.read_text(encoding="utf-8"))
     header = (
         "mean margin in x [mm]",

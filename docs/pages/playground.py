@@ -88,7 +88,7 @@ def introduce(instance: Instance, *, left_out: bool) -> str:
         f"that `nlp-gait export-objective {ID} --to DIR` writes: {len(instance.row_names)} constraints and the objective, which "
         "equal those of Python to nine digits (`tests/docs/test_playground.py`). The gait, the zero-moment point and the power "
         "that are drawn come from the same symbolic model and are computed in the page, too. The searches have the settings of "
-        "[those of the package](../algorithms.md). `python -m benchmarks.playground` measures the candidates per second.",
+        "[those of the package](../algorithms.md).",
     )
 
 

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args, get_origin, get_type_hints
 
-from benchmarks.difficulty import Best, Difficulty, Reached, difficulties
 from compare.analysis.published import load_published
 from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import plot_gait
+from docs.difficulty import Best, Difficulty, Reached, difficulties
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem, list_problems, load
@@ -33,7 +33,7 @@ ARGUMENT = re.compile(r"^ {4}(\w+): (.+(?:\n {8,}.+)*)", re.MULTILINE)
 SOURCE = re.compile(r"^Source:\n((?: {4}.+\n?)+)", re.MULTILINE)
 INTRODUCTION = """# Problems
 
-Each page is generated from the problem; figures of solvers were measured by `python -m benchmarks.difficulty` with default
+Each page is generated from the problem; figures of solvers were measured by `python -m docs.difficulty` with default
 options and values. Near: within 0.1 % of the best known point. [GaitBench](../../gaitbench.md) freezes variants of them, and
 [your own](../../bring-your-own.md) is used as `FILE.py:NAME`."""
 SIZES = Path(__file__).parents[1] / "nlp_sizes.json"
@@ -41,7 +41,7 @@ KEYS = ("variables", "lifted", "constraints", "equations", "jacobian", "hessian"
 SIZES_INTRODUCTION = """## Sizes of the NLPs
 
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
-measured by `python -m benchmarks.nlp_sizes`. `nlp-gait export-solver PROBLEM --to DIR --nl` writes one as an `.nl` file,
+measured by `python -m docs.nlp_sizes`. `nlp-gait export-solver PROBLEM --to DIR --nl` writes one as an `.nl` file,
 [for solver developers](../../gaitbench.md#nlps-for-solver-developers)."""
 PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 
@@ -158,13 +158,13 @@ def best_section(problem: GaitProblem, found: Difficulty | None) -> str:
     objective = problem.objective
     title = f"## Best known {objective.name}"
     if found is None or found.best is None:
-        return f"{title}\n\nNot measured yet: `python -m benchmarks.difficulty {problem.name}`."
+        return f"{title}\n\nNot measured yet: `python -m docs.difficulty {problem.name}`."
     best, exact = found.best, build_exact_model(problem)
     value = objective.sign * exact.at(problem.check_x(best.x), problem.p).cost
     if not math.isclose(value, best.objective, rel_tol=SAME):
         raise ValueError(
             f"docs/difficulty.json has {best.objective} as the best of {problem.name!r}, but the judge finds {value} there: "
-            f"the problem has changed; measure it again by python -m benchmarks.difficulty {problem.name}"
+            f"the problem has changed; measure it again by python -m docs.difficulty {problem.name}"
         )
     text = [
         f"**{with_unit(best.objective, objective.unit, '.8g')}**, to {objective.sense}; found by {best.solver}.",

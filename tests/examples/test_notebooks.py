@@ -1,7 +1,4 @@
-"""The notebooks that the gallery offers run under Jupyter in an empty folder and show their figures.
-
-`python -m benchmarks.notebooks` runs all of them; here those run that failed there before: they write files.
-"""
+"""The notebooks that the gallery offers run under Jupyter in an empty folder and show their figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measure what the smoothed balance margin costs: ``python -m benchmarks.smoothing [WIDTH_M...]``.
+"""Measure what the smoothed balance margin costs: ``python -m docs.smoothing [WIDTH_M...]``.
 
 For each width of the sigmoid IPOPT solves NAO's single support, from the optimum of the last width; the exact functions judge the
 point. By default these are the widths of the solver, and the table of ``docs/model/smoothed-margin.md`` is written.
@@ -22,7 +22,7 @@ from nlp_gait.backends.solvers.ipopt import NARROWER_WIDTHS, QUIET
 PROBLEM = "nao-ssp"
 MARGINS_M = (0.05, 0.065)  # required mean margins in x: the paper's, and one that limits the gait
 OPTIONS = QUIET | {"ipopt.tol": 1e-9, "ipopt.bound_relax_factor": 0.0}
-TABLE = Path(__file__).parents[1] / "docs" / "smoothing.json"
+TABLE = Path(__file__).with_suffix(".json")
 
 
 def measure(widths: list[float], margin_m: float) -> list[dict[str, Any]]:
@@ -53,7 +53,7 @@ def measure(widths: list[float], margin_m: float) -> list[dict[str, Any]]:
 
 def main() -> None:
     """Measure the widths of the solver and write the table, or measure others."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.smoothing", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m docs.smoothing", description=__doc__.splitlines()[0])
     parser.add_argument("widths", type=float, nargs="*", help="widths of the sigmoid [m]")
     widths = parser.parse_args().widths
     found = [row for margin in MARGINS_M for row in measure(widths or [*WIDTHS, *NARROWER_WIDTHS], margin)]

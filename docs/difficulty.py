@@ -1,4 +1,4 @@
-"""How hard each problem is, for its page in the documentation: ``python -m benchmarks.difficulty --records FOLDER``.
+"""How hard each problem is, for its page in the documentation: ``python -m docs.difficulty --records FOLDER``.
 
 For each problem, with its default options and values: the share of feasible points among uniform random ones, the cost of an
 evaluation, how many starts of IPOPT and how many runs of each default search end within 0.1 % of the best point known, and that
@@ -26,7 +26,7 @@ from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import ActiveConstraint
 
-FILE = Path(__file__).parents[1] / "docs" / "difficulty.json"
+FILE = Path(__file__).with_suffix(".json")
 STARTS, RUNS, EVALUATIONS = 100, 31, 10_000
 SEARCHES = ("pso", "ga", "aco")
 NEAR = 1e-3  # relative distance from the best known objective that counts as reaching it
@@ -91,7 +91,7 @@ class Difficulty:
 
 def main() -> None:
     """Measure what is asked for, problem by problem."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.difficulty", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m docs.difficulty", description=__doc__.splitlines()[0])
     parser.add_argument("problems", nargs="*", default=None, help="default: all that need no option")
     parser.add_argument("--records", type=Path, required=True, help="folder for the runs; finished ones in it are kept")
     parser.add_argument("--starts", type=int, default=STARTS, help="of IPOPT")

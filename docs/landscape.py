@@ -1,4 +1,4 @@
-"""Measure why the gradient wins on gait problems: ``python -m benchmarks.landscape`` writes ``docs/landscape.json``.
+"""Measure why the gradient wins on gait problems: ``python -m docs.landscape`` writes ``docs/landscape.json``.
 
 On NAO's single support: the exact objective and constraints around the optimum in two variables, the paths of PSO, GA, ACO and
 IPOPT from start to end, how far PSO's particles still move, the effect of the budget, and that of noise on searches and on a
@@ -34,7 +34,7 @@ BUDGET, RUNS, SEED = 30_000, 5, 0
 BUDGETS = (300, 1_000, 3_000, 10_000, 30_000)
 NOISES = (0.0, 1e-8, 1e-6, 1e-4, 1e-2)  # standard deviation, as a share of the objective and in units of the violation
 NOISY_BUDGET, NOISY_RUNS, DIFFERENCE = 10_000, 3, 1e-7
-FILE = Path(__file__).parents[1] / "docs" / "landscape.json"
+FILE = Path(__file__).with_suffix(".json")
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Evaluate = Callable[[Array], tuple[Array, Array]]

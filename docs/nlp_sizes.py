@@ -1,4 +1,4 @@
-"""Sizes of all NLPs, for the documentation: ``python -m benchmarks.nlp_sizes`` writes docs/nlp_sizes.json."""
+"""Sizes of all NLPs, for the documentation: ``python -m docs.nlp_sizes`` writes docs/nlp_sizes.json."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nlp_gait.backends.derivatives.assembly import make_nlp_plan
 from nlp_gait.backends.derivatives.structure import split_nlp
 from nlp_gait.backends.nlp import build_nlp
 
-FILE = Path(__file__).parents[1] / "docs" / "nlp_sizes.json"
+FILE = Path(__file__).with_suffix(".json")
 
 
 def measure(name: str) -> dict[str, int]:
