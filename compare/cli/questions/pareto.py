@@ -8,7 +8,6 @@ import typer
 from compare.cli.command import command
 from compare.cli.options import AsJson, NamedProblem, OutFolder, Seed
 from compare.cli.questions.output import Output
-from nlp_gait.errors import InputError
 
 SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 
@@ -16,13 +15,7 @@ SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 @command
 def pareto(
     *,
-    objectives: Annotated[
-        str,
-        typer.Option(
-            help="power [W] and one or two of dbm_y_mean, dbm_x_mean, dbm_y_min, dbm_x_min [m] and "
-            "speed [m/s], separated by commas."
-        ),
-    ] = "power,dbm_y_mean",
+    against: Annotated[str, typer.Option(help="dbm_y_mean or dbm_x_mean [m], or speed [m/s].")] = "dbm_y_mean",
     points: Annotated[int, typer.Option(min=5, max=10000, help="Points of the front.")] = 40,
     starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts at every third point.")] = 5,
     search: Annotated[
@@ -41,21 +34,10 @@ def pareto(
 ) -> None:
     """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
 
-    With three objectives the front is a surface, without searches.
-
-    Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --objectives power,dbm_y_mean,speed`
+    Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --against speed`
     """
-    from compare.questions.pareto.competing import parse_objectives
-    from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
-    from compare.questions.pareto.pareto_surface import ParetoSurface
+    from compare.questions.pareto.pareto import Pareto, parse_searches
 
-    names, output = parse_objectives(objectives), Output(out=out, as_json=as_json)
-    searches = parse_searches(search or SEARCHES)
-    effort = {"points": points, "starts": starts, "seed": seed}
-    if len(names) == 1:
-        (name,) = names
-        output.answer(ParetoFront(problem=problem.load(), objective=name, searches=searches, runs=runs, **effort))
-        return
-    if search and searches:
-        raise InputError("three objectives are traded without searches; leave out --search")
-    output.answer(ParetoSurface(problem=problem.load(), objectives=(names[0], names[1]), **effort))
+    output, searches = Output(out=out, as_json=as_json), parse_searches(search or SEARCHES)
+    effort = {"points": points, "starts": starts, "seed": seed, "runs": runs}
+    output.answer(Pareto(problem=problem.load(), against=against, searches=searches, **effort))

@@ -1,8 +1,6 @@
-"""Objectives that compete with power: a balance margin or the walking speed, as a limit, a number and an expression."""
+"""What competes with power: a mean balance margin or the walking speed, each with a least value that can be demanded."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 from casadi import MX
 
@@ -13,34 +11,29 @@ from nlp_gait.formulation import Array, Assembly, GaitProblem, Objective, Parame
 from nlp_gait.formulation.solution import Solution
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-POWER, SPEED = "power", "speed"
-MARGINS = ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min")
+SPEED = "speed"
+MARGINS = ("dbm_y_mean", "dbm_x_mean")
 REWARD = "reward_W_per_unit"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Margin:
-    """A dynamic balance margin: the mean over the samples or the least one, along x or across y."""
+    """A dynamic balance margin's mean over the samples, along x or across y."""
 
     name: str
     unit: str = "m"
 
-    @property
-    def parameter(self) -> str:
-        """The limit's name."""
-        return f"{self.name}_limit_m"
-
     def get_demand(self, problem: GaitProblem) -> float:
         """Return the least value that the problem demands."""
-        return problem.value(self.parameter)
+        return problem.value(f"{self.name}_limit_m")
 
     def drop_demand(self, problem: GaitProblem) -> GaitProblem:
         """Return the problem with the least demand: zero, which keeps the ZMP within the soles' box."""
-        return problem.with_values(**{self.parameter: 0.0})
+        return self.demand(problem, 0.0)
 
     def demand(self, problem: GaitProblem, least: float) -> GaitProblem:
         """Return the problem with a least value."""
-        return problem.with_values(**{self.parameter: least})
+        return problem.with_values(**{f"{self.name}_limit_m": least})
 
     def evaluate(self, problem: GaitProblem, x: Array) -> float:
         """Return the exact value at x (n,)."""
@@ -48,28 +41,16 @@ class Margin:
 
     def evaluate_many(self, objective: CompiledObjective, X: Array) -> Array:
         """Return the values (P,) of candidates (P, n)."""
-        margins: Array = objective.constraints(X)[:, _find_rows(objective.groups, self._group)].min(axis=1)
-        return margins
+        values: Array = objective.constraints(X)[:, objective.groups.index(self.name)]
+        return values
 
     def express(self, point: Point, assembly: Assembly) -> MX:
-        """Return a scalar for the assembly of a problem; only the mean margins are smooth enough."""
-        if not self.name.endswith("_mean"):
-            raise InputError(f"{self.name} has no smooth expression; trade a mean margin: dbm_y_mean, dbm_x_mean")
+        """Return a scalar for the assembly of a problem."""
         return assembly.group(self.name).value
 
     def compute_price(self, solution: Solution) -> float:
         """Return the change of the least power per unit of the demand [W/unit]."""
-        return sum((a.price for a in solution.active_constraints if a.name.partition("[")[0] == self._group), 0.0)
-
-    @property
-    def _group(self) -> str:
-        """Constraint rows that carry the limit."""
-        return self.name.removesuffix("_min")
-
-
-@lru_cache(maxsize=16)  # some searches evaluate one point at a time
-def _find_rows(groups: tuple[str, ...], group: str) -> list[int]:
-    return [i for i, name in enumerate(groups) if name == group]
+        return sum((a.price for a in solution.active_constraints if a.name.partition("[")[0] == self.name), 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,8 +72,8 @@ class Speed:
 
     def demand(self, problem: GaitProblem, least: float) -> GaitProblem:
         """Return the problem with a least value."""
-        end = f"{self.duration}.upper"
-        return problem.with_values(**{end: max(problem.value(f"{self.duration}.lower"), self.distance_m / least)})
+        longest = max(problem.value(f"{self.duration}.lower"), self.distance_m / least)
+        return problem.with_values(**{f"{self.duration}.upper": longest})
 
     def evaluate(self, problem: GaitProblem, x: Array) -> float:
         """Return the exact value at x (n,)."""
@@ -108,9 +89,8 @@ class Speed:
 
     def compute_price(self, solution: Solution) -> float:
         """Return the change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = distance / v."""
-        per_second = sum(
-            a.price for a in solution.active_constraints if a.name == f"bounds[{self.duration}]" and a.side == "upper"
-        )
+        bound = f"bounds[{self.duration}]"
+        per_second = sum(a.price for a in solution.active_constraints if a.name == bound and a.side == "upper")
         return -per_second * solution.x[self.duration] ** 2 / self.distance_m
 
 
@@ -126,7 +106,7 @@ def make_competing_objective(name: str, problem: GaitProblem) -> CompetingObject
         InputError: the problem has no power, margins and duration to trade.
     """
     durations = problem.display.durations
-    if problem.objective.name != POWER or len(durations) != 1 or problem.display.motion is None:
+    if problem.objective.name != "power" or len(durations) != 1 or problem.display.motion is None:
         raise InputError(f"{problem.name} has no power, balance and speed to trade; allowed are nao-ssp and nao-dsp")
     if name in MARGINS:
         return Margin(name=name)
@@ -153,18 +133,3 @@ def add_reward(problem: GaitProblem, criterion: CompetingObjective) -> GaitProbl
         parameters=(reward,),
         change=change,
     )
-
-
-def parse_objectives(text: str) -> Sequence[str]:
-    """Return the objectives next to power from ``power,dbm_y_mean`` or ``power,dbm_y_mean,speed``.
-
-    Raises:
-        InputError: power is missing, a name is duplicated, or there are fewer than two or more than three.
-    """
-    names = [part.strip() for part in text.split(",")]
-    others = [name for name in names if name != POWER]
-    if names.count(POWER) != 1 or len(set(others)) != len(others) or not 1 <= len(others) <= 2:
-        raise InputError(
-            f"--objectives takes power and one or two of {', '.join((*MARGINS, SPEED))}, separated by commas; got {text!r}"
-        )
-    return others

@@ -1,7 +1,7 @@
 """The true front of power against one criterion: least power for each demanded value of the criterion, and its knees."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,8 +33,7 @@ WINDOW = 0.1
 class FrontPoint:
     """A point of the front."""
 
-    demanded: float  #: least value of the criterion that was demanded
-    value: float  #: exact value of the criterion, at least that
+    value: float  #: exact value of the criterion
     power_W: float  #: exact power
     #: slope of the front, from the multiplier of the demand [W per unit of the criterion]; NaN if the solver gives none
     price: float = 0.0
@@ -68,7 +67,7 @@ def solve_front(
     if points < LEAST_POINTS:
         raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
     problem = criterion.drop_demand(problem)
-    low, high = solve_ends(problem, criterion, starts, seed, solver)
+    low, high = _solve_ends(problem, criterion, starts, seed, solver)
     ready = (solver or IpoptSettings()).prepare(problem, SOLVES)
     rng = np.random.default_rng(seed)
     found: dict[float, list[Outcome]] = {}
@@ -122,7 +121,7 @@ def solve_point(
     )
 
 
-def select_front(points: Sequence[FrontPoint]) -> list[FrontPoint]:
+def select_front(points: Iterable[FrontPoint]) -> list[FrontPoint]:
     """Return the points, by rising criterion, that no other point equals or betters in both; the first of equal ones stays."""
     kept: list[FrontPoint] = []
     for point in sorted(points, key=lambda p: (-p.value, p.power_W)):
@@ -131,8 +130,8 @@ def select_front(points: Sequence[FrontPoint]) -> list[FrontPoint]:
     return kept[::-1]
 
 
-def solve_ends(
-    problem: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver | None = None
+def _solve_ends(
+    problem: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver | None
 ) -> tuple[FrontPoint, FrontPoint]:
     """Return the least power, and the point beyond which the criterion costs too much."""
     solution = solve(problem, starts=2 * starts, seed=seed, solver=solver)
@@ -165,16 +164,13 @@ def _make_point(
     if best is None:
         return None
     price = math.nan if best.guess is None else criterion.compute_price(solution)
-    return replace(_make_reached(problem, criterion, solution), demanded=at, price=price)
+    return replace(_make_reached(problem, criterion, solution), price=price)
 
 
 def _make_reached(problem: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
-    """Return a solution as a point that demands what it reaches."""
     x = problem.check_x(solution.x)
-    value = criterion.evaluate(problem, x)
     return FrontPoint(
-        demanded=value,
-        value=value,
+        value=criterion.evaluate(problem, x),
         power_W=build_exact_model(problem).at(x, problem.p).cost,
         violation=solution.violation,
         x=tuple(x.tolist()),
@@ -190,60 +186,39 @@ class Knee:
     price_before: float  #: slope just below it [W per unit]
     price_after: float  #: slope just above it [W per unit]
     turn_deg: float  #: by how much the front turns around it, with both ranges as 1 [degree]
-    chord_distance: float  #: from the straight line between the front's ends, with both ranges as 1; negative behind it
 
 
-@dataclass(frozen=True, kw_only=True)
-class Bends:
-    """How a front bends."""
-
-    knees: tuple[Knee, ...]  #: bends, by rising criterion
-    farthest: int  #: number of the point farthest from the chord, on its better side
-    #: no segment is flatter than the one before it by more than a hundredth of its slope: then there is at most one knee in the
-    #: sense of the chord
-    convex: bool
-
-
-def find_bends(front: Sequence[FrontPoint]) -> Bends:
-    """Return the knees of a front (at least three points, by rising criterion).
+def find_knees(front: Sequence[FrontPoint]) -> tuple[Knee, ...]:
+    """Return the knees of a front (at least three points, by rising criterion), by rising criterion.
 
     At a knee, the straight lines from the point a twentieth of the front's length before it and to the point as far behind it
     differ in direction by at least 15 degrees, towards higher prices, both ranges being 1; so a single inaccurate point makes
     no knee. Of those within a tenth of the length the sharpest counts. The prices come from the multipliers.
     """
-    value, power = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
-    across, up = np.diff(value) / np.ptp(value), np.diff(power) / np.ptp(power)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(across, up))])
+    value, power = np.array([(p.value, p.power_W) for p in front]).T
     scaled = np.column_stack([(value - value[0]) / np.ptp(value), (power - power[0]) / np.ptp(power)])
-    # From the better side: the chord lies above a convex front.
-    chord = (scaled[:, 0] - scaled[:, 1]) / np.sqrt(2)
+    across, up = np.diff(scaled, axis=0).T
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(across, up))])
     half = WINDOW * along[-1] / 2
 
     def at(place: Array) -> Array:
-        return np.column_stack([np.interp(place, along, scaled[:, k]) for k in (0, 1)])
+        return np.column_stack([np.interp(place, along, column) for column in scaled.T])
 
     before, after = scaled - at(along - half), at(along + half) - scaled
-    total = np.arctan2(after[:, 1], after[:, 0]) - np.arctan2(before[:, 1], before[:, 0])
-    total[(along < half) | (along > along[-1] - half)] = 0.0
-    free = np.ones(len(front), dtype=bool)
+    turns = np.arctan2(after[:, 1], after[:, 0]) - np.arctan2(before[:, 1], before[:, 0])
+    turns[(along < half) | (along > along[-1] - half)] = 0.0
     knees = []
-    while free.any() and total[free].max() >= LEAST_TURN:
-        centre = int(np.flatnonzero(free)[np.argmax(total[free])])
+    while turns.max() >= LEAST_TURN:
+        centre = int(np.argmax(turns))
         window = np.flatnonzero(np.abs(along - along[centre]) <= half)
         knees.append(
             Knee(
-                value=float(value[centre]),
-                power_W=float(power[centre]),
+                value=front[centre].value,
+                power_W=front[centre].power_W,
                 price_before=front[max(0, window[0] - 1)].price,
                 price_after=front[min(len(front) - 1, window[-1] + 1)].price,
-                turn_deg=float(np.degrees(total[centre])),
-                chord_distance=float(chord[centre]),
+                turn_deg=float(np.degrees(turns[centre])),
             )
         )
-        free &= np.abs(along - along[centre]) > 2 * half
-    slope = up / across
-    return Bends(
-        knees=tuple(sorted(knees, key=lambda knee: knee.value)),
-        farthest=int(np.argmax(chord)),
-        convex=bool(np.all(slope[1:] >= slope[:-1] * 0.99)),
-    )
+        turns[np.abs(along - along[centre]) <= 2 * half] = 0.0
+    return tuple(sorted(knees, key=lambda knee: knee.value))

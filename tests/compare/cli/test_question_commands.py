@@ -33,9 +33,7 @@ CERTAINTY = ["certainty", "walk12", "--starts", "4", "--evaluations", "0"]
 
 
 def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
-    done = nlp_gait(
-        *PARETO, "--objectives", "power,speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path, "--json"
-    )
+    done = nlp_gait(*PARETO, "--against", "speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path, "--json")
     data = json.loads(done.stdout)
     powers = [point["power_W"] for point in data["front"]]
     assert len(powers) >= 4 and powers == sorted(powers)
@@ -45,7 +43,7 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
     assert written >= {"nao-ssp-front-speed.csv", "nao-ssp-pareto-speed.json"}
     assert all(Path(file).stat().st_size > 0 for file in data["files"])
     again = nlp_gait(
-        *PARETO, "--objectives", "power,speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path
+        *PARETO, "--against", "speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path
     )  # from its stored results
     assert "price" in again.stdout and " W per m/s " in again.stdout and "wrote " in again.stdout
 
@@ -53,12 +51,10 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--objectives", "power,dbm_z"], ["unknown objective next to power 'dbm_z'", "dbm_y_mean"]),
-        (["--objectives", "power"], ["--objectives takes power and one or two of", "got 'power'"]),
+        (["--against", "dbm_z"], ["unknown objective next to power 'dbm_z'", "dbm_y_mean"]),
         (["--search", "NSGA2"], ["--search takes NAME=BUDGET,BUDGET", "'NSGA2'"]),
         (["--search", "NSGA3=100"], ["Known: NSGA2, CMOPSO", "'NSGA3'"]),
         (["--search", "NSGA2=10"], ["at least the population of 100", "[10]"]),
-        (["--objectives", "power,dbm_y_mean,speed", "--search", "NSGA2=100"], ["leave out --search"]),
     ],
 )
 def test_pareto_refuses_in_one_sentence_before_the_work(arguments: list[str], words: list[str], tmp_path: Path) -> None:
@@ -141,7 +137,7 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_stored_results(
             press()
         return evaluate(watch, arguments)
 
-    ends = pareto_front.solve_ends
+    ends = pareto_front._solve_ends
 
     def found(*arguments: object, **named: object) -> object:
         result = ends(*arguments, **named)  # type: ignore[arg-type]
@@ -149,7 +145,7 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_stored_results(
         return result
 
     monkeypatch.setattr(IterationWatch, "eval", counted)
-    monkeypatch.setattr(pareto_front, "solve_ends", found)
+    monkeypatch.setattr(pareto_front, "_solve_ends", found)
     steps = tmp_path / "store"
     steps.mkdir()
     (steps / "earlier.json").write_text("{}")

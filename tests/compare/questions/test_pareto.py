@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.questions.pareto import pareto_surface
-from compare.questions.pareto.competing import make_competing_objective, parse_objectives
-from compare.questions.pareto.front import FrontPoint, find_bends, select_front, solve_front
-from compare.questions.pareto.pareto_front import ParetoFront, parse_searches
-from compare.questions.pareto.pareto_surface import ParetoSurface
-from compare.questions.pareto.searches import SearchFront, compute_qualities
+from compare.questions.pareto.competing import MARGINS, make_competing_objective
+from compare.questions.pareto.front import FrontPoint, find_knees, select_front, solve_front
+from compare.questions.pareto.pareto import Pareto, SearchFront, compute_qualities, parse_searches
 from compare.questions.question import Work, find
 from compare.study.store import Store
-from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.solution import Solution
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
@@ -33,7 +26,7 @@ SLOPE_TOLERANCE = 0.02
 
 
 def points(pairs: list[tuple[float, float]]) -> list[FrontPoint]:
-    return [FrontPoint(demanded=v, value=v, power_W=w, price=0.0, violation=0.0, x=(0.0,)) for v, w in pairs]
+    return [FrontPoint(value=v, power_W=w, price=0.0, violation=0.0, x=(0.0,)) for v, w in pairs]
 
 
 def broken_line(*corners: tuple[float, float]) -> list[FrontPoint]:
@@ -44,25 +37,20 @@ def broken_line(*corners: tuple[float, float]) -> list[FrontPoint]:
 
 
 def test_one_corner_is_one_knee() -> None:
-    found = find_bends(broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0)))
-    assert [knee.value for knee in found.knees] == pytest.approx([0.7])
-    assert found.convex
-    assert found.knees[0].turn_deg == pytest.approx(
-        np.degrees(np.arctan2(2.9 / 3, 0.3) - np.arctan2(0.1 / 3, 0.7)), abs=0.1
-    )
+    (knee,) = find_knees(broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0)))
+    assert knee.value == pytest.approx(0.7)
+    turn = np.degrees(np.arctan2(2.9 / 3, 0.3) - np.arctan2(0.1 / 3, 0.7))
+    assert knee.turn_deg == pytest.approx(turn, abs=0.1)
 
 
-def test_two_corners_with_a_flatter_piece_between_are_two_knees_of_a_front_that_is_not_convex() -> None:
-    found = find_bends(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
-    assert [knee.value for knee in found.knees] == pytest.approx([0.4, 0.9])
-    assert not found.convex
+def test_two_corners_with_a_flatter_piece_between_are_two_knees() -> None:
+    knees = find_knees(broken_line((0.0, 0.0), (0.4, 0.02), (0.45, 0.4), (0.9, 0.5), (1.0, 1.0)))
+    assert [knee.value for knee in knees] == pytest.approx([0.4, 0.9])
 
 
 def test_an_arc_has_no_knee() -> None:
     angles = np.linspace(0.0, np.pi / 2, 60)
-    found = find_bends(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles]))
-    assert found.knees == ()
-    assert found.convex
+    assert find_knees(points([(float(np.sin(a)), float(1 - np.cos(a))) for a in angles])) == ()
 
 
 def test_dominated_points_go() -> None:
@@ -77,7 +65,7 @@ def test_criteria_are_the_judges_numbers(name: str) -> None:
     x = X if name == "nao-ssp" else np.array([0.31, 0.00683, 0.00007, 0.00485, 0.06828, -0.05291, -0.0217, 2.0])
     judged = evaluate(problem, x)
     objective = nlp_gait.compile_objective(problem)
-    for margin in ("dbm_y_mean", "dbm_x_mean", "dbm_y_min", "dbm_x_min"):
+    for margin in MARGINS:
         criterion = make_competing_objective(margin, problem)
         assert criterion.evaluate(problem, x) == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
         assert criterion.evaluate_many(objective, x[None])[0] == pytest.approx(judged.indexes[f"{margin}_m"], rel=1e-9)
@@ -99,12 +87,7 @@ def test_prices_are_the_fronts_slopes() -> None:
         assert criterion.compute_price(here) == pytest.approx(slope, rel=SLOPE_TOLERANCE)
 
 
-def test_objectives_are_parsed() -> None:
-    assert parse_objectives("power,dbm_y_mean") == ["dbm_y_mean"]
-    assert parse_objectives("speed, power, dbm_x_mean") == ["speed", "dbm_x_mean"]
-    for wrong in ("power", "speed,dbm_y_mean", "power,speed,speed", "power,a,b,c"):
-        with pytest.raises(InputError, match="--objectives takes power"):
-            parse_objectives(wrong)
+def test_searches_are_parsed() -> None:
     assert parse_searches(["none"]) == {}
     assert parse_searches(["NSGA2=100,200"]) == {"NSGA2": (100, 200)}
     with pytest.raises(InputError, match="--search takes"):
@@ -126,8 +109,8 @@ def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothi
     values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
     none = np.empty(0)
     runs = [
-        SearchFront(solver="NSGA2", run=0, budget=10, values=values, powers=powers, X=np.zeros((len(front), 1))),
-        SearchFront(solver="NSGA2", run=1, budget=10, values=none, powers=none, X=np.empty((0, 1))),
+        SearchFront(solver="NSGA2", budget=10, values=values, powers=powers, X=np.zeros((len(front), 1))),
+        SearchFront(solver="NSGA2", budget=10, values=none, powers=none, X=np.empty((0, 1))),
     ]
     (row,) = compute_qualities(front, runs)
     assert row.hypervolume == pytest.approx((0.0, 0.5, 1.0))
@@ -152,7 +135,7 @@ def small() -> GaitProblem:
 
 
 def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProblem, folder: Path) -> None:
-    question = ParetoFront(problem=small, points=5, starts=1, searches={"NSGA2": (100, 300)}, runs=1)
+    question = Pareto(problem=small, points=5, starts=1, searches={"NSGA2": (100, 300)}, runs=1)
     found = find(question, Work(store=Store(folder)))
     values, powers = zip(*((p.value, p.power_W) for p in found.front), strict=True)
     assert list(values) == sorted(values) and list(powers) == sorted(powers)
@@ -170,22 +153,3 @@ def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProb
         rows = list(csv.DictReader(file))
     assert [float(row["power_W"]) for row in rows] == list(powers)
     assert all(path.stat().st_size > 0 for path in written)
-
-
-def test_a_surface_rises_with_both_demands(small: GaitProblem, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All pairs of demands can be satisfied here; the last one is reported as if it could not."""
-
-    def solve(problems: list[GaitProblem], **options: Any) -> list[Solution]:
-        *solved, last = solve_both_ways(problems, **options)
-        assert last.converged
-        return [*solved, replace(last, claimed=False)]
-
-    monkeypatch.setattr(pareto_surface, "solve_both_ways", solve)
-    question = ParetoSurface(problem=small, objectives=("dbm_y_mean", "speed"), points=4, starts=1)
-    surface = find(question, Work(store=Store(folder)))
-    powers = {p.demanded: p.power_W for p in surface.points}
-    for (margin, speed), power in powers.items():
-        assert all(other >= power * (1 - 1e-6) for (m, s), other in powers.items() if m >= margin and s >= speed)
-    assert len(surface.points) == 3 and len(surface.infeasible) == 1
-    assert surface.infeasible[0] not in powers
-    assert all(path.stat().st_size > 0 for path in question.report(surface).write(folder))
