@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -10,12 +10,10 @@ from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
-from compare.cli.endings import report_interrupts
 from compare.cli.options import AsJson, Evaluations, Jobs, parse_names
 from compare.cli.printing import describe_command, print_result, print_table, show_progress, stdout
 from compare.study.settings import SolverSpec
 from compare.study.task import check_task
-from nlp_gait import gaitbench
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
@@ -83,10 +81,6 @@ def bench(
     ] = None,
     *,
     chosen: InstanceOptions,
-    objectives: Annotated[
-        Literal["1", "2"],
-        typer.Option(help="2: searches for several objectives on the instances with two, against their true fronts."),
-    ] = "1",
     tune: Annotated[
         int,
         typer.Option(
@@ -119,8 +113,6 @@ def bench(
     """
     if audit:
         _audit(algorithm, as_json)
-    elif objectives == "2":
-        _rank_on_fronts(algorithm, chosen.instances, effort, as_json)
     else:
         _rank(algorithm, label, chosen, effort, tune, as_json)
 
@@ -176,30 +168,6 @@ def _rank(
         "standings": [asdict(standing) for standing in board.standings],
     }
     print_result(as_json, data, written, tables)
-
-
-def _rank_on_fronts(algorithm: str | None, instances: str | None, effort: BenchEffort, as_json: bool) -> None:
-    """Run searches on the instances with two objectives and write their page."""
-    from compare.bench.fronts import SEARCHES, make_fronts_page, rank_searches, run_fronts
-    from compare.report.writing import add_session, write_document
-
-    chosen, out, runs = parse_names(instances or "") or list(gaitbench.list_fronts()), effort.out, effort.runs
-    solvers = list(SEARCHES if effort.against == RIVALS else parse_names(effort.against))
-    solvers += [algorithm] if algorithm and algorithm not in solvers else []
-    make_writable_folder(out)
-    jobs = effort.jobs or available_cores()
-    options: dict[str, Any] = {"runs": runs, "evaluations": effort.evaluations, "folder": out, "jobs": jobs}
-    with (
-        report_interrupts(f"interrupted; finished runs are stored in {out}; rerun the command to continue"),
-        show_progress("runs", len(chosen) * len(solvers) * runs) as advance,
-    ):
-        results = run_fronts(chosen, solvers, **options, progress=advance)
-    page = add_session(make_fronts_page(results, runs, effort.evaluations), describe_command(), [], str(jobs))
-    written, ranks = write_document(out, page, "fronts"), rank_searches(results)
-    data = {"instances": chosen, "mean_ranks": ranks}
-    title = f"GaitBench with two objectives: {len(chosen)} instances"
-    rows = [(name, f"{rank:.2f}") for name, rank in ranks.items()]
-    print_result(as_json, data, written, lambda: print_table(title, ("search", "mean rank by hypervolume"), rows))
 
 
 def _audit(algorithm: str | None, as_json: bool) -> None:

@@ -5,12 +5,10 @@ from nlp_gait import gaitbench
 problem = gaitbench.load("ssp-v5")          # gaitbench.list_instances(subset="small" | "full")
 f, violation = problem(X)                   # X: (P, n)
 problem.best_known, problem.best_x, str(problem.evidence)
-problem = gaitbench.load_front("ssp-power-time")  # two objectives; gaitbench.list_fronts() has all
 problem = gaitbench.generate("ssp", seed=3)  # the same as load("gb2:ssp:3"); gaitbench.list_families() has the others
 """
 
 from nlp_gait.gaitbench.facts import Definition, Evidence, Features, list_instances
-from nlp_gait.gaitbench.fronts import FrontInstance, FrontQuality, list_fronts, load_front
 from nlp_gait.gaitbench.generated import list_families, list_test_seeds
 from nlp_gait.gaitbench.instance import Instance, generate, load
 
@@ -18,14 +16,10 @@ __all__ = [
     "Definition",
     "Evidence",
     "Features",
-    "FrontInstance",
-    "FrontQuality",
     "Instance",
     "generate",
     "list_families",
-    "list_fronts",
     "list_instances",
     "list_test_seeds",
     "load",
-    "load_front",
 ]

@@ -14,8 +14,6 @@ ADAPTERS: dict[str, tuple[str, tuple[str, ...]]] = {
     "ioh": ("plain:to_ioh", ("ioh",)),
     "pygmo": ("plain:to_pygmo", ("pygmo",)),
     "pymoo": ("pymoo:PymooProblem", ("pymoo",)),
-    "pymoo-front": ("pymoo:PymooProblem", ("pymoo",)),
-    "pygmo-front": ("plain:to_pygmo_front", ("pygmo",)),
 }
 
 

@@ -9,13 +9,11 @@ import numpy as np
 from nlp_gait.formulation import Array
 
 if TYPE_CHECKING:
-    from nlp_gait.gaitbench.fronts import FrontInstance
     from nlp_gait.gaitbench.instance import Instance
 
 CMA_SIGMA = 0.25  # first step, as a share of each variable's range
 # A violation of 1 costs this many times the best known objective: ioh adds it to the objective that its algorithms see.
 IOH_PENALTY = 1e3
-INFEASIBLE = 1e6  # of both objectives, beyond the worst ones of feasible points, which are of the size of 1
 
 
 def to_scipy(instance: Instance) -> dict[str, Any]:
@@ -85,40 +83,20 @@ def to_pygmo(instance: Instance) -> Any:
     return pygmo.problem(_PygmoProblem(instance))
 
 
-def to_pygmo_front(instance: FrontInstance) -> Any:
-    """Return a problem of pygmo; its algorithms for several objectives take no constraints, so a violation adds to both."""
-    import pygmo
+class _PygmoProblem:
+    """The objective, then every row as an inequality, with dense gradients."""
 
-    return pygmo.problem(_PygmoFrontProblem(instance))
-
-
-class _InBox:
-    """What user-defined problems of pygmo share."""
-
-    def __init__(self, instance: Any) -> None:
+    def __init__(self, instance: Instance) -> None:
         self.instance = instance
 
     def fitness(self, x: Array) -> Array:
         return self.batch_fitness(x)
 
-    def batch_fitness(self, xs: Array) -> Array:
-        """Return the fitness of concatenated points, point by point."""
-        raise NotImplementedError
-
     def has_batch_fitness(self) -> bool:
         return True
 
-    def get_bounds(self) -> tuple[Array, Array]:
-        return self.instance.lower, self.instance.upper
-
-    def get_name(self) -> str:
-        return f"GaitBench {self.instance.id}"
-
-
-class _PygmoProblem(_InBox):
-    """The objective, then every row as an inequality, with dense gradients."""
-
     def batch_fitness(self, xs: Array) -> Array:
+        """Return the fitness of concatenated points, point by point."""
         X = np.reshape(xs, (-1, len(self.instance.names)))
         return np.hstack([self.instance(X)[0][:, None], self.instance.rows(X)]).ravel()
 
@@ -126,21 +104,15 @@ class _PygmoProblem(_InBox):
         """Return the derivatives ((1 + m) n,), row by row."""
         return np.vstack([self.instance.gradient(x), self.instance.jacobian(x)]).ravel()
 
+    def get_bounds(self) -> tuple[Array, Array]:
+        return self.instance.lower, self.instance.upper
+
     def get_nic(self) -> int:
         return len(self.instance.row_names)
+
+    def get_name(self) -> str:
+        return f"GaitBench {self.instance.id}"
 
     def get_extra_info(self) -> str:
         instance = self.instance
         return f"\t{instance.definition.what}\n\tbest known: {instance.best_known!r}, {instance.evidence}"
-
-
-class _PygmoFrontProblem(_InBox):
-    """Two objectives; infeasible points are worse than any feasible one."""
-
-    def batch_fitness(self, xs: Array) -> Array:
-        F, violation = self.instance(np.reshape(xs, (-1, len(self.instance.names))))
-        return np.where(violation[:, None] > 0.0, INFEASIBLE + violation[:, None], F).ravel()
-
-    def get_nobj(self) -> int:
-        count: int = self.instance.count
-        return count
