@@ -128,7 +128,7 @@ def _parse_numbers(text: str, count: int, link: str) -> list[float]:
 def _read_xml(path: str) -> Any:
     if find_spec("urdf_parser_py") is None:
         raise MissingExtraError(
-            f"robot file {path!r}: URDF files need the package urdf-parser-py, which is not installed: "
+            f"robot file {path!r}: URDF files need the package urdfdom-py, which is not installed: "
             "pip install 'nlp-gait[urdf]'"
         )
     data = read_bytes(Path(path), "robot file", error=RobotDataError)

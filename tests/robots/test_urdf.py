@@ -286,5 +286,5 @@ def test_joint_names_that_fit_no_joint_are_refused(tmp_path: Path, names: object
 
 def test_without_the_extra_its_name_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(urdf, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtraError, match=r"need the package urdf-parser-py.*pip install 'nlp-gait\[urdf\]'"):
+    with pytest.raises(MissingExtraError, match=r"need the package urdfdom-py.*pip install 'nlp-gait\[urdf\]'"):
         read_urdf(stored(tmp_path, as_urdf(nao())))
