@@ -1,6 +1,6 @@
-"""Public humanoids side by side: against Pinocchio, ten starts, the kernel, and cycles at one Froude number, model and engine.
+"""Public humanoids side by side: ten starts, searches, and steps and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [oracle] [starts] [kernel] [searches] [steps] [cycles] [cart-table] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [starts] [searches] [steps] [cycles] [cart-table] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -21,16 +21,14 @@ import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
-from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.gaits.humanoid.body import GRAVITY
 from nlp_gait.robots.biped import NAO_LEG_M, make_biped_model
-from tests.pinocchio_oracle import floating_model, stand
 
 SHARE = "share/example-robot-data/robots"
-CANDIDATES, STARTS, STEPS = 200, 10, 4
+STARTS, STEPS = 10, 4
 SEARCHES = {name: metaheuristics.make_algorithm(name) for name in ("pso", "ga", "aco")}
 TIME_S = 2.0  # of NAO's single support
-CLOSURE_M = 1e-9
 
 
 def robots() -> dict[str, str]:
@@ -50,47 +48,6 @@ def robots() -> dict[str, str]:
         if name not in found:
             print(f"{name} is left out: pip install jvrc-description example-robot-data", file=sys.stderr)
     return found
-
-
-def oracle(files: dict[str, str]) -> Iterator[str]:
-    """Torques and ZMP of random reachable candidates against Pinocchio."""
-    yield header("robot", "candidates", "torque, of the largest", "ZMP m", "reached, share of draws")
-    for name, file in files.items():
-        problem = nlp_gait.load("humanoid-ssp", robot=file)
-        model = problem.display.simulation_model
-        assert model is not None
-        robot = model.robot
-        model, ankle = floating_model(robot), robot.joint_to[robot.feet["left"].link].name
-        worst_torque, worst_zmp = 0.0, 0.0
-        chosen, share = reachable(problem)
-        rng = np.random.default_rng(1)
-        for x in chosen:
-            signals = problem.signals(x)
-            k = int(rng.integers(len(signals.arrays["t"])))
-            at = {
-                a: dict(zip(signals.joints, map(float, signals.arrays[a][k]), strict=True)) for a in ("q", "qd", "qdd")
-            }
-            foot = signals.arrays["left_foot"][k] + [0.0, 0.0, robot.feet["left"].ankle_height_m]
-            found = stand(model, ankle, foot, at["q"], at["qd"], at["qdd"], GRAVITY)
-            torque = np.array([found.torques[joint] for joint in signals.joints])
-            error = np.abs(torque - signals.arrays["tau"][k]).max() / np.abs(torque).max()
-            worst_torque = max(worst_torque, float(error))
-            worst_zmp = max(worst_zmp, float(np.abs(found.zmp - signals.arrays["zmp"][k]).max()))
-        yield cells(name, f"{len(chosen)}", f"{worst_torque:.1e}", f"{worst_zmp:.1e}", f"{share:.2f}")
-
-
-def reachable(problem: GaitProblem) -> tuple[Array, float]:
-    """Random candidates whose legs reach their feet, and how many of all do."""
-    model, rng = build_exact_model(problem), np.random.default_rng(0)
-    rows = [i for i, name in enumerate(model.row_names) if name.startswith("closure")]
-    found: list[Array] = []
-    draws = 0
-    while len(found) < CANDIDATES:
-        x = rng.uniform(problem.lower, problem.upper)
-        draws += 1
-        if model.at(x, problem.p).g[rows].max() < CLOSURE_M:
-            found.append(x)
-    return np.array(found), len(found) / draws
 
 
 def starts(files: dict[str, str]) -> Iterator[str]:
@@ -116,25 +73,6 @@ def starts(files: dict[str, str]) -> Iterator[str]:
             f"{abs(lifted - values.cost) / values.cost:.1e}",
             ", ".join(active.name for active in solution.active_constraints[:4]),
         )
-
-
-def kernel(files: dict[str, str]) -> Iterator[str]:
-    """A candidate's time against nao-ssp's, in turns, processor time, one thread."""
-    import time
-
-    problems = {"nao-ssp": nlp_gait.load("nao-ssp")}
-    problems |= {name: nlp_gait.load("humanoid-ssp", robot=file) for name, file in files.items()}
-    objectives = {n: nlp_gait.compile_objective(p, require_compiler=True, threads=1) for n, p in problems.items()}
-    points = {n: np.random.default_rng(0).uniform(p.lower, p.upper, (1000, len(p.names))) for n, p in problems.items()}
-    best = dict.fromkeys(problems, np.inf)
-    for _ in range(25):
-        for name, objective in objectives.items():
-            started = time.process_time()
-            objective(points[name])
-            best[name] = min(best[name], time.process_time() - started)
-    yield header("problem", "us a candidate", "times nao-ssp")
-    for name in problems:
-        yield cells(name, f"{1e3 * best[name]:.2f}", f"{best[name] / best['nao-ssp']:.2f}")
 
 
 def searches(files: dict[str, str]) -> Iterator[str]:
@@ -294,9 +232,7 @@ def leg_of(problem: GaitProblem) -> float:
 
 
 GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
-    "oracle": oracle,
     "starts": starts,
-    "kernel": kernel,
     "searches": searches,
     "steps": steps,
     "cycles": cycles,

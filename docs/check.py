@@ -17,7 +17,7 @@ from urllib.parse import unquote, urldefrag
 
 import pytest
 
-from tests.browser import SCREENS, list_accessibility_faults, list_wide_parts, start_browser, visit
+from docs.browser import SCREENS, list_accessibility_faults, list_wide_parts, start_browser, visit
 
 LOADING = {
     "script": "src",

@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from docs.pages import playground
-from docs.pages.webassembly import has_compiler
-from nlp_gait import gaitbench
-from nlp_gait.formulation import Array
-from nlp_gait.formulation.display import Skeleton
-from tests.browser import (
+from docs.browser import (
     SCREENS,
     Visit,
     list_accessibility_faults,
@@ -24,6 +19,11 @@ from tests.browser import (
     visit,
     wait_for_motion,
 )
+from docs.pages import playground
+from docs.pages.webassembly import has_compiler
+from nlp_gait import gaitbench
+from nlp_gait.formulation import Array
+from nlp_gait.formulation.display import Skeleton
 
 pytestmark = pytest.mark.slow
 EQUAL = 1e-9

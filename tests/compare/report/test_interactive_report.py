@@ -15,7 +15,7 @@ from compare.report import write_report
 from compare.report.interactive import animate_gait
 from compare.study.record import RunRecord
 from compare.study.settings import Manifest
-from tests.browser import (
+from docs.browser import (
     SCREENS,
     Visit,
     list_accessibility_faults,
