@@ -1,7 +1,7 @@
 """Options that several commands take; ``command`` explains groups of options."""
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -86,11 +86,7 @@ class CycleOptions:
         """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
         named = ProblemSpec(name=name)
         options: dict[str, Any] = {k: value for k, value in vars(self).items() if k in FLAGS and value is not None}
-        known = inspect.signature(find_maker(named.address)).parameters
-        for key, text in _parse_pairs(self.option, "--option"):
-            if key not in known:
-                raise unknown(f"option of {name}", key, known)
-            options[key] = _parse_option(key, text, known[key].default)
+        options |= parse_options(named.address, parse_pairs(self.option, "--option"))
         named = replace(named.with_options(**options), values=parse_values(self.values, "--set"))
         fixed = named.load().fix(**parse_values(self.fix, "--fix"))
         return replace(named, values=dict(fixed.values))
@@ -234,7 +230,7 @@ def parse_x(text: str) -> list[float]:
 
 def parse_values(items: Sequence[str] | None, flag: str) -> dict[str, float]:
     """Return the numbers of an option NAME=VALUE by name; raises as ``parse_number``."""
-    return {name: parse_number(name, text, flag) for name, text in _parse_pairs(items, flag)}
+    return {name: parse_number(name, text, flag) for name, text in parse_pairs(items, flag)}
 
 
 def parse_number(name: str, text: str, flag: str) -> float:
@@ -245,7 +241,8 @@ def parse_number(name: str, text: str, flag: str) -> float:
         raise InputError(f"{flag}: {name} must be a number, got {text!r}") from None
 
 
-def _parse_pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]:
+def parse_pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]]:
+    """Return names and values of texts NAME=VALUE; raises InputError for another text."""
     pairs = []
     for item in items or ():
         name, equals, text = item.partition("=")
@@ -255,9 +252,15 @@ def _parse_pairs(items: Sequence[str] | None, flag: str) -> list[tuple[str, str]
     return pairs
 
 
-def _parse_option(name: str, text: str, default: Any) -> str | int | float | bool:
-    kind = type(default)
-    try:
-        return {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)
-    except (KeyError, ValueError):
-        raise InputError(f"--option {name} must be {describe_type(kind)}, got {text!r}") from None
+def parse_options(problem: str, pairs: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return options of a problem from names and texts; raises UnknownNameError, and InputError for a bad value."""
+    known, options = inspect.signature(find_maker(problem)).parameters, {}
+    for name, text in pairs:
+        if name not in known:
+            raise unknown(f"option of {problem}", name, known)
+        kind = type(known[name].default)
+        try:
+            options[name] = {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)
+        except (KeyError, ValueError):
+            raise InputError(f"option {name} must be {describe_type(kind)}, got {text!r}") from None
+    return options

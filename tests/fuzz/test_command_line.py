@@ -29,7 +29,7 @@ KEPT = (
     ("simulate", "walk.json", "--steps", "1000000000"),
     ("simulate", "walk.json", "--period-ms", "1e-9"),
     ("simulate", "walk.json", "--period-ms", "1e9"),
-    ("motors", "--starts", "1000000000"),
+    ("variants", "--starts", "1000000000"),
     ("prices", "walk12", "--starts", "1000000000"),
     ("robust", "--samples", "1000000000"),
     ("pareto", "nao-ssp", "--points", "1000000000"),

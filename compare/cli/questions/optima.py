@@ -1,8 +1,11 @@
-"""Commands about optima: how certain they are (``certainty``), and how they change (``motions``, ``prices``, ``walk``, ...)."""
+"""Commands about optima: how certain they are (``certainty``), and how they change (``variants``, ``prices``, ``walk``, ...)."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,12 +22,18 @@ from compare.cli.options import (
     Seed,
     name_all,
     parse_names,
+    parse_options,
+    parse_pairs,
 )
 from compare.cli.printing import print_json, show_progress, stdout
 from compare.cli.questions.output import Output
 from compare.cli.simulate import DriveOptions
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
+from nlp_gait.formulation import GaitProblem
+
+if TYPE_CHECKING:
+    from compare.questions.variants import Variant
 
 
 @command
@@ -103,52 +112,73 @@ def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: b
 
 
 @command
-def motions(
+def variants(
     *,
-    problem: Annotated[str, typer.Argument(metavar="[nao-ssp|nao-dsp]")] = "nao-ssp",
-    orders: Annotated[
-        str, typer.Option(help="Motions of hip, foot and arms, separated by commas.")
-    ] = "cubic,quintic,spline-2,spline-4,spline-8",
-    free_orders: Annotated[
-        str, typer.Option(help="Motions of free joints, separated by commas; empty for none.")
-    ] = "spline-2,spline-4,spline-8,spline-16",
+    over: Annotated[
+        str | None,
+        typer.Option(
+            metavar="motors|trajectory|OPTION=V1,V2,...",
+            help="Real motors, feature by feature; richer and richer motions with free joints at the end; "
+            "or values of an option.",
+        ),
+    ] = None,
+    variant: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME:OPTION=VALUE,...",
+            help="A variant by name, next to the problem itself; `problem` is another problem's name; repeatable.",
+        ),
+    ] = None,
     starts: Annotated[
-        int, typer.Option(min=0, max=100000, help="Random starts for each order, next to the simpler optimum.")
-    ] = 1,
-    seed: Seed = 0,
-    robot: Annotated[str, typer.Option(help="nao-v5, nao-v6, nao-v4, or a robot file.")] = "nao-v5",
-    intervals: Annotated[int, typer.Option(min=1, help="Intervals of the phase.")] = 10,
-    output: Output,
-) -> None:
-    """Solve a NAO phase with richer and richer motions: what the paper's cubics cost, and the least power of richer motions.
-
-    Each order starts from the optimum of the one before, which it contains exactly. Free joints take minutes each.
-    Rerun the command to continue after an interruption.
-
-    Example: `nlp-gait motions nao-dsp`. One order alone: `nlp-gait solve nao-dsp --option trajectory=spline-4`
-    """
-    from compare.questions.motions.motion import load_phase
-    from compare.questions.motions.motions import Motions
-
-    phase, rising, free = load_phase(problem, robot, intervals), parse_names(orders), parse_names(free_orders)
-    output.answer(Motions(problem=phase, orders=rising, free_orders=free, starts=starts, seed=seed))
-
-
-@command
-def motors(
-    *,
-    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts for each variant.")] = 10,
+        int, typer.Option(min=1, max=100000, help="Starts of each variant, an earlier optimum among them.")
+    ] = 10,
     seed: Seed = 0,
     problem: NaoPhase,
     output: Output,
 ) -> None:
-    """Solve a NAO phase with real motors: speed and torque limits, coupled ankles, braking, heat and rotor of each motor.
+    """Solve variants of a problem, each from the richest earlier one that it contains, and show what changes.
 
-    Example: `nlp-gait motors nao-ssp`. One variant alone: `nlp-gait solve nao-ssp --option motors=limits,heat`
+    Free joints take minutes each. Rerun the command to continue after an interruption.
+
+    Examples: `nlp-gait variants nao-ssp --over motors`, `nlp-gait variants nao-dsp --over trajectory --starts 2`,
+    `nlp-gait variants nao-ssp --variant "smooth:objective=jerk" --variant "quick motors:motors=limits,rotor"`
     """
-    from compare.questions.real_motors import RealMotors
+    from compare.questions.variants import Variants
 
-    output.answer(RealMotors(problem=problem.load(), starts=starts, seed=seed))
+    base = problem.load()
+    output.answer(Variants(problem=base, variants=_list_variants(base, over, variant), starts=starts, seed=seed))
+
+
+def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] | None) -> list[Variant]:
+    """Return the variants that ``--over`` and ``--variant`` describe."""
+    from compare.questions.variants import MOTORS, PROBLEM, Variant, list_trajectories
+
+    option, _, values = (over or "").partition("=")
+    if over is None:
+        found = [Variant(name="as given")]
+    elif values:
+        found = [
+            Variant(name=value, options=parse_options(problem.address, [(option, value)]))
+            for value in parse_names(values)
+        ]
+    elif option in ("motors", "trajectory"):
+        found = [*(MOTORS if option == "motors" else list_trajectories(problem))]
+    else:
+        raise InputError(f"--over takes motors, trajectory or OPTION=VALUE,VALUE,..., got {over!r}")
+    for text in named or ():
+        name, _, rest = text.partition(":")
+        parts: list[str] = []
+        for part in rest.split(","):  # a value may contain commas
+            parts = [*parts, part] if "=" in part else [*parts[:-1], f"{parts[-1]},{part}" if parts else part]
+        options = dict(parse_pairs(parts, "--variant NAME:"))
+        other = options.pop(PROBLEM, "")
+        changed = parse_options(other or problem.address, options.items())
+        found.append(Variant(name=name.strip(), options=changed, problem=other))
+    if len(found) < 2:
+        raise InputError(
+            "name at least two variants by --over or --variant; the problem itself is one of those of --variant"
+        )
+    return found
 
 
 @command

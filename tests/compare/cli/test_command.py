@@ -25,7 +25,7 @@ OF_A_PROBLEM = (
     "prices",
     "pareto",
     "certainty",
-    "motors",
+    "variants",
     "robust",
 )
 

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.questions import prices
-from compare.questions import real_motors as motors
+from compare.questions import prices, variants
 from compare.questions.pareto import front as pareto_front
 from compare.questions.robust import robust_gait as robust
 from nlp_gait.backends.solvers.solver import IterationWatch
@@ -157,25 +156,27 @@ def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_stored_results(
     )
 
 
-def test_ctrl_c_in_motors_writes_the_finished_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motors, "solve", pressed_in_call(2, motors.solve))
-    done = nlp_gait("motors", "nao-ssp", "--intervals", "3", "--starts", "1", "--out", tmp_path, status=130)
+def test_ctrl_c_in_variants_writes_the_finished_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(variants, "solve", pressed_in_call(2, variants.solve))
+    done = nlp_gait(
+        *("variants", "nao-ssp", "--over", "motors", "--intervals", "3", "--starts", "1", "--out", tmp_path), status=130
+    )
     assert (
         f"interrupted after 1 of 8 variants; the results are in {tmp_path}; rerun the command to continue\n"
         in done.stderr
     )
-    assert len((tmp_path / "nao-ssp-motors.csv").read_text().splitlines()) == 2
+    assert len((tmp_path / "nao-ssp-variants.csv").read_text().splitlines()) == 2
 
 
 def test_ctrl_c_before_the_first_result_counts_the_stored_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in (motors, robust):
+    for module in (variants, robust):
         monkeypatch.setattr(module, "solve", press)
     monkeypatch.setattr(prices, "Continuation", press)
     out = ["--out", tmp_path]
     kept = f"finished results are stored in {tmp_path}; rerun the command to continue\n"
-    assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("motors", *out, status=130)
+    assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("variants", "--over", "motors", *out, status=130)
     assert f"interrupted; 2 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
     assert f"interrupted; 3 {kept}" in one_sentence("prices", "walk12", *out, status=130)
     assert [path.name for path in tmp_path.iterdir()] == ["store"]

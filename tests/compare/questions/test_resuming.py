@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 import nlp_gait
 from compare.cli import app
-from compare.questions import local_optima, real_motors
+from compare.questions import local_optima
 from compare.study.store import Store, encode_outcome, parse_outcome, store_runs
 from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.solve import run_starts
@@ -37,7 +37,7 @@ WHOLE = {
     "sweep by a search": (
         "sweep", "walk12", "--over", "foot_lift_m=0.01:0.03:3", "--algorithm", "random", "--evaluations", "200",
     ),
-    "motors": ("motors", *NAO),
+    "variants": ("variants", *NAO, "--variant", "limits:motors=limits"),
     "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
 }  # fmt: skip
 # Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
@@ -54,7 +54,6 @@ class Killed(BaseException):
 @pytest.fixture(autouse=True)
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_optima, "BATCH", 2)
-    monkeypatch.setattr(real_motors, "VARIANTS", dict(list(real_motors.VARIANTS.items())[:2]))
 
 
 def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:

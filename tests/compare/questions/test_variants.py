@@ -1,0 +1,139 @@
+"""Variants of a problem: what is solved, from where, and what the command writes of it."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.questions.question import find
+from compare.questions.variants import (
+    MOTORS,
+    SolvedVariant,
+    Variant,
+    Variants,
+    convert_motion,
+    list_trajectories,
+    load_variant,
+)
+from nlp_gait import load
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
+RUN = CliRunner()
+
+
+def run(*arguments: str) -> Any:
+    done = RUN.invoke(app, ["variants", *arguments, "--json"])
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def problem() -> GaitProblem:
+    return load("nao-dsp", intervals=2)
+
+
+@pytest.fixture(scope="module")
+def found(problem: GaitProblem) -> tuple[SolvedVariant, ...]:
+    names = ("cubic", "quintic", "spline-8, few samples")
+    some = [variant for variant in list_trajectories(problem) if variant.name in names]
+    some[-1] = Variant(name="few samples", options={**some[-1].options, "trajectory": "quintic"}, alone=True)
+    return find(Variants(problem=problem, variants=some, starts=1))
+
+
+def test_a_quintic_needs_less_and_hides_power_between_few_samples(found: tuple[SolvedVariant, ...]) -> None:
+    cubic, quintic, coarse = found
+    assert all(variant.feasible for variant in found)
+    assert [variant.start for variant in found] == ["", "cubic", "quintic"]
+    assert quintic.objective < 0.9 * cubic.objective
+    assert quintic.dense is not None and coarse.dense is not None
+    assert quintic.objective == pytest.approx(quintic.dense["power_W"], rel=0.15)
+    assert coarse.objective < 0.1 * coarse.dense["power_W"] and coarse.worst.startswith("torque_change")
+    assert quintic.variables == cubic.variables + 14 and quintic.moved is None
+
+
+def test_a_richer_motion_contains_a_simpler_one(problem: GaitProblem, found: tuple[SolvedVariant, ...]) -> None:
+    quintic = found[1]
+    planned = load_variant(problem, Variant(name="quintic", options=quintic.options))
+    value = build_exact_model(planned).at(planned.check_x(quintic.x), planned.p).cost
+    for name, options in (
+        ("nao-dsp", {"trajectory": "spline-4"}),
+        ("nao-dsp-free", {"trajectory": "quintic"}),
+    ):
+        richer = (
+            load(name, **problem.options | options | {"samples_per_interval": 4})
+            if name == "nao-dsp"
+            else load(name, intervals=2, samples_per_interval=4, **options)
+        )
+        x = convert_motion(quintic.x, richer)
+        assert x is not None
+        assert build_exact_model(richer).at(x, richer.p).cost == pytest.approx(value, rel=1e-9)
+        assert convert_motion(richer.by_name(x), planned) is None or name == "nao-dsp"
+    assert convert_motion(quintic.x, problem) is None
+
+
+def test_lists_of_trajectories() -> None:
+    variants = list_trajectories(load("nao-ssp"))
+    assert [(v.problem, v.options["trajectory"], v.options["samples_per_interval"]) for v in variants] == [
+        *(("", order, 4) for order in ("cubic", "quintic", "spline-2", "spline-4", "spline-8")),
+        ("", "spline-8", 1),
+        *(("", "spline-4", 4),) * 2,
+        *(("nao-ssp-free", order, 8) for order in ("spline-2", "spline-4", "spline-8", "spline-16")),
+    ]
+    assert [v.alone for v in variants] == [False] * 5 + [True] * 7
+
+
+def test_the_command_reports_what_each_feature_of_the_motors_changes(tmp_path: Path) -> None:
+    named = ["--variant", "limits:motors=limits", "--variant", "K:motors=limits,ankle,heat"]
+    answer = run("nao-dsp", *named, "--starts", "1", "--out", str(tmp_path))
+    published, limited, heated = answer["variants"]
+    assert [v["options"] for v in answer["variants"]] == [{}, {"motors": "limits"}, {"motors": "limits,ankle,heat"}]
+    assert published["objective"] == pytest.approx(0.531886, abs=1e-6)
+    assert limited["objective"] == pytest.approx(published["objective"], rel=1e-6)
+    assert limited["unchanged_violation"] == 0.0
+    assert heated["objective"] < heated["unchanged"] and heated["as_first"] > published["objective"]
+    rows = list(csv.DictReader((tmp_path / "nao-dsp-variants.csv").read_text().splitlines()))
+    assert [row["name"] for row in rows] == ["as given", "limits", "K"]
+    assert {path.suffix for path in map(Path, answer["files"])} == {".html", ".md", ".csv", ".png", ".svg", ".json"}
+
+
+def test_values_of_an_option_of_any_problem(tmp_path: Path) -> None:
+    answer = run(
+        "nao-dsp", "--over", "step_length_m=0.05,0.06", "--intervals", "2", "--starts", "1", "--out", str(tmp_path)
+    )
+    short, long = answer["variants"]
+    assert short["options"] == {"step_length_m": 0.05} and short["objective"] < long["objective"]
+    assert np.isfinite(short["moved"])
+
+
+def test_the_first_set_of_motors_is_the_published_one() -> None:
+    assert MOTORS[0].options == {"motors": ""} and len(MOTORS) == 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["walk12", "--over", "motors"], "unknown option of walk12 'motors'"),
+        (["nao-ssp", "--over", "speed"], "--over takes motors, trajectory or OPTION"),
+        (["nao-ssp"], "name at least two variants"),
+        (["nao-ssp", "--variant", "fast:speed"], "--variant NAME: takes NAME=VALUE"),
+        (["nao-ssp", "--variant", "fast:speed=3"], "unknown option of nao-ssp 'speed'"),
+        (["nao-ssp", *["--variant", "a:motors=limits"] * 2], "each with its own name"),
+    ],
+)
+def test_others_are_rejected(arguments: list[str], message: str, tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["variants", *arguments, "--out", str(tmp_path)])
+    assert done.exit_code == 1 and message in done.stderr
+
+
+def test_variants_need_names(problem: GaitProblem) -> None:
+    with pytest.raises(InputError, match="at least one"):
+        Variants(problem=problem, variants=())
