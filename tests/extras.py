@@ -9,12 +9,11 @@ import pytest
 
 # Packages by the extra of pyproject.toml that a message names.
 PACKAGES = {
-    "algorithms": ("cma", "pymoo"),
+    "algorithms": ("cma", "pymoo", "optuna"),
     "bayes": ("egobox",),
     "cluster": ("dask", "distributed"),
     "sim": ("mujoco",),
     "suites": ("pymoo", "cma", "ioh", "pygmo"),
-    "tune": ("optuna",),
     "urdf": ("urdf_parser_py", "lxml"),
     "video": ("imageio_ffmpeg",),
 }

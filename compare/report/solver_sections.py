@@ -3,8 +3,10 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from compare.analysis.anytime import EQUIVALENT, SHARES, AnytimeScore, score_anytime
-from compare.analysis.comparison import Comparison
+import numpy as np
+
+from compare.analysis.anytime import SHARES, compute_gaps
+from compare.analysis.comparison import Comparison, index_solvers
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import count
@@ -62,23 +64,21 @@ def _make_wins(comparisons: Sequence[Comparison], solver: str) -> Table:
 
 
 def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
-    """Return the table of anytime scores and the critical-difference diagram, of solvers that ran on all problems."""
-    scores, ranking = score_anytime(comparisons), rank_over_problems(comparisons)
-    pairs = len(comparisons) * (len(scores) - 1)
-    header = ("solver", "best", "95 %", "area", "dominates", "dominated")
+    """Return gaps and running times of solvers that ran on all problems, and the critical-difference diagram."""
+    ranking = rank_over_problems(comparisons)
+    found, gaps = index_solvers(comparisons)[0], compute_gaps(comparisons)
+    rows = []
+    for name in ranking.mean_ranks:
+        if all(solvers[name].has_costs("evaluations") for solvers in found):
+            medians = [float(np.median(column)) for column in gaps[name].T]
+            costs = [float(np.median([solvers[name].expected_cost(target) for solvers in found])) for target in TARGETS]
+            shown = (format_percent(gap) if math.isfinite(gap) else "infeasible" for gap in medians)
+            rows.append((name, *shown, *map(count, costs)))
+    header = ("solver", *(f"after {100 * share:g} %" for share in SHARES), *(f"to {100 * t:g} %" for t in TARGETS))
     parts: list[Part] = [
-        "Best: probability of being the best of these solvers on another problem like these, from a Bayesian Plackett-Luce model "
-        "of the ranks of the final median gaps, with its 95 % interval; gaps that differ by at most "
-        f"{100 * EQUIVALENT:g} % of the best known are equivalent. Area: over the convergence curve (AOCC), mean over runs and "
-        "evaluations of the gap's logarithm, 1 at 1e-6 and 0 from 100 % on. Dominates: "
-        f"pairs of problem and other solver, of {pairs}, on which the median gap is nowhere higher over the whole budget and "
-        "somewhere lower. A gradient method has no result before its end.",
-        make_text_table(header, [_format_score(score) for score in scores], "Solvers at all budgets"),
-        make_text_table(
-            ("solver", *(f"after {100 * share:g} %" for share in SHARES), *(f"to {100 * t:g} %" for t in TARGETS)),
-            [_format_fixed(score) for score in scores],
-            "Medians over the problems: gap after a share of the budget, and expected evaluations to a gap",
-        ),
+        "Medians over the problems: gap after a share of the budget, and expected evaluations to a gap. A gradient method has no "
+        "result before its end.",
+        make_text_table(header, rows, "Solvers at all budgets"),
     ]
     if ranking.critical_difference is not None:
         parts.append(
@@ -89,17 +89,6 @@ def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
             )
         )
     return Section(title="At all budgets", parts=parts)
-
-
-def _format_score(score: AnytimeScore) -> tuple[str, ...]:
-    low, high = score.interval
-    ends = (f"{score.area:.3f}", str(score.dominates), str(score.dominated))
-    return score.solver, f"{100 * score.best:.0f} %", f"{100 * low:.0f} to {100 * high:.0f} %", *ends
-
-
-def _format_fixed(score: AnytimeScore) -> tuple[str, ...]:
-    gaps = (format_percent(gap) if math.isfinite(gap) else "infeasible" for gap in score.gaps)
-    return score.solver, *gaps, *(count(cost) for cost in score.costs)
 
 
 def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:
@@ -118,10 +107,9 @@ def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:
     header = ("solver", "area before", "tuned", "trials", "evaluations", "time of all runs", "chosen settings")
     words = (
         f"A trial of a search is one run on each of {join_words(tunings[0].training)}, which are not judged here or have other "
-        "seeds; the first has the settings before. Optuna's tree-structured Parzen estimator proposes the others within the "
-        "ranges that belong to the search's settings, and the trial with the largest mean area over the convergence curve "
-        "(AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before the judged runs, and are not counted "
-        "there."
+        "seeds. Optuna's tree-structured Parzen estimator proposes settings within their ranges, and the trial with the largest "
+        "mean area over the convergence curve (AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before "
+        "the judged runs, and are not counted there."
     )
     table = make_text_table(header, rows, "Settings before and after tuning", prose=True)
     return (Section(title="Tuning", parts=(words, table)),)

