@@ -1,6 +1,6 @@
 """Public humanoids side by side: ten starts, searches, and steps and cycles at one Froude number, model and engine.
 
-    python -m benchmarks.humanoids [starts] [searches] [steps] [cycles] [cart-table] [--robots jvrc,g1,...]
+    python -m benchmarks.humanoids [starts] [searches] [steps] [cycles] [--robots jvrc,g1,...]
 
 Robots come from the packages ``jvrc-description`` and ``example-robot-data``; what is not installed is left out and said.
 """
@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -175,56 +174,6 @@ def cycles(files: dict[str, str]) -> Iterator[str]:
         )
 
 
-def cart_table(files: dict[str, str]) -> Iterator[str]:
-    """The textbook's walk on the footsteps of the cheapest cycle at NAO's 0.03 m/s times the root of lambda, and that cycle."""
-    from compare.questions.question import find
-    from compare.questions.sweep import parse_axis
-    from compare.questions.walk.planners import CART_TABLE
-    from compare.questions.walk.walk import CheapestWalk
-    from nlp_gait.simulation.drive import FEEDBACKS, Drive
-
-    yield header(
-        "robot", "speed m/s", "step m", "times s", "textbook W, optimum W, saved", "engine", "textbook's notes"
-    )
-    for name, file in files.items():
-        problem = nlp_gait.load("humanoid-cycle", robot=file, objective="power")
-        question = CheapestWalk(problem=problem, axis=parse_axis(f"speed_m_s={problem.value('speed_m_s')!r}"), starts=1)
-        (least,) = find(question).gaits
-        if not least.point.feasible:
-            yield cells(name, f"{least.at:.4f}", "-", "-", least.point.status, "-", "-")
-            continue
-        engine = []
-        for feedback, words in ((None, "open loop"), (FEEDBACKS["torso-spring"], "torso-spring")):
-            drive = Drive(feedback=feedback)
-            found = find(replace(question, steps=STEPS, drive=drive, planners=[CART_TABLE]))
-            (best,), (cart,) = found
-            if cart.walk is None or best.walk is None:
-                break  # no height of the hip reaches
-            fell = [walk.measurements.fell_at_s for walk in (cart.walk, best.walk)]
-            energies = [walk.engine_J_per_planned_m or np.nan for walk in (cart.walk, best.walk)]
-            if fell == [None, None]:
-                engine.append(f"{words}: {watts(*(energy * least.at for energy in energies))}")
-                break
-            said = [
-                f"{who} falls at {at_s:.1f} s" for who, at_s in zip(("textbook", "optimum"), fell, strict=True) if at_s
-            ]
-            engine.append(f"{words}: {', '.join(said)}")
-        yield cells(
-            name,
-            f"{least.at:.4f}",
-            f"{least.indexes['step_length_m']:.3f}",
-            " + ".join(f"{least.point.x[key]:.3f}" for key in problem.display.durations),
-            watts(cart.indexes.get("power_W", np.nan), least.indexes["power_W"]),
-            "; ".join(engine),
-            "; ".join((cart.note, *cart.broken)),
-        )
-
-
-def watts(textbook: float, optimum: float) -> str:
-    """Mean powers [W], and what the optimum saves."""
-    return f"{textbook:.3f}, {optimum:.3f}, {100.0 * (1.0 - optimum / textbook):.1f} %"
-
-
 def leg_of(problem: GaitProblem) -> float:
     """Length of a leg [m]."""
     assert problem.display.robot is not None
@@ -236,7 +185,6 @@ GROUPS: dict[str, Callable[[dict[str, str]], Iterator[str]]] = {
     "searches": searches,
     "steps": steps,
     "cycles": cycles,
-    "cart-table": cart_table,
 }
 
 

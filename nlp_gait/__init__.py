@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from nlp_gait.backends.functions.compiled_function import compile_function as compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective as CompiledObjective
     from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
-    from nlp_gait.backends.optima.gait_library import GaitLibrary as GaitLibrary
-    from nlp_gait.backends.optima.gait_library import LibraryGait as LibraryGait
-    from nlp_gait.backends.optima.gait_library import load_library as load_library
     from nlp_gait.backends.plan_walk import WalkPlan as WalkPlan
     from nlp_gait.backends.plan_walk import plan_walk as plan_walk
     from nlp_gait.backends.solve import solve as solve
@@ -42,7 +39,6 @@ _PUBLIC = {
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",
-    "nlp_gait.backends.optima.gait_library": "GaitLibrary LibraryGait load_library",
 }
 _PLACES = {name: f"{module}:{name}" for module, names in _PUBLIC.items() for name in names.split()}
 __all__ = sorted(_PLACES)

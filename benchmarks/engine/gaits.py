@@ -10,8 +10,8 @@ import numpy as np
 
 import nlp_gait
 from compare.questions.question import find
-from compare.questions.sweep import Axis
-from compare.questions.walk.walk import CheapestWalk
+from compare.questions.sweep import Axis, Sweep
+from compare.questions.swept_walks import SweepPoint
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
@@ -33,11 +33,16 @@ DRAWS, BATCH = 100, 20_000  # candidates of random gaits: at most DRAWS batches
 
 @cache
 def optimal_cycles(speeds: Sequence[float] = SPEEDS, **options: Any) -> Mapping[float, Result]:
-    """Return the cheapest cycle at each speed [m/s], as ``nlp-gait walk``."""
+    """Return the cheapest cycle at each speed [m/s], as ``nlp-gait sweep``."""
     problem = nlp_gait.load("nao-cycle", objective="power", **options)
     axis = Axis(name="speed_m_s", values=tuple(speeds))
-    gaits = find(CheapestWalk(problem=problem, axis=axis, starts=3)).gaits
-    return {gait.at: gait.result for gait in gaits if gait.point.feasible}
+    points = find(Sweep(problem=problem, axes=[axis], starts=3))
+    return {point.at[axis.name]: _place(problem, point) for point in points if point.feasible}
+
+
+def _place(problem: GaitProblem, point: SweepPoint) -> Result:
+    placed = problem.place(point.at)
+    return Result(problem=placed, x=placed.check_x(point.x))
 
 
 @cache

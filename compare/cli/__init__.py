@@ -16,7 +16,7 @@ from compare.cli.evaluate import evaluate
 from compare.cli.exchange import archive, cite, import_results, logs, verify
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
-from compare.cli.questions.optima import capabilities, certainty, prices, robust, sweep, variants, walk
+from compare.cli.questions.optima import capabilities, certainty, prices, robust, sweep, variants
 from compare.cli.questions.pareto import pareto
 from compare.cli.report import report, reproduce
 from compare.cli.simulate import simulate
@@ -25,7 +25,7 @@ from compare.cli.solve import plan, search, solve
 PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, plan, search),
     "Comparison": (compare, import_results, report, reproduce, bench, verify, archive),
-    "Questions": (sweep, prices, pareto, certainty, variants, robust, walk, capabilities),
+    "Questions": (sweep, prices, pareto, certainty, variants, robust, capabilities),
     "Show and share": (simulate, animate, export, logs, export_objective, export_solver, cite),
 }
 

@@ -6,7 +6,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -190,3 +190,12 @@ def inline_svg(svg: str, prefix: str, title: str) -> str:
     svg = svg.replace("fill: #ffffff", "fill: none").replace(INK, "currentColor").replace("#d0d0d0", "var(--grid)")
     # Text without a fill is black by default, in a dark page too.
     return svg.replace("<svg ", f'<svg role="img" aria-label="{title}" fill="currentColor" ', 1)
+
+
+def mark_values(
+    axes: Axes, values: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", height: float = 0.03
+) -> None:
+    """Mark values of x at a share of the axes' height."""
+    if values:
+        transform = axes.get_xaxis_transform()
+        axes.plot(values, [height] * len(values), marker, color=colour, label=label, transform=transform)

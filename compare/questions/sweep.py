@@ -3,29 +3,31 @@
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar, cast
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import format_quantity, list_units, make_axis_label, with_unit
-from compare.drawing.figures import COLOURS, make_axes, use_style
+from compare.drawing.figures import COLOURS, make_axes, mark_values, use_style
 from compare.questions.question import Answer, Question, Work, make_record_table
+from compare.questions.swept_walks import COST, SweepPoint, check_cycle, report_walks, simulate_walk
 from compare.report.document import Figure, make_text_table
 from compare.study.record import RunRecord, parse_record
 from compare.study.references import find_reference
 from compare.study.run_task import run_task, try_task
-from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task, describe_problem
+from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.solution import Solution
 from nlp_gait.interrupts import Interrupted, remember_interrupts
+from nlp_gait.simulation.engine import load_mujoco
 
 MOST_POINTS = 10_000  # of an axis, and of the whole grid
 
@@ -56,20 +58,6 @@ def parse_axis(text: str) -> Axis:
     return Axis(name=name, values=tuple(numbers))
 
 
-@dataclass(frozen=True, kw_only=True)
-class SweepPoint:
-    """Result at one point of the grid."""
-
-    at: Mapping[str, float]  #: value of each axis
-    objective: float  #: exact value, in the problem's sense
-    feasible: bool  #: a feasible optimum was found
-    status: str  #: in words; without a feasible point it names the violated constraints
-    x: Mapping[str, float]  #: by variable name
-    violation: float  #: exact total violation
-    evaluations: int  #: calls of f
-    time_s: float  #: wall time [s]
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sweep(Question[list[SweepPoint]]):
     """How does the optimum move with one or more parameters?
@@ -86,13 +74,16 @@ class Sweep(Question[list[SweepPoint]]):
     starts: int = 5  #: random starts of an NLP solver at both ends of its path, and where no neighbour helps
     evaluations: int = 10_000  #: budget of a search, and of a run of SLSQP
     seed: int = 0  #: of starts and searches
+    steps: int = 0  #: of each walking cycle to simulate in the engine, open loop; 0 for none (extra ``sim``)
 
     def __post_init__(self) -> None:
         """Validate the grid and the algorithm.
 
         Raises:
             UnknownNameError: an axis is neither a variable nor a parameter; an unknown algorithm.
-            InputError: a value is not allowed, an axis is duplicated, or the grid has too many points.
+            InputError: a value is not allowed, an axis is duplicated, the grid has too many points, or the problem is not a
+                walking cycle whose steps can be simulated.
+            MissingExtraError: MuJoCo is needed and not installed.
         """
         names = [axis.name for axis in self.axes]
         if len(set(names)) < len(names):
@@ -104,6 +95,9 @@ class Sweep(Question[list[SweepPoint]]):
                 f"a sweep takes at most {MOST_POINTS} points in all, got {spans} = {points}; take fewer of each"
             )
         check_task(self._tasks[0])
+        if self.steps:
+            check_cycle(self.problem)
+            load_mujoco()
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -112,7 +106,8 @@ class Sweep(Question[list[SweepPoint]]):
     @property
     def total(self) -> int:
         # An NLP solver solves twice at each point of the grid.
-        return math.prod(len(axis.values) for axis in self.axes) * (2 if self.algorithm in GRADIENT_SOLVERS else 1)
+        solves = 2 if self.algorithm in GRADIENT_SOLVERS else 1
+        return math.prod(len(axis.values) for axis in self.axes) * (solves + bool(self.steps))
 
     def find(self, work: Work) -> Iterator[list[SweepPoint]]:
         """Yield the points, in row-major order of the axes."""
@@ -135,13 +130,50 @@ class Sweep(Question[list[SweepPoint]]):
             if not tasks[0].is_search:
                 interrupt = Interrupted(f"{error.sentence}, not all of them solved in both directions", None)
         found = {
-            tuple(at.values()): _make_point(at, end) for at, end in zip(path, ends, strict=False) if end is not None
+            tuple(at.values()): self._make_point(at, end)
+            for at, end in zip(path, ends, strict=False)
+            if end is not None
         }
         grid = [found[at] for at in itertools.product(*(axis.values for axis in self.axes)) if at in found]
         if grid:
             yield grid
         if interrupt is not None:
             raise interrupt
+        for i, point in enumerate(grid if self.steps else ()):
+            if point.feasible:
+                placed = self.problem.place(point.at)
+                result = Result(problem=placed, x=placed.check_x(point.x))
+                grid[i] = replace(point, walk=simulate_walk(result, self.steps, work))
+                yield grid
+            work.progress("")
+
+    def _make_point(self, at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:
+        if isinstance(end, Solution):
+            placed = self.problem.place(at)
+            indexes = build_exact_model(placed).at(placed.check_x(end.x), placed.p).indexes
+            return SweepPoint(
+                at=at,
+                objective=end.objective,
+                feasible=end.converged,
+                status=end.status,
+                x=end.x,
+                violation=end.violation,
+                evaluations=end.evaluations.f,
+                time_s=end.time_s.solve,
+                indexes=indexes,
+            )
+        verdict = end.verdict
+        return SweepPoint(
+            at=at,
+            objective=verdict.objective,
+            feasible=verdict.feasible,
+            status=end.status if verdict.feasible else f"infeasible: {'; '.join(verdict.violated)}",
+            x=end.x,
+            violation=verdict.violation,
+            evaluations=end.evaluations["f"],
+            time_s=end.time_s.solve,
+            indexes=verdict.indexes,
+        )
 
     @cached_property
     def _path(self) -> list[dict[str, float]]:
@@ -181,9 +213,18 @@ class Sweep(Question[list[SweepPoint]]):
             parts=(
                 make_text_table((*axes, objective.name, "status", "best known"), rows, "Optima"),
                 Figure(name=stem, caption=shown, drawing=plot_sweep(findings, problem, solver)),
-                make_record_table(stem, findings),
+                *report_walks(problem, findings),
+                make_record_table(stem, [point.to_row() for point in findings]),
             ),
             data={"problem": problem.name, "points": [asdict(point) for point in findings]},
+            results={
+                "-".join((problem.name, *(f"{name}-{value:g}" for name, value in point.at.items()))): {
+                    **describe_problem(problem.place(point.at)),
+                    "x": dict(point.x),
+                }
+                for point in findings
+                if point.feasible and COST in point.indexes
+            },
         )
 
 
@@ -212,31 +253,6 @@ def _run_search(task: Task) -> dict[str, Any]:
     return record.to_json()
 
 
-def _make_point(at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:
-    if isinstance(end, Solution):
-        return SweepPoint(
-            at=at,
-            objective=end.objective,
-            feasible=end.converged,
-            status=end.status,
-            x=end.x,
-            violation=end.violation,
-            evaluations=end.evaluations.f,
-            time_s=end.time_s.solve,
-        )
-    verdict = end.verdict
-    return SweepPoint(
-        at=at,
-        objective=verdict.objective,
-        feasible=verdict.feasible,
-        status=end.status if verdict.feasible else f"infeasible: {'; '.join(verdict.violated)}",
-        x=end.x,
-        violation=verdict.violation,
-        evaluations=end.evaluations["f"],
-        time_s=end.time_s.solve,
-    )
-
-
 def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem, solver: str) -> Drawing:
     """Plot the optimum over the first axis, with a line for each combination of the others; infeasible points as crosses."""
     first, *others = points[0].at
@@ -258,12 +274,3 @@ def plot_sweep(points: Sequence[SweepPoint], problem: GaitProblem, solver: str) 
         axes.set_ylabel("least " * (objective.sign > 0) + make_axis_label(objective.name, objective.unit))
         figure.legend(loc="outside right upper") if others else axes.legend()
     return figure
-
-
-def mark_values(
-    axes: Axes, values: Sequence[float], label: str, marker: str = "x", colour: str = "0.4", height: float = 0.03
-) -> None:
-    """Mark values of x at a share of the axes' height."""
-    if values:
-        transform = axes.get_xaxis_transform()
-        axes.plot(values, np.full(len(values), height), marker, color=colour, label=label, transform=transform)

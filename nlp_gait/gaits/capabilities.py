@@ -10,11 +10,6 @@ _NAO_RECORDED = "nlp_gait.gaits.nao.problems:make_recorded_gait"
 _NAO_FITTED = "nlp_gait.gaits.nao.free_joints:fit_joints"
 # Makes a gait from recorded joint angles, by the problem whose limits judge it; the first is the default.
 RECORDED_GAITS = {"nao-ssp": _NAO_RECORDED, "nao-dsp": _NAO_RECORDED, "nao-cycle": _NAO_RECORDED}
-# Makes the robot of the textbook's cart-table walk, by the walking cycle whose limits judge it.
-CART_TABLE_BODIES = {
-    "nao-cycle": "nlp_gait.gaits.nao.problems:make_nao_cycles",
-    "humanoid-cycle": "nlp_gait.gaits.humanoid.problems:make_humanoid_cycles",
-}
 # Fits free joints to a planned motion, by the problem with free joints.
 FITTED_STARTS = {"nao-ssp-free": _NAO_FITTED, "nao-dsp-free": _NAO_FITTED}
 

@@ -53,7 +53,7 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (1, (*SOLVE, "--jobs", "2", "--seed", "5")),
     (2, ("export-solver", "walk12", "--to", "out/solver", "--set", "lambda=0.3", "--intervals", "20")),
     (2, ("certainty", "--check", "certificate.json", "--seed", "1", "--json")),
-    (2, ("walk", "--over", "speed_m_s=0.02,0.04", "--starts", "1", "--baseline", "cart-tables", "--out", "walked")),
+    (2, ("sweep", "walk12", "--over", "speed_m_s=0.02,0.04", "--starts", "1", "--engine", "--out", "walked")),
     (1, ("sweep", "walk12", "--over", "lambda=0.2,0.3", "--starts", "1", "--out", "swept")),
     (4, ("compare", "--config", "study.toml", "--out", "study", "--jobs", "1", "--runs", "3")),
     (4, ("compare", "--resume", "--out", "absent")),
@@ -122,7 +122,7 @@ SEED_LINES = (*KNOWN_LINES, *((1, (name, "nothing", "--out", "out")) for name in
 COUNTS = ("--starts", "--runs", "--evaluations", "--jobs", "--poses", "--steps", "--checks")
 BAD_COUNTS = ("0", "-1", "1.5", "", "nan", "many", "9" * 400, "\ud800")
 # Little mutated: with right values they take minutes.
-SLOW = ("bench", "compare", "reproduce", "animate", "walk", *STUDIES)
+SLOW = ("bench", "compare", "reproduce", "animate", *STUDIES)
 # How sentences before the last one may begin: what was fixed in a robot's file, what a result depends on.
 NOTES = ("robot ", "steps ")
 HOSTILE = (

@@ -1,4 +1,4 @@
-"""Commands about optima: how certain they are (``certainty``), and how they change (``variants``, ``prices``, ``walk``, ...)."""
+"""Commands about optima: how certain they are (``certainty``), and how they change (``variants``, ``prices``, ``sweep``, ...)."""
 
 from __future__ import annotations
 
@@ -27,13 +27,15 @@ from compare.cli.options import (
 )
 from compare.cli.printing import print_json, show_progress, stdout
 from compare.cli.questions.output import Output
-from compare.cli.simulate import DriveOptions
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.biped.cycle import SPEED
 
 if TYPE_CHECKING:
     from compare.questions.variants import Variant
+
+CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the objective is the power
 
 
 @command
@@ -235,6 +237,10 @@ def sweep(
     starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts where no neighbour helps.")] = 5,
     evaluations: Evaluations = 10_000,
     seed: Seed = 0,
+    engine: Annotated[
+        bool, typer.Option("--engine", help="Simulate steps of each walking cycle in MuJoCo (extra sim).")
+    ] = False,
+    steps: Annotated[int, typer.Option(min=1, max=1000, help="With --engine: number of steps.")] = 10,
     problem: NamedProblem,
     output: Output,
 ) -> None:
@@ -242,11 +248,18 @@ def sweep(
 
     Rerun the command to continue after an interruption.
 
-    Example: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`
+    With speeds as an axis the objective of a walking cycle is its power. Simulations are open loop.
+
+    Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
+    `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10 --engine`,
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --over speed_m_s=0.02,0.05`
     """
     from compare.questions.sweep import Sweep, parse_axis
 
     axes, effort = [parse_axis(text) for text in over], {"starts": starts, "evaluations": evaluations, "seed": seed}
+    if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
+        problem = replace(problem, option=["objective=power", *(problem.option or ())])
+    effort["steps"] = steps if engine else 0
     output.answer(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort))
 
 
@@ -274,76 +287,3 @@ def capabilities(
     from compare.questions.capabilities import Capabilities
 
     output.answer(Capabilities(problem=problem.make_spec(problem.name).load(), starts=starts, seed=seed))
-
-
-@command
-def walk(
-    *,
-    over: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=LOW:HIGH:COUNT",
-            help="Speeds (default: ten from 0.01 to 0.1 m/s, for humanoids in proportion to the root"
-            " of their leg length), or another parameter or variable; NAME=V1,V2,... Repeatable"
-            " with --library.",
-        ),
-    ] = None,
-    library: Annotated[
-        bool, typer.Option(help="Write a library of gaits with their derivatives, and judge what lies between them.")
-    ] = False,
-    engine: Annotated[
-        bool, typer.Option("--engine", help="Simulate ten steps of each gait in MuJoCo (extra sim).")
-    ] = False,
-    steps: Annotated[int | None, typer.Option(min=0, max=1000, help="Simulate so many steps; 0 for none.")] = None,
-    baseline: Annotated[
-        list[str] | None,
-        typer.Option(help="Planner to compare with, on the same footsteps: cart-table, least-torque; repeatable."),
-    ] = None,
-    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts where no neighbour helps.")] = 5,
-    seed: Seed = 0,
-    drives: DriveOptions,
-    problem: AnyCycle,
-    output: Output,
-) -> None:
-    """Find the cheapest walking cycle at each speed: its cost of transport, and its simulation in a physics engine.
-
-    The problem is nao-cycle, or humanoid-cycle, with the power as its objective; each point starts from its neighbours.
-    Simulations are open loop unless a feedback is named. Rerun the command to continue after an interruption.
-
-    With `--library` the gaits over one or more axes are written with their derivatives, for `nlp_gait.load_library`, and the
-    gaits between them are judged.
-
-    Examples: `nlp-gait walk`, `nlp-gait walk --over speed_m_s=0.02,0.04 --engine`,
-    `nlp-gait walk --library --over speed_m_s=0.03:0.08:6 --over step_length_m=0.05:0.08:4`,
-    `nlp-gait walk --baseline cart-table --baseline least-torque --engine`,
-    `nlp-gait walk humanoid-cycle --robot my.urdf --over speed_m_s=0.05 --baseline cart-table`,
-    `nlp-gait walk --over ssp_dbm_y_mean_limit_m=0.02:0.035:4 --set speed_m_s=0.03 --steps 10`
-    """
-    from compare.questions.sweep import parse_axis
-    from compare.questions.walk.gait_library import LibraryOfGaits
-    from compare.questions.walk.walk import CheapestWalk, check_cycle, choose_speeds
-    from compare.study.simulations import STEPS
-
-    check_cycle(problem.name)
-    cycle = replace(problem, option=["objective=power", *(problem.option or ())]).make_spec(problem.name).load()
-    axes = [parse_axis(text) for text in over or [choose_speeds(cycle)]]
-    if library:
-        if engine or steps or baseline:
-            raise InputError(
-                "--library simulates nothing and compares no planners; leave out --engine, --steps and --baseline"
-            )
-        output.answer(LibraryOfGaits(problem=cycle, axes=axes, starts=starts, seed=seed))
-        return
-    if len(axes) > 1:
-        raise InputError("walk has one axis, except with --library; leave out the others")
-    output.answer(
-        CheapestWalk(
-            problem=cycle,
-            axis=axes[0],
-            starts=starts,
-            seed=seed,
-            steps=(STEPS if engine else 0) if steps is None else steps,
-            drive=drives.make(),
-            planners=baseline or (),
-        )
-    )

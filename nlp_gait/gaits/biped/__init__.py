@@ -13,5 +13,5 @@ From a robot to the first constraint, in reading order:
 
 ``support_phases.py`` composes a phase, ``cycle.py`` joins both; ``phase_problem.py`` makes the problem.
 ``load_sharing.py`` divides the load between two standing feet. ``recorded_*.py`` judge motions that are given as angles over
-time by the same limits, ``cart_table.py`` plans such a motion by the textbook.
+time by the same limits.
 """

@@ -11,7 +11,6 @@ from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, share_load
 from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem
-from nlp_gait.gaits.biped.recorded_cycle import RecordedCycles
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.humanoid.body import make_humanoid
@@ -138,12 +137,3 @@ def humanoid_walk(
         if slope_deg:
             raise InputError(f"stairs are level, but slope_deg is {slope_deg:g}; leave out one of them")
     return plan_whole_walk(body, steps, grid, flight)
-
-
-def make_humanoid_cycles(robot: str = "nao-v5", intervals: int = 10, drive_limits: bool = True) -> RecordedCycles:
-    """Return a humanoid and the limits of ``humanoid-cycle``, by which its recorded cycles are judged."""
-    return RecordedCycles(
-        body=make_humanoid(robot, drive_limits=drive_limits),
-        intervals=intervals,
-        options={"robot": robot, "intervals": intervals, "drive_limits": drive_limits},
-    )

@@ -83,13 +83,6 @@ def test_every_command_that_builds_any_problem_takes_the_same_six_options(name: 
     assert [options[option].help for option in SHARED] == [known[option].help for option in SHARED]
 
 
-def test_walk_takes_those_that_a_cycle_has() -> None:
-    options = [parameter.opts[0] for parameter in typer.main.get_command(app).commands["walk"].params]  # type: ignore[attr-defined]
-    assert [option for option in SHARED if option not in options] == ["--derivatives"]
-    refused = RUN.invoke(app, ["walk", "--derivatives", "analytic"])
-    assert refused.exit_code == 2 and "No such option" in refused.stderr and "--derivatives" in refused.stderr
-
-
 @pytest.mark.parametrize(
     ("problem", "intervals"), [("nao-ssp", 10), ("walk12", 20), ("stairs-plan", 40), ("stairs-ideal", 70)]
 )

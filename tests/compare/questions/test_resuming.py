@@ -43,7 +43,7 @@ WHOLE = {
 # Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
 BEGUN = {
     "pareto": (*PARETO, "--search", "none"),
-    "walk": ("walk", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2"),
+    "cycles": ("sweep", "nao-cycle", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2"),
 }
 
 
@@ -115,7 +115,7 @@ def end_at_start(problem: GaitProblem, x0: Array, *_: object) -> Outcome:
 
 @pytest.mark.parametrize("case", BEGUN)
 def test_a_second_call_repeats_no_solve(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if case == "walk":  # the others need multipliers
+    if case == "cycles":  # the others need multipliers
         monkeypatch.setattr(Ipopt, "__init__", lambda *_: None)
         monkeypatch.setattr(Ipopt, "run", lambda _, *rest: end_at_start(*rest))
         monkeypatch.setattr(Ipopt, "run_from", lambda _, problem, near, *rest: end_at_start(problem, near.x))

@@ -10,7 +10,8 @@ import pytest
 
 from compare.analysis.units import format_quantity, make_axis_label
 from compare.questions.question import Work, find
-from compare.questions.sweep import Axis, Sweep, SweepPoint, parse_axis, plot_sweep
+from compare.questions.sweep import Axis, Sweep, parse_axis, plot_sweep
+from compare.questions.swept_walks import SweepPoint
 from compare.report.document import Table
 from nlp_gait import load
 from nlp_gait.errors import InputError, UnknownNameError

@@ -1,1 +1,0 @@
-"""A whole walking cycle: its cost of transport over speed, and its playback."""

@@ -1,0 +1,98 @@
+"""Sweeps of walking cycles: cost of transport, results that can be simulated, and the engine."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from compare.cli import app
+from compare.questions.question import Work, find
+from compare.questions.sweep import Sweep, parse_axis
+from compare.questions.swept_walks import SweepPoint
+from compare.report.document import Figure
+from compare.study.store import Store
+from nlp_gait import load
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import load_result
+
+pytestmark = pytest.mark.usefixtures("coarse_pictures")
+
+# Fewer samples than those of ten intervals: the tests are about what is done with the gaits.
+OVER = "speed_m_s=0.04,0.045"
+COMMAND = ["sweep", "nao-cycle", "--over", OVER, "--starts", "1", "--intervals", "2"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with stored solves of the gaits."""
+    return tmp_path_factory.mktemp("walk")
+
+
+@pytest.fixture(scope="module")
+def question() -> Sweep:
+    problem = load("nao-cycle", objective="power", intervals=2)
+    return Sweep(problem=problem, axes=[parse_axis(OVER)], starts=1)
+
+
+@pytest.fixture(scope="module")
+def points(question: Sweep, folder: Path) -> list[SweepPoint]:
+    """Two gaits, and a point without one."""
+    found = find(question, Work(store=Store(folder)))
+    lost = replace(found[1], at={"speed_m_s": 1.0}, feasible=False, status="in the way: step_length")
+    return [*found, lost]
+
+
+def test_gaits_satisfy_the_axis(points: list[SweepPoint]) -> None:
+    assert [point.feasible for point in points] == [True, True, False]
+    for point in points[:2]:
+        assert point.indexes["speed_m_s"] == pytest.approx(point.at["speed_m_s"])
+        assert point.indexes["power_W"] == pytest.approx(point.objective)
+        cost = point.objective / (5.30535 * 9.8 * point.at["speed_m_s"])
+        assert point.indexes["cost_of_transport"] == pytest.approx(cost)
+
+
+def test_the_table_and_the_results_can_be_read_back(question: Sweep, points: list[SweepPoint], tmp_path: Path) -> None:
+    answer = question.report(points)
+    assert [part.name for part in answer.parts if isinstance(part, Figure)][-1] == "nao-cycle-cost"
+    answer.write(tmp_path)
+    rows = list(csv.DictReader((tmp_path / "nao-cycle-sweep-speed_m_s-ipopt.csv").read_text().splitlines()))
+    assert [float(row["at.speed_m_s"]) for row in rows] == [0.04, 0.045, 1.0]
+    assert rows[2]["feasible"] == "false" and float(rows[0]["indexes.step_length_m"]) > 0.0
+    assert not (tmp_path / "nao-cycle-speed_m_s-1.json").exists()
+    for point in points[:2]:
+        speed = point.at["speed_m_s"]
+        result = load_result(tmp_path / f"nao-cycle-speed_m_s-{speed:g}.json")
+        assert result.problem.value("speed_m_s") == speed
+        assert result.problem.by_name(result.x) == point.x
+
+
+def test_nothing_is_drawn_of_cycles_without_a_gait(question: Sweep, points: list[SweepPoint]) -> None:
+    infeasible = [replace(point, feasible=False) for point in points]
+    figures = [part.name for part in question.report(infeasible).parts if isinstance(part, Figure)]
+    assert figures == ["nao-cycle-sweep-speed_m_s-ipopt"]
+
+
+def test_only_walking_cycles_are_simulated() -> None:
+    with pytest.raises(InputError, match="steps of walking cycles, such as nao-cycle; 'nao-ssp' is not one"):
+        Sweep(problem=load("nao-ssp"), axes=[parse_axis("swing_height_m=0.02")], steps=2)
+
+
+def test_the_command_simulates_stored_gaits(points: list[SweepPoint], folder: Path) -> None:
+    pytest.importorskip("mujoco")
+    done = CliRunner().invoke(app, [*COMMAND, "--engine", "--steps", "2", "--out", str(folder), "--json"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)["points"]
+    assert [point["x"] for point in found] == [point.x for point in points[:2]]
+    for point in found:
+        assert point["walk"]["steps_done"] == 2 and not point["walk"]["measurements"]["fallen"]
+        assert point["walk"]["walked_m"] == pytest.approx(point["walk"]["planned_m"], rel=0.3)
+    assert (folder / "nao-cycle-cost.png").exists()
+    page = (folder / "nao-cycle-sweep-speed_m_s-ipopt.md").read_text()
+    assert "Energy of 2 steps in the engine" in page and "2 gaits were simulated, none fell" in page
+    error = found[0]["walk"]["engine_J_per_planned_m"] / found[0]["walk"]["model_J_per_m"] - 1.0
+    assert f"{100 * error:+.2f} %" in page
