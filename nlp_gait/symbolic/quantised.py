@@ -1,4 +1,4 @@
-"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, as printed and linearly implicit.
+"""Temporal quantised Lagrange dynamics under a PD controller: one quantum of time, linearly implicit.
 
 Contacts are springs and dampers with Coulomb friction; implicit, they are stable at every stiffness and gain.
 """
@@ -38,11 +38,10 @@ class Contact(NamedTuple):
     height: SX  #: above the ground [m]
     normal: SX  #: (n,) derivative of the height by the coordinates
     tangent: SX  #: (n,) derivative of the forward position by the coordinates
-    drift: SX = SX(2, 1)  #: (2,) velocity at rest, of a base that moves: up from the ground, and forward [m/s]
 
     def velocity(self, rates: SX) -> tuple[SX, SX]:
         """Return the speeds up from the ground and forward, at rates (n,) of the coordinates."""
-        return ca.dot(self.normal, rates) + self.drift[0], ca.dot(self.tangent, rates) + self.drift[1]
+        return ca.dot(self.normal, rates), ca.dot(self.tangent, rates)
 
 
 class Equations(NamedTuple):
@@ -176,28 +175,3 @@ def implicit_quantum(
     held = control.joints.T @ ca.diag(stiffness) @ control.joints
     mass = motion.M + quantum * motion.C + held + ca.diag(brake)
     return implicit_equations(Equations(mass, force - brake * state.v / quantum), state.v, contacts, ground, quantum)
-
-
-def explicit_quantum(
-    motion: EquationsOfMotion,
-    state: QuantisedState,
-    control: Controller,
-    desired: QuantisedState,
-    contacts: Sequence[Contact],
-    ground: Ground,
-    disturbance: SX,
-) -> Equations:
-    """Return the equations of the acceleration as printed: controller and contacts act on the state at the start of the quantum.
-
-    It is stable only for K_d below twice the least inertia over dt: 0.018 N m s/rad at the toe and dt = 0.01 s.
-
-    Source:
-        Bhardwaj et al., eqs. (33)-(35), (46)-(52); ``desired`` at the start of the quantum, friction against the slip.
-    """
-    torque = controller_torque(control, desired, state, motion.G) + disturbance
-    force = control.joints.T @ torque - motion.C @ state.v - motion.G
-    for contact in contacts:
-        rate, slip = contact.velocity(state.v)
-        pressed = (contact.height <= 0) * (-ground.stiffness * contact.height - ground.damping * rate)  # (eq. 33)
-        force += pressed * (contact.normal - ground.friction * ca.sign(slip) * contact.tangent)  # (eqs. 34, 35)
-    return Equations(motion.M, force)

@@ -14,8 +14,7 @@ import pytest
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.gaits.stairs.track import PLAN
-from tests.referee import nao, stairs, stairs_ideal, stairs_track, walk12
+from tests.referee import nao, stairs, stairs_ideal, walk12
 
 POINTS = 250
 AGREEMENT = 1e-9  # of a row's scale, or of its value where that is larger
@@ -117,21 +116,6 @@ def test_the_planned_step_on_stairs(length: float, ratio: float, agreement: floa
     found = compared(problem, referee, drawn(problem, referee, 900, in_order))
     assert len(found) == 44 * 22 + 3 * 82 + 4 + 6
     assert worst(found)[0] < agreement, worst(found)
-
-
-PLAN_NAMES = ("z", "hip", "zmp0", "zmp1", "rate", "t1", "t2", "t_bc", "pitch")
-
-
-def test_the_tracked_step_on_stairs_as_printed() -> None:
-    """(33)-(35) and (47)-(53) from the hip with six contacts, knees by (27), (28): three quanta, then most gains diverge."""
-    options = {"scheme": "explicit", "base": "hip", "coordinates": "printed", "rates": "differences"}
-    problem = nlp_gait.load("stairs-track", **options, tracking_limit=False, duration_s=0.03)
-    problem = problem.with_values(gravity_compensation=0.0, spin_in_zmp=0.0, slope_in_single_support=1.0)
-    X = np.random.default_rng(21).uniform([0.0, 0.0, 0.8], [20.0, 0.02, 1.75], (POINTS, 3))
-    plan = dict(zip(PLAN_NAMES, PLAN.values(), strict=True))
-    found = compared(problem, lambda X: stairs_track.track(X, plan, 3, 0.254, 0.7 * 0.254), X)
-    assert len(found) == 3 + 7 + 1
-    assert worst(found)[0] < AGREEMENT, worst(found)
 
 
 @pytest.mark.slow

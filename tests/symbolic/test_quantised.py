@@ -1,4 +1,4 @@
-"""One quantum of time, implicit and as printed, against the same balance of forces in NumPy."""
+"""One quantum of time against the same balance of forces in NumPy."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from casadi import SX
 from nlp_gait.formulation import Array
 from nlp_gait.symbolic.dynamics import EquationsOfMotion
 from nlp_gait.symbolic.quantised import (
-    Contact,
     Controller,
     Ground,
     QuantisedState,
     advance,
-    explicit_quantum,
     implicit_quantum,
     solve_definite,
 )
@@ -65,22 +63,6 @@ def test_all_forces_balance_at_the_end_of_the_quantum() -> None:
     brake = np.diag(M) * (QUANTUM * V) ** 8 * v / QUANTUM
     assert np.abs(brake).max() > 0.01
     assert M @ a == pytest.approx(driving(q, v) - brake, rel=1e-12)
-
-
-def test_the_printed_scheme_acts_at_the_start_and_contacts_press_only_below_the_ground() -> None:
-    normals, tangents = (
-        np.array([[0.8, -0.4], [0.3, 0.9], [-0.2, 0.5]]),
-        np.array([[0.1, 0.7], [-0.6, -0.2], [0.5, 0.5]]),
-    )
-    heights, stiffness, damping, friction = (-0.02, 0.0, 0.01), 2000.0, 15.0, 0.6
-    contacts = [Contact(SX(h), ca.SX(n), ca.SX(t)) for h, n, t in zip(heights, normals, tangents, strict=True)]
-    ground = Ground(SX(stiffness), SX(damping), SX(friction))
-    equations = explicit_quantum(MOTION, STATE, CONTROL, AIM, contacts, ground, ca.SX(DISTURBANCE))
-    force = driving(Q, V)
-    for h, n, t in zip(heights[:2], normals, tangents, strict=False):  # the third is above it, the second just touches
-        force += (-stiffness * h - damping * (n @ V)) * (n - friction * np.sign(t @ V) * t)
-    assert numbers(equations.force) == pytest.approx(force, rel=1e-12)
-    assert np.array(ca.evalf(equations.mass)) == pytest.approx(M)
 
 
 def test_a_quantum_of_constant_acceleration() -> None:

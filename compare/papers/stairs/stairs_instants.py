@@ -14,11 +14,12 @@ from metaheuristics.interface import Algorithm
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaits.stairs.closed_loop import GIVEN, QUANTUM, TORSO, ClosedLoop, N
 from nlp_gait.gaits.stairs.display import JOINTS, make_rigid_bodies
-from nlp_gait.gaits.stairs.track import LARGEST_STATE, compute_support
+from nlp_gait.gaits.stairs.track import compute_support
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Decides = Literal["gains", "torques"]
 PERCENTILES = (5, 95)
+LARGEST_STATE = 1e3  # a step beyond this [rad, rad/s] has diverged
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +46,7 @@ class Quanta:
     def inputs(self) -> tuple[Array, Array, Array]:
         """Desired states (m + 1, 18), other inputs (m, n), and both ends of the support polygon (m, 2) [m]."""
         at = self.problem.at([1.0, 1.0, self.torso_rad])
-        desired, given = (np.array(ca.evalf(part)).T for part in self.loop.inputs(at, Exact())[:2])
+        desired, given = (np.array(ca.evalf(part)).T for part in self.loop.inputs(at, Exact()))
         ends = [np.array(ca.evalf(part)) for part in compute_support(at, self.loop)]
         return desired, given, np.hstack(ends)
 

@@ -46,11 +46,9 @@ class Reading:
 
     text: str
     plan: str = "plan"
-    plans: tuple[str, ...] = ("jerk", "plan")  # of a reading of the planner: least jerk, least energy
     relaxes: bool = False  # whether it only relaxes limits of the planner, so that our plans keep them
-    contains: tuple[
-        str, ...
-    ] = ()  # readings of the tracked step with the same objective, narrower bounds or more limits
+    #: readings of the tracked step with the same objective, narrower bounds or more limits
+    contains: tuple[str, ...] = ()
     options: Mapping[str, str | bool] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from compare.judge import evaluate
@@ -12,10 +11,10 @@ from compare.papers import claims
 from compare.papers.claims import Check, ClaimVerdict, Series, compare_levels, decide, require_change
 from compare.papers.paper_runs import choose_best, get_point, list_infeasible
 from compare.papers.stairs import stairs_paper, stairs_planning, stairs_runs
-from compare.papers.stairs.stairs_paper import OURS, PRINTED, TABLE_3, TABLE_4, measure_printed_equations, measure_slide
+from compare.papers.stairs.stairs_paper import OURS, TABLE_3, TABLE_4, measure_printed_equations, measure_slide
 from compare.papers.stairs.stairs_planning import PLANS, measure_hip_speeds, move
 from compare.papers.stairs.stairs_runs import CLOSED_FORM, DRAWN_CASE, KINDS, RULES, StairsFindings, make_plan_spec
-from compare.papers.stairs.stairs_tracking import get_best, make_choice_spec, measure_spread
+from compare.papers.stairs.stairs_tracking import measure_spread
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import RIGHT
@@ -24,18 +23,12 @@ from nlp_gait.gaits.stairs.leg_network import ONLINE
 from nlp_gait.gaits.stairs.plan import SAMPLING_RESERVE
 from nlp_gait.gaits.stairs.planar_biped import (
     GRAVITY,
-    JOINT_RATES,
-    MOVING,
     get_rod,
     load_toe_foot_biped,
-    locate_centres,
-    locate_points,
 )
 from nlp_gait.gaits.stairs.planned_motion import PHASES
 from nlp_gait.gaits.stairs.stair import SETBACK
 
-INERTIAS = (0.0, 1.0, 2.0)  # as multiples of those of slender rods
-SETBACKS = (0.0, 0.03, 0.09)  # of edges behind the ankle that stands on the step [m]
 NOT_COMPUTED = "not computed with this effort"
 NAMES = {"jerk": "plan of least jerk", "plan": "plan of least energy"}
 LEARNED = ("closed-form cost", "network cost", "largest_angle_error_rad")
@@ -91,20 +84,13 @@ def _get_networks(findings: StairsFindings) -> list[Mapping[str, Any]]:
 def compute_effects(findings: StairsFindings) -> dict[str, Any]:
     """Return numbers for the table of differences, as text; those of plans by plan, in the order of the cases or as above."""
     cases = findings.cases
-    arrays = {what: move(findings, what, DRAWN_CASE)[0].arrays for what in PLANS}
-    moments = {what: [_change_inertia(arrays[what], share) for share in INERTIAS] for what in PLANS}
     planned = {name or OURS: _describe_plans(findings, name) for name in ("", *stairs_paper.PLAN_CHOICES)}
     ours = planned[OURS]
     changed = {name: "unchanged" if text == ours else f"{text} instead of {ours}" for name, text in planned.items()}
     return {
-        "inertia_J": {what: Series(energy for energy, _ in rows) for what, rows in moments.items()},
-        "inertia_mm": {what: Series(margin for _, margin in rows) for what, rows in moments.items()},
-        "edge_mm": {what: Series(measure_depth(findings, what, DRAWN_CASE, x) for x in SETBACKS) for what in PLANS},
         "zmp_gap_mm": {what: Series(measure_zmp_gap(findings, what, case) for case in cases) for what in PLANS},
         "start_m_s": Series(measure_hip_speeds(findings, "jerk", case)[0] for case in cases),
-        "centre_mm": {what: Series(_measure_centre(findings, what, case) for case in cases) for what in PLANS},
         "search_gap": max(measure_spread(findings, name) for name in findings.effort.choices),
-        "turn_rad": {name: Series(_measure_turn(findings, case, name) for case in cases) for name in (OURS, PRINTED)},
         "learned": [findings.collect("learned", name) for name in LEARNED],
         "first": [Series(findings.best(what, case).verdict.objective for case in cases) for what in ("first", "free")],
         "colony": {
@@ -113,60 +99,26 @@ def compute_effects(findings: StairsFindings) -> dict[str, Any]:
         },
         "printed_effort": stairs_paper.ANTS * stairs_paper.ITERATIONS,
         "planned": planned,
-        "tread_between": "".join(f" ({row} between samples)" for row in _list_between(findings, "tread")),
         "plan_effect": {name: f"case {DRAWN_CASE}: {text}" for name, text in changed.items()},
-        "tracked": {name: _describe_step(findings, name) for name in stairs_paper.CHOICES},
     }
 
 
 def _describe_plans(findings: StairsFindings, name: str) -> str:
     if name and name not in findings.effort.plan_choices:
         return NOT_COMPUTED
-    found = {
-        what: stairs_planning.describe_plan(findings, what, name) for what in stairs_planning.list_choice_plans(name)
-    }
+    found = {what: stairs_planning.describe_plan(findings, what, name) for what in PLANS}
     return ", ".join(
         f"no {NAMES[what]} {text.removeprefix('none ')}" if "(" in text else f"{text} {PLANS[what]}"
         for what, text in found.items()
     )
 
 
-def _list_between(findings: StairsFindings, name: str) -> list[str]:
-    """Return the worst violation of the plan of least jerk under a choice that is feasible at its samples."""
-    verdict = (
-        stairs_planning.get_choice(findings, "jerk", name).verdict if name in findings.effort.plan_choices else None
-    )
-    return [*verdict.violated[:1]] if verdict is not None and verdict.feasible else []
-
-
-def _describe_step(findings: StairsFindings, name: str) -> str:
-    if name not in findings.effort.choices:
-        return NOT_COMPUTED
-    steps = [get_best(findings, case, name).verdict for case in findings.cases]
-    cost, energy = (Series(step.indexes[index] for step in steps) for index in ("controller_cost", "energy_J"))
-    return f"mean of (53) {cost}, {energy} J" + ("" if all(step.feasible for step in steps) else ", not feasible")
-
-
-def _change_inertia(arrays: Mapping[str, Array], share: float) -> tuple[float, float]:
-    """Return energy [J] and ZMP margin [mm] of a planned motion with a multiple of the links' inertias.
-
-    The equations of motion are in absolute link angles: an inertia acts on the acceleration of its own link only.
-    """
-    robot = load_toe_foot_biped()
-    inertias = np.array([robot.link(link).inertia_kgm2 for link in MOVING])
-    extra = (share - 1) * inertias * arrays["link_qdd"] @ np.linalg.inv(JOINT_RATES)
-    power = np.abs((arrays["tau"] + extra) * arrays["qd"]).sum(axis=1)
-    pressure = arrays["stance_pressure"][:, 0] - extra[:, 0] / arrays["stance_force"][:, 1]
-    margin = np.minimum(pressure, robot.foot_m - pressure).min()
-    return float(np.trapezoid(power, arrays["t"])), 1e3 * float(margin)
-
-
-def measure_depth(findings: StairsFindings, what: str, case: int, setback: float) -> float:
-    """Return how deep ankle, sole or toe of the swing foot are in steps with such edges [mm]."""
+def measure_depth(findings: StairsFindings, what: str, case: int) -> float:
+    """Return how deep ankle, sole or toe of the swing foot are in the steps [mm]."""
     tread, rise = TABLE_4[case].step_m
     signals, legs = move(findings, what, case)
     x, z = np.moveaxis(legs[RIGHT][signals.arrays["t"] > findings.best(what, case).x["t2_s"], 2:5], -1, 0)
-    ground = rise * (1.0 * (x >= -setback) + (x >= tread - setback) - 1.0)
+    ground = rise * (1.0 * (x >= -SETBACK) + (x >= tread - SETBACK) - 1.0)
     return round(1e3 * float((ground - z).max()), 1) + 0.0
 
 
@@ -177,22 +129,6 @@ def measure_zmp_gap(findings: StairsFindings, what: str, case: int) -> float:
     share, (tread, _) = arrays["t"] / arrays["t"][-1], TABLE_4[case].step_m
     planned = x["zmp_start_m"] + (tread + x["zmp_end_m"] - x["zmp_start_m"]) * share**2 * (3 - 2 * share)
     return 1e3 * float(np.abs(arrays["zmp"][:, 0] + tread - planned).max())
-
-
-def _measure_centre(findings: StairsFindings, what: str, case: int) -> float:
-    """Return how far the centre of gravity of all links is below the hip at the start of a plan [mm]."""
-    angles = move(findings, what, case)[0].arrays["link_q"][0]
-    place = locate_points(ca.SX([*angles, 0.0, 0.0]), ca.SX(2, 1))
-    moment = sum(get_rod(link).mass_kg * float(middle[1]) for link, middle in locate_centres(place).items())
-    return 1e3 * (float(place["H"][1]) - moment / load_toe_foot_biped().mass_kg)
-
-
-def _measure_turn(findings: StairsFindings, case: int, name: str) -> float:
-    """Return by how much a link turns at most in a quantum of the best step under a choice [rad]."""
-    problem = make_choice_spec(findings, case, name).load()
-    x = get_best(findings, case, name).x
-    rates = problem.signals(np.array(list(x.values()))).arrays["link_qd"]
-    return QUANTUM * float(np.abs(rates).max())
 
 
 PEAKS = {"acceleration": "peak_acceleration_rad_s2", "jerk": "peak_jerk_rad_s3"}  # in Table IV, and in our plans
@@ -307,7 +243,7 @@ def _check_easier(findings: StairsFindings) -> Check:
 
 
 def _check_collisions(findings: StairsFindings) -> Check:
-    feet = {what: Series(measure_depth(findings, what, case, SETBACK) for case in findings.cases) for what in PLANS}
+    feet = {what: Series(measure_depth(findings, what, case) for case in findings.cases) for what in PLANS}
     rows = [*feet.values(), *_measure_shanks(findings).values()]
     return decide([max(row) <= 0 for row in rows], feet=feet)
 

@@ -1,6 +1,6 @@
 """Plans of the stairs paper: its choices one by one, the first step, the reverse double support, and what they cost."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from importlib.util import find_spec
@@ -37,7 +37,7 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield plans under every choice, and in each case the paper's hip height, an upright torso, a reverse double support."""
     effort = findings.effort
     for name in effort.plan_choices:
-        for what in list_choice_plans(name):
+        for what in PLANS:
             spec, best = _make_choice_spec(findings, what, name), findings.best(what, DRAWN_CASE)
             yield _make_task(spec, best, effort.plan_settings)
     for case in findings.cases:
@@ -50,10 +50,9 @@ def make_choice_tasks(findings: StairsFindings) -> Iterator[Task]:
 def make_energy_tasks(findings: StairsFindings) -> Iterator[Task]:
     """Yield searches for plans of least energy under every choice that start from those of least jerk under it."""
     for name in findings.effort.plan_choices:
-        if "plan" in list_choice_plans(name):
-            best = choose_best(findings.runs[f"jerk-{DRAWN_CASE}-{name}", IPOPT])
-            spec = _make_choice_spec(findings, "plan", name)
-            yield replace(_make_task(spec, best, findings.effort.plan_settings), run=1)
+        best = choose_best(findings.runs[f"jerk-{DRAWN_CASE}-{name}", IPOPT])
+        spec = _make_choice_spec(findings, "plan", name)
+        yield replace(_make_task(spec, best, findings.effort.plan_settings), run=1)
 
 
 def _make_choice_spec(findings: StairsFindings, what: str, name: str) -> ProblemSpec:
@@ -162,7 +161,7 @@ def get_choice(findings: StairsFindings, what: str, name: str) -> RunRecord:
     """Return the best known plan under a choice, of either goal, and ours if it only relaxes limits; ours without a name."""
     if not name:
         return findings.best(what, DRAWN_CASE)
-    titles = [f"{other}-{DRAWN_CASE}-{name}" for other in list_choice_plans(name)]
+    titles = [f"{other}-{DRAWN_CASE}-{name}" for other in PLANS]
     titles += [f"{other}-{DRAWN_CASE}" for other in PLANS if PLAN_CHOICES[name].relaxes]
     known = [run for title in titles for run in findings.runs[title, IPOPT] if run.verdict.feasible]
     own = choose_best(findings.runs[f"{what}-{DRAWN_CASE}-{name}", IPOPT])
@@ -172,14 +171,8 @@ def get_choice(findings: StairsFindings, what: str, name: str) -> RunRecord:
 def _list_choice(findings: StairsFindings, name: str) -> list[Value]:
     jerk = get_choice(findings, "jerk", name)
     times = ", ".join(f"{jerk.x[time]:.2f}" for time in ("t1_s", "t2_s", "t_bc_s"))
-    energy = describe_plan(findings, "plan", name) if "plan" in list_choice_plans(name) else ""
     text = PLAN_CHOICES[name].text if name else "ours"
-    return [text, describe_plan(findings, "jerk", name), energy, times, jerk.verdict.indexes["knot_jerk_rad_s3"]]
-
-
-def list_choice_plans(name: str) -> Iterable[str]:
-    """Return the plans that a choice has, or ours without a name."""
-    return PLAN_CHOICES[name].plans if name else PLANS
+    return [text, *(describe_plan(findings, what, name) for what in PLANS), times]
 
 
 def describe_plan(findings: StairsFindings, what: str, name: str) -> str:

@@ -77,7 +77,7 @@ def _make_tables(findings: StairsFindings) -> dict[str, Rows]:
         **planning.make_planning_tables(findings),
         "other-stairs": _list_other_stairs(findings),
         "network": _list_network(findings.others["network"]),
-        "printed-scheme": [row[:8] for row in _list_results(findings, "printed")],
+        "printed-gains": [row[:4] for row in _list_results(findings, "printed")],
         "learned": _list_results(findings, "learned"),
         **tracking.make_tracking_tables(findings),
     }

@@ -11,25 +11,23 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs import planar_biped as biped
-from nlp_gait.gaits.stairs.leg_network import ONLINE, PRINTED, solve_legs_by_network
+from nlp_gait.gaits.stairs.leg_network import ONLINE, solve_legs_by_network
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_posture, compute_stair_height
 from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic import quantised
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import Contact, Equations, Ground, QuantisedState, solve_definite
 
-Scheme = Literal["implicit", "explicit"]
-InverseKinematics = Literal["closed-form", "network", "printed-network"]
+InverseKinematics = Literal["closed-form", "network"]
 Rates = Literal["exact", "differences"]
-Coordinates = Literal["joint", "printed", "link"]
-Base = Literal["stance-foot", "hip"]
+Coordinates = Literal["joint", "printed"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
 EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 CONTACTS = ("T", "S", "A", "S'", "T'", "A'")  # points that may touch the ground, all but the base
 N = len(biped.LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
-# k_s, k_d and mu, share of gravity, amplitude of the disturbance, the base's place, velocity and acceleration, and the virtual
-# slope and the share of the links' spin in the ZMP, torques besides the controller's. Nothing is ever differentiated with
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance, the virtual slope and the
+# share of the links' spin in the ZMP, torques besides the controller's. Nothing is ever differentiated with
 # respect to it.
 GIVEN = {
     "aim": 2 * N,
@@ -38,7 +36,6 @@ GIVEN = {
     "ground": 3,
     "gravity_share": 1,
     "disturbance": 1,
-    "base": 6,
     "slope": 1,
     "spin": 1,
     "torque": N,
@@ -66,7 +63,6 @@ ANGLES: Mapping[Coordinates, Mapping[str, Mapping[str, int]]] = {
         "knee'": _KNEES["knee'"],
         **{link: {link: 1} for link in biped.LINKS[4:]},
     },
-    "link": {link: {link: 1} for link in biped.LINKS},
 }
 
 
@@ -82,7 +78,6 @@ class Rollout(NamedTuple):
     state: MX  # (18, m) angles [rad] and rates [rad/s] of the nine links
     torque: MX  # (9, m) torques on the controlled angles [Nm]
     zmp: MX  # (1, m) ahead of the stance ankle, on the virtual slope in double support [m]
-    place: MX  # (2, m) of the base [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,11 +85,8 @@ class ClosedLoop:
     """Closed loop over whole quanta of time."""
 
     quanta: int  # number of steps of the rollout
-    scheme: Scheme  # of the quantised dynamics
-    gains: int  # number of different K_p, and of different K_d: 1 or one for each link
     inverse_kinematics: InverseKinematics = "closed-form"  # source of the desired angles of both legs
     coordinates: Coordinates = "joint"  # what the controller measures and drives
-    base: Base = "stance-foot"  # pinned to its step; or the hip, on its planned curve
     kind: StepKind = "next"
     rates: Rates = "exact"  # desired ones: derivatives of the plan, or differences of its angles over a quantum
 
@@ -105,56 +97,53 @@ class ClosedLoop:
 
     @property
     def base_point(self) -> str:
-        """The hip; or of the stance foot the ankle, or the tip of the toe where the foot turns about it."""
-        return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
+        """The stance ankle, or the tip of the stance toe where the foot turns about it."""
+        return "T'" if self.kind == "landing" else "A'"
 
-    def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX, MX]:
-        """Return desired angles and rates (18, m + 1) of the links at the ends of quanta, ``GIVEN``, and the base's places."""
+    @property
+    def base_place(self) -> DM:
+        """(2,) ahead of the stance ankle's place and above it [m]."""
+        return DM([biped.load_toe_foot_biped().foot_m * (self.kind == "landing"), 0])
+
+    def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
+        """Return desired angles and rates (18, m + 1) of the links at the ends of quanta, and ``GIVEN``."""
         stair = read_stair(point)
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
-        planned = _make_desired(ops, self.kind).map(self.quanta + 1)(DM(times[None, :]), plan)
-        desired, place, speed = ca.vertsplit(planned, [0, 2 * N, 2 * N + 2, 2 * N + 4])
-        if self.inverse_kinematics != "closed-form":
-            settings = ONLINE if self.inverse_kinematics == "network" else PRINTED
-            desired = solve_legs_by_network(desired, settings)
+        desired = _make_desired(ops, self.kind).map(self.quanta + 1)(DM(times[None, :]), plan)
+        if self.inverse_kinematics == "network":
+            desired = solve_legs_by_network(desired, ONLINE)
         if self.rates == "differences":
             differences = (desired[:N, 1:] - desired[:N, :-1]) / QUANTUM
             desired = ca.vertcat(desired[:N, :], ca.horzcat(differences[:, 0], differences))
         contact = ("ground_stiffness_N_m", "ground_damping_N_s_m", "friction")
         constants = ca.vertcat(size, *(point[name] for name in (*contact, "gravity_compensation", "disturbance_Nm")))
-        acted = slice(1, None) if self.scheme == "implicit" else slice(None, -1)
-        if self.base == "stance-foot":
-            ahead = biped.load_toe_foot_biped().foot_m * (self.base_point == "T'")
-            place, speed = MX(DM([[ahead] * (self.quanta + 1), [0] * (self.quanta + 1)])), MX(2, self.quanta + 1)
-        base = ca.vertcat(place[:, :-1], speed[:, acted], (speed[:, 1:] - speed[:, :-1]) / QUANTUM)
         on_slope = ca.fmax(DM(times[None, 1:]) < point["t2_s"], point["slope_in_single_support"])
         given = ca.vertcat(
-            desired[:, acted],
+            desired[:, 1:],
             DM(times[None, :-1]),
             ca.repmat(constants, 1, self.quanta),
-            base,
             0 * on_slope if self.kind == "first" else stair.rise / stair.tread * on_slope,
             ca.repmat(point["spin_in_zmp"], 1, self.quanta),
             DM(N, self.quanta),
         )
-        return desired, given, place[:, 1:]
+        return desired, given
 
     def rollout(self, point: Point, tuned: MX, ops: Nonsmooth) -> Rollout:
-        """Return states, torques and ZMP for tuned K_p (gains,), K_d (gains,) >= 0 and desired torso pitch."""
-        desired, given, place = self.inputs(point, ops)
+        """Return states, torques and ZMP for tuned K_p, K_d >= 0 and desired torso pitch."""
+        desired, given = self.inputs(point, ops)
         inputs = given, ca.repmat(tuned, 1, self.quanta)
         states = ops.rollout(self.step, desired[:, 0], *inputs)
         before = ca.horzcat(desired[:, 0], states[:, :-1])
         torque, zmp = self.outcome.map(self.quanta)(before, states, *inputs)
-        return Rollout(desired[:, 1:], states, torque, zmp, place)
+        return Rollout(desired[:, 1:], states, torque, zmp)
 
     def find_stance_ankle(self, rollout: Rollout) -> MX:
         """Return its place (2, m) in a rollout [m]."""
-        q, place = SX.sym("q", N), SX.sym("place", 2)
-        found = biped.locate_points(q, place, self.base_point)["A'"]
-        return ca.Function("ankle", [q, place], [found]).map(self.quanta)(rollout.state[:N, :], rollout.place)
+        q = SX.sym("q", N)
+        found = biped.locate_points(q, SX(self.base_place), self.base_point)["A'"]
+        return ca.Function("ankle", [q], [found]).map(self.quanta)(rollout.state[:N, :])
 
     @cached_property
     def step(self) -> ca.Function:
@@ -168,25 +157,18 @@ class ClosedLoop:
     def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
         """Return the equations of the acceleration within one quantum."""
         q, v = state
-        place, speed, push = ca.vertsplit(parts["base"], [0, 2, 4, 6])
-        found = biped.locate_points(q, place, self.base_point)
+        found = biped.locate_points(q, SX(self.base_place), self.base_point)
         motion = biped.make_dynamics(q, v, q, self.base_point)
-        momentum = sum(
-            (biped.get_rod(link).mass_kg * middle for link, middle in biped.locate_centres(found).items()), SX(2, 1)
-        )
         stair = Stair(parts["size"][0], parts["size"][1])
 
         def touch(point: SX) -> Contact:
             height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH, self.kind)
-            return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
+            return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T)
 
         contacts = [touch(found[name]) for name in CONTACTS if name != self.base_point]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
-        inertia = ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push  # of links that the base accelerates
-        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) - inertia + parts["torque"]
-        if self.scheme == "implicit":
-            return quantised.implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
-        return quantised.explicit_quantum(motion, state, control, aim, contacts, ground, disturbance)
+        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) + parts["torque"]
+        return quantised.implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
 
     @cached_property
     def outcome(self) -> ca.Function:
@@ -194,16 +176,15 @@ class ClosedLoop:
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         G = biped.make_dynamics(state.q, state.v, state.q, self.base_point).G
-        acted = following if self.scheme == "implicit" else state
-        torque = quantised.controller_torque(parts["control"], parts["desired"], acted, G) + parts["torque"]
+        torque = quantised.controller_torque(parts["control"], parts["desired"], following, G) + parts["torque"]
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
-        place, push = parts["base"][:2], parts["base"][4:]
-        for link, middle in biped.locate_centres(biped.locate_points(state.q, place, self.base_point)).items():
+        found = biped.locate_points(state.q, SX(self.base_place), self.base_point)
+        for link, middle in biped.locate_centres(found).items():
             mass = biped.get_rod(link).mass_kg
             velocity = ca.jtimes(middle, state.q, state.v)
-            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
+            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration)
             spin = parts["spin"] * acceleration[biped.LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
             weight += mass * (a[1] + biped.GRAVITY)
             pull += mass * a[0]
@@ -221,28 +202,26 @@ class ClosedLoop:
 
     def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
         """Return the state, the inputs given and tuned, and their parts by name, with controller and desired state."""
-        given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 2 * self.gains + 1)
+        given, tuned = SX.sym("given", sum(GIVEN.values())), SX.sym("tuned", 3)
         ends = [0, *np.cumsum(list(GIVEN.values())).tolist()]
         parts: dict[str, Any] = dict(zip(GIVEN, ca.vertsplit(given, ends), strict=True))
-        kp, kd, torso = ca.vertsplit(tuned, [0, self.gains, 2 * self.gains, 2 * self.gains + 1])
-        each = N // self.gains
+        kp, kd, torso = ca.vertsplit(tuned)
         aim = parts.pop("aim")
         share = parts.pop("gravity_share")
-        parts["control"] = quantised.Controller(ca.repmat(kp, each, 1), ca.repmat(kd, each, 1), share, self.joints)
+        parts["control"] = quantised.Controller(ca.repmat(kp, N, 1), ca.repmat(kd, N, 1), share, self.joints)
         parts["desired"] = QuantisedState(ca.vertcat(aim[:TORSO], torso, aim[TORSO + 1 : N]), aim[N:])
         return QuantisedState(SX.sym("q", N), SX.sym("v", N)), [given, tuned], parts
 
 
 def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
-    """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
+    """Return the function of (time, governing parameters, stair, reach margin) to the desired state (18,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)
     step = compute_posture(plan, Stair(size[0], size[1]), s, passing / plan.durations, margin, ops, kind)
     given = ca.vertcat(values, size, margin)
     angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
-    motion = [*angles, step.hip.position, step.hip.velocity]
-    pose = ca.Function("pose", [s, passing, given], motion)
+    pose = ca.Function("pose", [s, passing, given], list(angles))
     time = SX.sym("time")
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])
     passed = (time - starts) / plan.durations

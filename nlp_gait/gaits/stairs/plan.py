@@ -32,11 +32,10 @@ from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load
 from nlp_gait.gaits.stairs.planned_motion import PHASES, StepKind
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
-Minimise = Literal["energy", "jerk", "knot-jerk"]
+Minimise = Literal["energy", "jerk"]
 OBJECTIVES = {
     "energy": Objective(name="energy", unit="J"),
     "jerk": Objective(name="peak_joint_jerk", unit="rad/s^3"),
-    "knot-jerk": Objective(name="peak_joint_jerk_at_knots", unit="rad/s^3"),
 }
 
 REAR_SHARE = "share of the ground force below the rear toe at the start"
@@ -89,7 +88,7 @@ def stairs_plan(
 
     Args:
         minimise: energy, the integral of sum |torque x rate| over all joints; jerk, the peak of the joints' jerk (the paper's
-            knot shifting); knot-jerk, the same at t1, t2 and t_bc only.
+            knot shifting).
         step: next, over a flat stance foot; landing, the same with the stance foot's reverse double support until t2; first,
             one step up from standing at rest, with the hip from above the planned ZMP to where the next step starts.
         balance: feet, the centre of pressure below the stance foot; polygon, as printed, the ZMP of (49) in the convex hull of
@@ -219,9 +218,7 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
     )
     at_knots = step.jerk(samples, point["quantum_s"], knots=True)
     return Assembly(
-        objective=step.energy(samples, ops)
-        if minimise == "energy"
-        else ops.largest(jerk if minimise == "jerk" else at_knots),
+        objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
             *_make_rows_at(point, samples, step),
             _limit_clearance(step.clearances(point, ops), least_clearance),

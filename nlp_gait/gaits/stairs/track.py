@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -17,9 +16,6 @@ from nlp_gait.gaits.stairs.display import StepMotion, make_driven_step, make_sim
 from nlp_gait.gaits.stairs.planar_biped import LINKS, load_toe_foot_biped
 from nlp_gait.gaits.stairs.planned_motion import StepKind
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
-
-Gains = Literal["scalar", "per-joint"]
-ZmpRule = Literal["limits", "penalty"]
 
 # Plan of least energy for case 2 of Table IV: the optimum of stairs-plan.
 PLAN = {
@@ -40,7 +36,6 @@ PLAUSIBLE_GAIN, PLAUSIBLE_TORSO = 60.0, 1.4
 SCATTER = 0.05
 # The cost falls with both gains, by less than a hundredth from here to a hundredth of this: the bound does not decide the cost.
 LARGEST_GAIN = 1e4
-LARGEST_STATE = 1e3  # a rollout beyond this [rad, rad/s] has diverged
 
 PLANNED = [variable for variable in stair.GOVERNING_VARIABLES if variable.name != TORSO_PITCH]
 PARAMETERS = (
@@ -50,7 +45,7 @@ PARAMETERS = (
     *make_parameters(
         stair.REACH_MARGIN,
         ("tracking_tolerance_rad", "rad", 0.1, "largest error of a link angle at any time", 0.0, inf),
-        ("zmp_weight", "1/m", 100.0, "worth of the ZMP margin, or cost of the ZMP outside the polygon", 0.0, inf),
+        ("zmp_weight", "1/m", 100.0, "worth of the ZMP margin", 0.0, inf),
         ("spin_in_zmp", "1", 1.0, "share of the links' own angular momentum in the ZMP; 0 as printed", 0.0, 1.0),
         ("slope_in_single_support", "1", 0.0, "share of the virtual slope there; 1 as printed", 0.0, 1.0),
         ("gravity_compensation", "1", 1.0, "share of gravity that the controller compensates; 0 as printed", 0.0, 1.0),
@@ -65,36 +60,27 @@ PARAMETERS = (
 @maker
 def stairs_track(
     *,
-    gains: Gains = "scalar",
-    scheme: closed_loop.Scheme = "implicit",
     inverse_kinematics: closed_loop.InverseKinematics = "closed-form",
     coordinates: closed_loop.Coordinates = "joint",
     step: StepKind = "next",
-    base: closed_loop.Base = "stance-foot",
     rates: closed_loop.Rates = "exact",
-    zmp: ZmpRule = "limits",
     tracking_limit: bool = True,
     duration_s: float = 3.5,
 ) -> GaitProblem:
     """Return the closed loop over one planned step.
 
-    The plan is given by parameters; its torso pitch is a variable.
+    The plan is given by parameters; its torso pitch is a variable. The stance foot is pinned at its ankle, in landing at the tip
+    of its toe; the dynamics are linearly implicit: explicit, as printed, they diverge.
 
     Args:
-        gains: one K_p and K_d for all joints as in the paper, or one for each.
-        scheme: of the quantised dynamics: linearly implicit, or explicit as printed, which diverges at all but tiny gains.
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
-            quantum's pose within each evaluation (which makes one many times slower); or that at the printed rate and number
-            of iterations, with which few poses converge.
+            quantum's pose within each evaluation (which makes one many times slower).
         coordinates: what the controller measures and drives, and the disturbance acts on: joint angles and torques, and those of
-            the stance sole, which stands on the ground; as printed only the knees are joints (27), (28), and other angles are
-            those of links; or all angles are those of links.
+            the stance sole, which stands on the ground; or as printed, where only the knees are joints (27), (28) and other
+            angles are those of links.
         step: ``next`` over a flat stance foot; ``landing``, the same with the reverse double support, in which the stance foot
             turns down about the tip of its toe; or ``first`` from standing.
-        base: stance foot, pinned at its ankle (in landing at its toe), with five contacts; or the hip on its planned curve, with
-            the paper's six.
         rates: desired rates of the angles: exact, or as printed by differences over a quantum.
-        zmp: within the supporting polygon (Algorithm 3), with the least margin maximised; or a penalty outside it.
         tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
         duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
 
@@ -103,28 +89,22 @@ def stairs_track(
     """
     if not closed_loop.QUANTUM <= duration_s <= 60.0:
         raise InputError(f"duration_s must be within [{closed_loop.QUANTUM}, 60], got {duration_s}")
-    angles = closed_loop.ANGLES[coordinates]
-    suffixes = [""] if gains == "scalar" else [f"_{angle}" for angle in angles]
     loop = closed_loop.ClosedLoop(
         quanta=round(duration_s / closed_loop.QUANTUM),
-        scheme=scheme,
-        gains=len(suffixes),
         inverse_kinematics=inverse_kinematics,
         coordinates=coordinates,
-        base=base,
         kind=step,
         rates=rates,
     )
     limits = {"lower": 0.0, "upper": LARGEST_GAIN, "minimum": 0.0, "maximum": 1e6}
     variables = (
         *(
-            Variable(name=name + suffix, unit=unit, description=f"{symbol} of {suffix[1:] or 'all joints'}", **limits)
+            Variable(name=name, unit=unit, description=f"{symbol} of all joints", **limits)
             for name, unit, symbol in (("kp", "N m/rad", "K_p"), ("kd", "N m s/rad", "K_d"))
-            for suffix in suffixes
         ),
         *(v for v in stair.GOVERNING_VARIABLES if v.name == TORSO_PITCH),
     )
-    tracked = TrackedStep(loop=loop, variables=variables, zmp=zmp, tracking_limit=tracking_limit)
+    tracked = TrackedStep(loop=loop, variables=variables, tracking_limit=tracking_limit)
     model = make_simulation_model(tracked.move) if step == "next" else None
     return GaitProblem(
         name="stairs-track",
@@ -144,7 +124,6 @@ class TrackedStep:
 
     loop: closed_loop.ClosedLoop
     variables: tuple[Variable, ...]  # gains, then the torso's pitch
-    zmp: ZmpRule
     tracking_limit: bool  # whether errors of the controlled angles are limited
 
     @property
@@ -154,7 +133,7 @@ class TrackedStep:
 
     def start(self, _: Mapping[str, float], rng: np.random.Generator) -> Array:
         """Draw a start point (n,)."""
-        about = np.append(np.full(2 * self.loop.gains, PLAUSIBLE_GAIN), PLAUSIBLE_TORSO)
+        about = np.array([PLAUSIBLE_GAIN, PLAUSIBLE_GAIN, PLAUSIBLE_TORSO])
         return about * (1 + SCATTER * rng.standard_normal(len(self.variables)))
 
     def roll_out(self, point: Point, ops: Nonsmooth) -> closed_loop.Rollout:
@@ -163,32 +142,25 @@ class TrackedStep:
         return self.loop.rollout(point, x, ops)
 
     def assemble(self, point: Point, ops: Nonsmooth) -> Assembly:
-        """Return the mean of (53) over all quanta with the worth of the ZMP margin or its penalty, and the limits of both."""
+        """Return the mean of (53) over all quanta with the worth of the ZMP margin, and the limits of both."""
         loop, rollout, exact = self.loop, self.roll_out(point, ops), Exact()
         quanta, zmp = loop.quanta, rollout.zmp.T
         errors = ca.diagcat(loop.joints, loop.joints) @ (rollout.state - rollout.desired)
         power = rollout.torque * (loop.joints @ rollout.state[closed_loop.N :, :])
         rear, front = compute_support(point, loop)
         tracking, effort = (ca.sum1(ops.abs(ca.vec(part))) / quanta for part in (errors, power))
-        if self.zmp == "penalty":  # the mean distance of the ZMP from the support polygon [m]
-            distances = ca.vertcat(rear - zmp, zmp - front)
-            balance = ca.sum1((distances + ops.abs(distances)) / 2) / zmp.shape[0]
-        else:
-            balance = -_compute_margin(zmp, rear, front, ops)
-        instants, constraints = range(1, quanta + 1), []
-        if self.zmp == "limits":  # (Algorithm 3)
-            constraints.append(
-                stair.make_rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants)
-            )
+        instants = range(1, quanta + 1)
+        constraints = [  # (Algorithm 3)
+            stair.make_rows("zmp", rollout.zmp, ("x",), "m", 0.01, lower=rear, upper=front, columns=instants)
+        ]
         if self.tracking_limit:
             most, limited = point["tracking_tolerance_rad"], errors[: closed_loop.N, :]
             row = stair.make_rows(
                 "tracking", limited, self.angles, "rad", 0.1, lower=-most, upper=most, columns=instants
             )
             constraints.append(row)
-        finite = exact.abs(ca.sum1(rollout.state)) < LARGEST_STATE
         return Assembly(
-            objective=tracking + effort + point["zmp_weight"] * balance,
+            objective=tracking + effort + point["zmp_weight"] * -_compute_margin(zmp, rear, front, ops),
             constraints=tuple(constraints),
             indexes={
                 "controller_cost": ca.sum1(exact.abs(ca.vertcat(ca.vec(errors), ca.vec(power)))) / quanta,
@@ -197,14 +169,13 @@ class TrackedStep:
                 "largest_error_rad": exact.largest(ca.vec(errors[: closed_loop.N, :])),
                 "peak_torque_Nm": exact.largest(ca.vec(rollout.torque)),
                 "zmp_margin_min_m": _compute_margin(zmp, rear, front, exact),
-                "quanta_before_divergence": ca.sum2(finite),
             },
         )
 
     def compute_signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
         loop, found = self.loop, self.roll_out(at, Exact())
-        parts = (*found[:4], loop.find_stance_ankle(found))
+        parts = (*found, loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
         joints = loop.joints.full().T
         (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))

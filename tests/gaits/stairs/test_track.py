@@ -60,49 +60,35 @@ def test_finite_at_every_gain(problem: GaitProblem, share: float) -> None:
     assert (violation[X[:, 1] == 0.0] > 0.0).all()
 
 
-def test_the_printed_explicit_scheme_diverges_and_says_when(problem: GaitProblem) -> None:
-    printed = nlp_gait.load("stairs-track", scheme="explicit").with_values(gravity_compensation=0.0)
-    survived = values(printed, [23.3027, 86.2633, 1.25847])[2]["quanta_before_divergence"]
-    assert 1 <= survived < 20
-    assert values(problem, [23.3027, 86.2633, 1.25847])[2]["quanta_before_divergence"] == 350
-
-
-def test_the_zmp_limits_are_constraints_and_the_penalty_is_not(problem: GaitProblem) -> None:
-    """At a torso pitch where the ZMP leaves the foot: limits reject it, the penalty only costs."""
+def test_the_zmp_limits_are_constraints(problem: GaitProblem) -> None:
+    """At a torso pitch where the ZMP leaves the foot."""
     x = [100.0, 100.0, 1.6]
-    penalty = nlp_gait.load("stairs-track", zmp="penalty")
-    (_, rejected, indexes), (cost, accepted, _) = values(problem, x), values(penalty, x)
+    cost, violation, indexes = values(problem, x)
     assert indexes["zmp_margin_min_m"] < -1e-3
-    assert rejected > 0.0 == accepted
+    assert violation > 0.0
     arrays = problem.signals(np.array(x)).arrays
     polygon = np.where(arrays["t"] < 0.7783, 0.17 - 0.254, 0.0)
     outside = np.maximum(polygon - arrays["zmp"], arrays["zmp"] - 0.17)
     assert outside.max() == pytest.approx(-indexes["zmp_margin_min_m"])
-    free = values(penalty.with_values(zmp_weight=0.0), x)[0]
-    assert cost - free == pytest.approx(100.0 * np.maximum(outside, 0.0).mean())
-    assert values(problem.with_values(zmp_weight=0.0), x)[0] - 100.0 * indexes["zmp_margin_min_m"] == pytest.approx(
-        values(problem, x)[0]
-    )
+    worthless = values(problem.with_values(zmp_weight=0.0), x)[0]
+    assert worthless - 100.0 * indexes["zmp_margin_min_m"] == pytest.approx(cost)
 
 
 @pytest.mark.slow
 def test_joint_torques_and_angles_of_the_same_motion() -> None:
-    """Stiff gains give the same motion in all coordinates; there joint torques do the work of the torques on the links."""
-    found = {}
-    for coordinates in ("joint", "printed", "link"):
-        stiff = nlp_gait.load("stairs-track", coordinates=coordinates, duration_s=0.3)
-        found[coordinates] = stiff.signals(np.array([1e4, 1e4, 1.45])).arrays
-    link, joint, printed = (found[name] for name in ("link", "joint", "printed"))
-    assert joint["link_q"] == pytest.approx(link["q"], abs=2e-3)
-    knee = link["q"][:, 1] - link["q"][:, 0]
-    assert joint["q"][:, 1] == pytest.approx(knee, abs=4e-3)  # (27)
+    """Stiff gains give the same motion in both coordinates; there joint torques do the work of the printed ones."""
+    joint, printed = (
+        nlp_gait.load("stairs-track", coordinates=name, duration_s=0.3).signals(np.array([1e4, 1e4, 1.45])).arrays
+        for name in ("joint", "printed")
+    )
+    link = joint["link_q"]
+    assert printed["link_q"] == pytest.approx(link, abs=2e-3)
+    knee = link[:, 1] - link[:, 0]
+    assert joint["q"][:, 1] == pytest.approx(knee, abs=1e-12)  # (27)
     assert printed["q"][:, 1] == pytest.approx(knee, abs=4e-3)
-    assert printed["q"][:, 5:7] == pytest.approx(link["q"][:, 5:7], abs=4e-3)
-    # What a link needs, the joints before it and after it give.
-    assert link["tau"][:, 0] == pytest.approx(joint["tau"][:, 0] - joint["tau"][:, 1], abs=1.0)
-    power = [(part["tau"] * part["qd"]).sum(axis=1)[5:] for part in (link, joint, printed)]
+    assert printed["q"][:, 5:7] == pytest.approx(link[:, 5:7], abs=4e-3)
+    power = [(part["tau"] * part["qd"]).sum(axis=1)[5:] for part in (joint, printed)]
     assert power[0] == pytest.approx(power[1], abs=0.5)
-    assert power[0] == pytest.approx(power[2], abs=0.5)
 
 
 def test_the_reverse_double_support_turns_the_stance_foot_about_its_toe() -> None:
@@ -127,16 +113,6 @@ def test_the_first_step_starts_at_rest_on_both_feet() -> None:
     _, violation, indexes = values(first, x)
     assert indexes["zmp_margin_min_m"] == pytest.approx(np.minimum(arrays["zmp"], 0.17 - arrays["zmp"]).min())
     assert violation > 0.0
-
-
-@pytest.mark.slow
-def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
-    """The paper's base and six contacts: the stance leg carries nothing, and gains like those of Table IV follow."""
-    held = nlp_gait.load("stairs-track", base="hip", duration_s=0.3).with_values(gravity_compensation=0.0)
-    standing = nlp_gait.load("stairs-track", duration_s=0.3).with_values(gravity_compensation=0.0)
-    (_, _, soft), (_, _, fallen) = (values(problem, [43.0, 5.0, 1.59]) for problem in (held, standing))
-    assert soft["largest_error_rad"] < 0.5 * fallen["largest_error_rad"]
-    assert soft["peak_torque_Nm"] < 0.5 * fallen["peak_torque_Nm"]
 
 
 def test_the_printed_zmp_has_no_spin_and_one_slope(problem: GaitProblem) -> None:
@@ -200,18 +176,7 @@ def test_start_points_are_near_gains_that_hold_the_robot(problem: GaitProblem) -
         assert 1.1 < torso < 1.7
 
 
-@pytest.mark.slow
-def test_one_gain_for_each_joint() -> None:
-    each = nlp_gait.load("stairs-track", gains="per-joint")
-    assert len(each.names) == 19
-    same = values(each, [80.0] * 9 + [60.0] * 9 + [1.45])
-    scalar = values(nlp_gait.load("stairs-track"), [80.0, 60.0, 1.45])
-    assert same[0] == pytest.approx(scalar[0], rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    "options", [{"gains": "both"}, {"scheme": "midpoint"}, {"inverse_kinematics": "newton"}, {"duration_s": 0.0}]
-)
+@pytest.mark.parametrize("options", [{"coordinates": "link"}, {"inverse_kinematics": "newton"}, {"duration_s": 0.0}])
 def test_options_that_are_not_allowed(options: dict[str, str | float]) -> None:
     with pytest.raises(InputError, match="must be"):
         nlp_gait.load("stairs-track", **options)
