@@ -13,23 +13,25 @@ from compare.cli.bench import bench
 from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
-from compare.cli.exchange import archive, cite, import_results, logs, verify
+from compare.cli.exchange import import_results, verify
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
+from compare.cli.old_names import Commands
 from compare.cli.questions.optima import capabilities, certainty, prices, robust, sweep, variants
 from compare.cli.questions.pareto import pareto
 from compare.cli.report import report, reproduce
 from compare.cli.simulate import simulate
-from compare.cli.solve import plan, search, solve
+from compare.cli.solve import plan, solve
 
 PANELS = {
-    "Problems, optima and searches": (list_problems, evaluate, solve, plan, search),
-    "Comparison": (compare, import_results, report, reproduce, bench, verify, archive),
+    "Problems, optima and searches": (list_problems, evaluate, solve, plan),
+    "Comparison": (compare, import_results, report, reproduce, bench, verify),
     "Questions": (sweep, prices, pareto, certainty, variants, robust, capabilities),
-    "Show and share": (simulate, animate, export, logs, export_objective, export_solver, cite),
+    "Show and share": (simulate, animate, export, export_objective, export_solver),
 }
 
 app = typer.Typer(
+    cls=Commands,
     help="Biped gait problems: the true optimum by IPOPT, and how far evolutionary search stops from it.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -10,11 +10,20 @@ import typer
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
 from compare.analysis.tuning import tune_solvers, write_tunings
+from compare.analysis.units import with_unit
 from compare.analysis.verdict import describe_best_known
 from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, end_interrupted, fail, report_interrupts, say_error
 from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
-from compare.cli.printing import describe_command, print_result, print_table, say, show_progress, stderr, stdout
+from compare.cli.printing import (
+    describe_command,
+    print_result,
+    print_table,
+    say,
+    show_progress,
+    stderr,
+    stdout,
+)
 from compare.cli.report import encode_simulations, print_simulations, simulate_best
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
@@ -39,6 +48,7 @@ from nlp_gait.interrupts import Interrupted
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
+MOST_RUNS = 12  # of a problem whose runs are printed one by one
 ALL, ALL_GRADIENT, BAYES = "all", (IPOPT, "slsqp"), BayesianOptimisation.name
 # Options for how and where a study runs; all others decide what it computes and are part of a study file.
 SESSION_OPTIONS = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
@@ -99,6 +109,7 @@ def compare(
     With `--engine` the report includes every solver's best gait in a physics engine, and whether it confirms the model.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
+    `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
     from compare.report import FurtherFiles, write_report
@@ -133,9 +144,11 @@ def compare(
     written = write_report(
         out, records, read_manifest(out), excluded=imported.excluded, further=FurtherFiles(csv=as_csv)
     )
-    data = {"problems": summarise_problems(records), **encode_simulations(gaits)} if as_json else {}
+    runs = [_encode_run(record) for record in records]
+    data = {"problems": summarise_problems(records), "runs": runs, **encode_simulations(gaits)} if as_json else {}
 
     def tables() -> None:
+        print_runs(records)
         print_summaries(records)
         print_simulations(gaits)
 
@@ -188,6 +201,44 @@ def end_if_none_left(records: Sequence[RunRecord]) -> None:
 def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
     """Return the table of solvers by problem as plain data."""
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
+
+
+def _encode_run(record: RunRecord) -> dict[str, Any]:
+    plain = record.to_json()
+    same = (
+        "problem",
+        "solver",
+        "run",
+        "seed",
+        "claimed_objective",
+        "claimed_violation",
+        "failed_evaluations",
+        "status",
+    )
+    return {
+        **{key: plain[key] for key in (*same, "x", "verdict")},
+        "evaluations": plain["evaluations"]["f"],
+        "time_s": plain["time_s"]["solve"],
+    }
+
+
+def print_runs(records: Sequence[RunRecord]) -> None:
+    """Print a table of the runs of each problem that has few of them, as judged by the exact functions."""
+    for comparison in compare_problems(records):
+        if len(comparison.records) <= MOST_RUNS:
+            rows = [
+                (
+                    record.solver,
+                    str(record.run),
+                    str(record.seed),
+                    with_unit(record.verdict.objective, comparison.objective.unit),
+                    f"{record.verdict.violation:.3g}",
+                    record.status,
+                )
+                for record in comparison.records
+            ]
+            header = ("solver", "run", "seed", comparison.objective.name, "violation", "status")
+            print_table(f"{comparison.problem}: runs", header, rows)
 
 
 # First columns on a narrow terminal, in reading order.

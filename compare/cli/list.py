@@ -12,6 +12,7 @@ from compare.cli.command import OUTPUT, command
 from compare.cli.options import AsJson
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, stdout
+from compare.study.citations import find_citations
 from compare.study.description import describe_solver, list_described_names
 from compare.study.task import list_solvers
 from metaheuristics.multi_objective import FRONT_ALGORITHMS
@@ -44,13 +45,26 @@ def list_problems(
     out: Annotated[
         Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG."), OUTPUT
     ] = None,
+    cite: Annotated[
+        bool,
+        typer.Option(
+            "--cite", help="Print BibTeX of a problem, a paper or an instance of GaitBench; of all without NAME."
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """List problems, algorithms and robots, or describe one of them.
 
-    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --algorithms`,
+    Examples: `nlp-gait list`, `nlp-gait list nao-ssp`, `nlp-gait list pso`, `nlp-gait list --cite nao-ssp`,
     `nlp-gait list --robot my_robot.urdf --out my_robot.png`, `nlp-gait list humanoid-cycle --robot my_robot.urdf`
     """
+    if cite:
+        entries = find_citations(name)
+        if as_json:
+            print_json({"entries": entries})
+        else:
+            stdout.print("\n\n".join(entries), soft_wrap=True)
+        return
     if robot is not None and name is None:
         _describe_robot(robot, out, as_json)
         return

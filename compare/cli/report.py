@@ -12,11 +12,13 @@ import typer
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.record_statistics import Weighting
+from compare.analysis.solver_table import describe_unknown
 from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, report_interrupts
 from compare.cli.options import AsCsv, AsJson, Code, name_all
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.cli.simulate import DriveOptions
+from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
@@ -60,6 +62,9 @@ def report(
     parquet: Annotated[
         bool, typer.Option("--parquet", help="Also write all runs as runs.parquet (extra parquet).")
     ] = False,
+    logs: Annotated[
+        bool, typer.Option("--logs", help="Also write the runs as logs for iohinspector, into the folder logs.")
+    ] = False,
     code: Code = None,
     drive_options: DriveOptions,
     as_csv: AsCsv = False,
@@ -99,6 +104,12 @@ def report(
     simulated = simulate_best(folder, records, drive_options.make()) if engine else []
     further = FurtherFiles(csv=as_csv, parquet=parquet, latex=latex, pdf=pdf, style=style)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
+    if logs:
+        comparisons = compare_problems(records)
+        for sentence in (s for comparison in comparisons for s in describe_unknown(comparison)):
+            say(f"not in the logs: {sentence}")
+        write_ioh(comparisons, folder / "logs")
+        written.append(folder / "logs")
     data = {**encode_simulations(simulated), "excluded": evidence.sentences}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
     end_if_excluded(evidence.sentences)

@@ -161,7 +161,7 @@ def plot_performance_profile(comparisons: Sequence[Comparison]) -> Figure:
         for name, look in assign_looks(profile).items():
             _draw_share(axes, *profile[name], name, look, last)
         use_log_axes(axes)
-        axes.set_xlim(left=1.0)
+        axes.set_xlim(1.0, last)
         axes.set_xlabel("factor of the cheapest solver's expected evaluations")
         axes.set_ylabel("share of problems and targets")
         add_legend_below(figure)

@@ -134,7 +134,10 @@ def use_log_axes(axes: Axes, both: bool = False) -> None:
     drawn = axes.dataLim  # its least positive values are infinite where nothing positive was drawn
     for axis, positive in ((axes.xaxis, drawn.minposx), (axes.yaxis, drawn.minposy if both else math.inf)):
         if math.isfinite(positive):
-            axes.set(**{"xscale" if axis is axes.xaxis else "yscale": "log"})
+            name = "x" if axis is axes.xaxis else "y"
+            if len(set(axis.get_data_interval())) == 1:  # one value has no range of its own
+                axes.set(**{f"{name}lim": (positive / 10.0, positive * 10.0)})
+            axes.set(**{f"{name}scale": "log"})
             axis.set_major_formatter(FuncFormatter(lambda value, _: format_power_of_ten(value)))
             axis.set_minor_formatter(NullFormatter())
 

@@ -111,7 +111,7 @@ def make_session_section(number: int, session: Session) -> Section:
 
 def make_citation_section(problems: Iterable[Mapping[str, Any]]) -> Section:
     """Return how to cite the software and the sources of problems, given by name and options."""
-    words = "The software and the papers whose problems are used here; `nlp-gait cite` prints these entries:"
+    words = "The software and the papers whose problems are used here; `nlp-gait list --cite` prints these entries:"
     entries = f"```bibtex\n{cite_problems(problems)}\n```"
     return Section(title="How to cite", parts=(Prose(f"{words}\n\n{entries}"),))
 

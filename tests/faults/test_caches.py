@@ -15,7 +15,7 @@ from nlp_gait.backends.kernel.compiler import find_compiler
 from tests.compare.cli.calls import nlp_gait
 from tests.faults.processes import in_own_mounts, quick_compiler, start
 
-SEARCH = ("search", "walk12", "--runs", "3", "--evaluations", "500", "--jobs", "1")
+SEARCH = tuple("compare walk12 --algorithms pso --starts 0 --runs 3 --evaluations 500 --jobs 1".split())
 
 
 def runs(folder: Path) -> dict[str, dict[str, Any]]:

@@ -105,7 +105,8 @@ def test_a_container_whose_user_has_no_entry(tmp_path: Path) -> None:
         "import pwd\ndef missing(*_):\n    raise KeyError('getpwuid(): uid not found')\npwd.getpwuid = missing\n"
     )
     kept = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME", FOLDER_VARIABLE)}
-    study = ("search", "walk12", "--runs", "1", "--evaluations", "100", "--out", str(tmp_path / "study"))
+    search = "compare walk12 --algorithms pso --starts 0 --runs 1 --evaluations 100 --jobs 1 --out"
+    study = (*search.split(), str(tmp_path / "study"))
     done = subprocess.run(
         [sys.executable, "-m", "nlp_gait", *study],
         cwd=ROOT,

@@ -148,23 +148,6 @@ def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [solution is None for solution in caught.value.partial] == [False, True, True]
 
 
-@pytest.mark.parametrize("with_folder", [True, False])
-def test_search_shows_the_finished_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_folder: bool) -> None:
-    press_after(monkeypatch, CompiledObjective, "__call__", 25)  # ten generations a run
-    folder = ["--out", str(tmp_path / "study")] if with_folder else []
-    done = run("search", "walk12", "--runs", "9", "--evaluations", "500", *folder)
-    assert "interrupted after 2 of 9 runs; finished runs are" in done.stderr
-    assert ("stored in" in done.stderr) == with_folder and ("not stored" in done.stderr) != with_folder
-    assert done.stdout.count("evaluation budget used") == 2
-    assert len(list(tmp_path.glob("study/records/*/*.json"))) == 2 * with_folder
-
-
-def test_search_before_the_first_run_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    press_after(monkeypatch, CompiledObjective, "__call__", 2)
-    done = run("search", "walk12", "--runs", "9", "--evaluations", "500")
-    assert done.stderr == "nlp-gait: interrupted after 0 of 9 runs\n" and done.stdout == ""
-
-
 @pytest.mark.slow
 def test_compare_with_worker_processes_is_continued_with_resume(tmp_path: Path) -> None:
     """As a terminal does it: the signal goes to the workers too."""
@@ -217,13 +200,14 @@ def test_a_compiler_that_is_busy_ends_too(tmp_path: Path) -> None:
 
     marker = tmp_path / "began"
     compiler = fake_compiler(tmp_path, f"echo $$ > {marker}; sleep 60")
-    process = start("search", "walk12", "--runs", "1", CXX=compiler, NLP_GAIT_CACHE=str(tmp_path / "cache"))
+    search = f"compare walk12 --algorithms pso --starts 0 --runs 1 --jobs 1 --out {tmp_path}/study"
+    process = start(*search.split(), CXX=compiler, NLP_GAIT_CACHE=str(tmp_path / "cache"))
     end = time.monotonic() + 60.0
     while not (marker.exists() and marker.read_text()) and time.monotonic() < end:
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGINT)
     _, messages = process.communicate(timeout=30)
-    assert process.returncode == 130 and messages == "nlp-gait: interrupted after 0 of 1 runs\n"
+    assert process.returncode == 130 and messages.startswith("nlp-gait: interrupted after 0 of 1 runs; ")
     state = subprocess.run(["ps", "-o", "stat=", "-p", marker.read_text().strip()], capture_output=True, text=True)
     assert state.stdout.strip()[:1] in ("", "Z")  # a Z has ended, but is not yet reaped
 
@@ -303,7 +287,7 @@ main()
 def test_while_modules_are_imported(module: str) -> None:
     """Before the command has begun, and within it."""
     done = subprocess.run(
-        [sys.executable, "-c", PRESSED_AT_IMPORT, module, "search", "walk12", "--runs", "1"],
+        [sys.executable, "-c", PRESSED_AT_IMPORT, module, "solve", "walk12", "--starts", "1"],
         capture_output=True,
         text=True,
         cwd=ROOT,

@@ -18,7 +18,7 @@ from tests.compare.cli.calls import one_sentence
 from tests.faults.processes import ROOT, in_own_mounts
 
 FULL = Path("/dev/full")
-SEARCH = "search walk12 --algorithm pso --runs 1 --evaluations 1000"
+EVALUATE = "evaluate walk12 --x 0.1,0.1,0.01,0.01"
 
 
 def shell(script: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -37,8 +37,8 @@ def shell(script: str, **environment: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 def test_numbers_are_printed_in_every_encoding(monkeypatch: pytest.MonkeyPatch) -> None:
-    done = shell(f"$gait {SEARCH}", PYTHONIOENCODING="ascii")
-    assert (done.returncode, done.stderr) == (0, "") and " 1 000 " in done.stdout
+    done = shell(f"$gait {EVALUATE}", PYTHONIOENCODING="ascii")
+    assert (done.returncode, done.stderr) == (0, "")
     for encoding in ("latin-1", "cp1252"):
         stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
         monkeypatch.setattr(sys, "stdout", stream)
@@ -84,7 +84,6 @@ def test_a_broken_pipe_is_silent_only_if_it_is_the_outputs() -> None:
     [
         "compare walk12 --runs 1 --starts 1 --evaluations 100 --out",
         "solve walk12 --starts 1 --out",
-        "search walk12 --runs 1 --evaluations 100 --out",
         "sweep walk12 --over foot_lift_m=0.01,0.02 --out",
         "evaluate walk12 --x 0.1,0.1,0.01,0.01 --signals",
     ],

@@ -31,7 +31,7 @@ WALK = ("step_length_m", "frontal_shift_m", "foot_lift_m", "bending_height_m")
 GAIT = "0.31,-0.0008,-0.0055,0.052,0.001,-0.0367,-0.0424,2"
 EVALUATE = ("evaluate", "nao-dsp", "--x", GAIT)
 STEP = "0.31,-0.001,0.003,0.012,0.001,-0.03,-0.03,0.015,0.6"
-SEARCH = ("search", "nao-dsp", "--runs", "1", "--evaluations", "60")
+SEARCH = tuple("compare nao-dsp --starts 0 --runs 1 --evaluations 60 --jobs 1 --out searched --algorithms".split())
 SOLVE = ("solve", "walk12", "--starts", "1")
 # Valid command lines, and how often each is taken.
 KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
@@ -45,9 +45,9 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (6, (*EVALUATE, "--set", "torque_change_limit_Nm=1", "--option", "intervals=8", "--json")),
     (4, (*EVALUATE, "--robot", "robot.json", "--derivatives", "finite-difference")),
     (3, (*EVALUATE, "--signals", "out/signals.npz")),
-    (3, (*SEARCH, "--algorithm", "pso", "--seed", "3", "--handling", "deb", "--json")),
-    (3, (*SEARCH, "--handling", "penalty", "--penalty-weight", "1", "--stagnation", "2", "--target", "0.5")),
-    (2, (*SEARCH, "--fix", "double_support_time_s=2", "--time-limit", "1", "--out", "searched")),
+    (3, (*SEARCH, "pso", "--seed", "3", "--handling", "deb", "--json")),
+    (3, (*SEARCH, "pso", "--handling", "penalty", "--penalty-weight", "1", "--stagnation", "2", "--target", "0.5")),
+    (2, (*SEARCH, "pso", "--fix", "double_support_time_s=2", "--time-limit", "1")),
     (1, (*SOLVE, "--x0", "0.1,0.1,0.2,1", "--json")),
     (1, (*SOLVE, "--set", "f1max=2", "--out", "out/solved.json")),
     (1, (*SOLVE, "--jobs", "2", "--seed", "5")),
@@ -89,7 +89,7 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
     (3, ("import", "walk12", "finals.csv", "--as", "GA (MATLAB)", "--evaluations", "100", "--out", "taken")),
     (3, ("import", "walk12", "finals.csv", "--history", "histories.csv", "--as", "other", "--out", "taken", "--csv")),
     (1, ("report", "taken", "--gradient-weight", "5", "--json")),
-    (3, ("logs", "taken", "--to", "out/logs", "--format", "coco")),
+    (3, ("report", "taken", "--logs")),
     (2, ("export-objective", "walk12-w015", "--to", "out/objective")),
     (2, ("export", "walk.json", "--format", "npz", "--out", "out/gait.npz")),
     (4, ("evaluate", "--motion", "hand.motion", "--touch-down", "0.3", "--json")),
@@ -111,7 +111,6 @@ KNOWN_LINES: tuple[tuple[int, tuple[str, ...]], ...] = (
             "speed_m_s=nan",
         ),
     ),
-    (2, (*SEARCH, "--jobs", "2", "--algorithm", "de", "--json")),
     (1, ("prices", "walk12", "--starts", "1", "--checks", "0", "--out", "priced", "--json")),
     (1, ("compare", "walk12", "--algorithms", "de", "--scheduler", "nowhere:1", "--jobs", "2", "--out", "study")),
     (2, ("reproduce", "nothing", "--out", "reproduction")),

@@ -14,7 +14,7 @@ LINES = 40
 KEPT = (
     ("report", "9" * 400),
     ("report", "absent", "--gradient-weight", "nan"),
-    ("search", "nao-dsp", "--runs", "1000000000000", "--evaluations", "60"),
+    ("compare", "nao-dsp", "--runs", "1000000000000", "--evaluations", "60"),
     ("solve", "nao-ssp", "--intervals", "1000000000"),
     ("evaluate", "nao-dsp", "--x", "1", "--set", "self=1"),
     ("sweep", "walk12", "--over", "lambda=0:1:1000000000"),

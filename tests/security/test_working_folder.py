@@ -28,18 +28,7 @@ PROGRAM = (
     f"import sys; sys.path.insert(0, {str(ROOT)!r}); from compare.__main__ import main; import compare.report; main()"
 )
 CALLS = (
-    (
-        "search",
-        "walk12",
-        "--runs",
-        "2",
-        "--evaluations",
-        "60",
-        "--jobs",
-        "2",
-        "--out",
-        "../out",
-    ),
+    tuple("compare walk12 --algorithms pso --starts 0 --runs 2 --evaluations 60 --jobs 2 --out ../out".split()),
     ("solve", "walk12", "--starts", "1", "--solver", "sqpmethod"),
 )
 

@@ -187,7 +187,7 @@ def test_included_files_and_meshes_travel_with_an_mjcf(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, undrawn_pictures: None) -> None:
     call = CliRunner().invoke
-    packed = call(app, ["archive", str(folder), "--out", str(tmp_path / "study.zip")])
+    packed = call(app, ["verify", str(folder), "--pack", str(tmp_path / "study.zip")])
     assert packed.exit_code == 0, packed.output
     good = call(app, ["verify", str(tmp_path / "study.zip"), "--rerun", "5%", "--json"])
     assert good.exit_code == 0 and json.loads(good.stdout)["holds"], good.output

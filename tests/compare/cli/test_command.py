@@ -19,7 +19,6 @@ SHARED = ("--robot", "--intervals", "--derivatives", "--option", "--set", "--fix
 OF_A_PROBLEM = (
     "evaluate",
     "solve",
-    "search",
     "compare",
     "sweep",
     "prices",

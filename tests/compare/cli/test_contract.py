@@ -43,7 +43,7 @@ def test_evaluate_prints_what_scripts_rely_on(tmp_path):
         assert arrays["com"].shape == arrays["left_foot"].shape == (11, 3)
 
 
-def test_solve_search_and_compare(tmp_path, monkeypatch):
+def test_solve_and_compare(tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "save", save_one)
     solution = as_json("solve", "nao-ssp", "--starts", "1", "--seed", "0")
     for key in (
@@ -59,11 +59,6 @@ def test_solve_search_and_compare(tmp_path, monkeypatch):
     ):
         assert key in solution
     assert solution["claimed"] and solution["feasible"] and solution["objective"] == pytest.approx(0.845868, rel=1e-5)
-    runs = as_json("search", "nao-ssp", "--algorithm", "pso", "--runs", "2", "--seed", "3", "--evaluations", "1000")[
-        "runs"
-    ]
-    assert [run["seed"] for run in runs] == [3, 4]
-    assert all({"claimed_objective", "claimed_violation", "evaluations", "time_s", "x"} <= set(run) for run in runs)
     out = tmp_path / "study"
     nlp_gait(
         "compare", "nao-ssp", "--runs", "2", "--starts", "1", "--evaluations", "500", "--jobs", "1", "--out", str(out)
@@ -86,21 +81,21 @@ def test_fixed_variable_and_parameter():
     assert fixed["parameters"]["lambda"] == 0.3
 
 
-def test_same_seed_same_result_with_one_or_two_processes():
+def test_same_seed_same_result_with_one_or_two_processes(tmp_path, undrawn_pages):
     def search(jobs):
-        runs = as_json("search", "nao-ssp", "--algorithm", "ga", "--runs", "3", "--evaluations", "600", "--jobs", jobs)[
-            "runs"
-        ]
+        call = f"compare nao-ssp --algorithms ga --starts 0 --runs 3 --seed 3 --evaluations 600 --jobs {jobs}"
+        runs = as_json(*call.split(), "--out", tmp_path / jobs)["runs"]
+        assert all({"claimed_violation", "evaluations", "time_s", "verdict"} <= run.keys() for run in runs)
         return [(run["seed"], run["claimed_objective"], run["x"]) for run in runs]
 
-    assert search("1") == search("1") == search("2")
+    runs = search("1")
+    assert [seed for seed, _, _ in runs] == [3, 4, 5] and runs == search("2")
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["evaluate", "nao-spp", "--x", "1"], ["unknown problem 'nao-spp'", "nao-ssp"]),
-        (["search", "nao-ssp", "--algorithm", "psso"], ["unknown algorithm 'psso'", "pso"]),
         (["solve", "nao-ssp", "--fix", "swing_hight_m=0.02"], ["unknown variable", "swing_height_m"]),
         (["solve", "nao-ssp", "--set", "torque_change_limit=0.02"], ["unknown parameter", "torque_change_limit_Nm"]),
         (["sweep", "nao-ssp", "--over", "intervals=10:20:2"], ["is an option of nao-ssp", "--option intervals="]),
@@ -146,11 +141,11 @@ def test_unreachable_pose_is_evaluated_and_named():
 
 
 def test_help_has_examples():
-    for command in ("evaluate", "solve", "search", "compare", "list"):
+    for command in ("evaluate", "solve", "compare", "list"):
         assert f"nlp-gait {command}" in nlp_gait(command, "--help", COLUMNS="200").stdout
 
 
 def test_out_is_checked_before_the_work(tmp_path):
     blocked: Path = tmp_path / "file"
     blocked.write_text("")
-    assert "cannot write" in one_sentence("search", "nao-ssp", "--evaluations", "100000000", "--out", blocked)
+    assert "cannot write" in one_sentence("compare", "nao-ssp", "--evaluations", "100000000", "--out", blocked)

@@ -1,8 +1,7 @@
-"""``bench``, ``logs``, ``export-objective`` and ``export-solver`` as users call them."""
+"""``bench``, ``export-objective`` and ``export-solver`` as users call them."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -83,14 +82,6 @@ def test_bench_ranks_a_user_algorithm(mine: Path, tmp_path: Path, name: str) -> 
         )
         <= 80
     )
-
-    logs = tmp_path / "logs"
-    assert as_json("logs", out, "--to", logs)["runs"] == 3
-    (header,) = logs.rglob("*.json")
-    runs = json.loads(header.read_text())["scenarios"][0]["runs"]
-    assert len(runs) == 3 and all(0.0 < run["best"]["y"] < 1.0 for run in runs)
-    nlp_gait("logs", out, "--to", tmp_path / "coco", "--format", "coco")
-    assert len(list((tmp_path / "coco").rglob("*.info"))) == 1
 
 
 def test_bench_shows_the_baseline_alone(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def test_a_program_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, u
 
     assert "runs only if you name it" in one_sentence("compare", "--resume", "--out", "study")
     assert "recomputed" not in nlp_gait("compare", "--resume", "--out", "study", "--code", command).stderr
-    nlp_gait("archive", "study", "--out", "study.zip", "--code", command)
+    nlp_gait("verify", "study", "--pack", "study.zip", "--code", command)
     assert "code/my_search.py" in nlp_gait("verify", "study.zip").stdout
     Path("shared.py").write_text("ROWS = 30\n")
     assert "recomputed" in nlp_gait("compare", "--resume", "--out", "study", "--code", command).stderr

@@ -63,7 +63,8 @@ def test_every_command_takes_them(mine: Path) -> None:
     x = ",".join(map(repr, best["x"].values()))
     verdict = as_json("evaluate", "my.py:two_link", "--option", "intervals=10", "--x", x)
     assert verdict["objective"]["value"] == pytest.approx(best["objective"])
-    found = as_json("search", "my.py:two_link", "--algorithm", "my.py:annealing", "--runs", "1", "--evaluations", "300")
+    search = "compare my.py:two_link --algorithms my.py:annealing --starts 0 --runs 1 --evaluations 300 --jobs 1"
+    found = as_json(*search.split())
     assert found["runs"][0]["evaluations"] == 300 and found["runs"][0]["verdict"]["feasible"]
     assert "swing_rad" in nlp_gait("list", "my.py:two_link").stdout
     swept = ["sweep", "my.py:two_link", "--over", "speed_m_s=0.5,0.6", "--out", "sweep", "--evaluations", "200"]

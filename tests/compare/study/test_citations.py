@@ -71,13 +71,15 @@ def test_every_problem_and_instance_leads_to_its_source(name: str) -> None:
 
 
 def test_the_command_prints_bibtex() -> None:
-    whole = nlp_gait("cite").stdout
+    whole = nlp_gait("list", "--cite").stdout
     assert keys([whole]) == ["nlp-gait", "Gupta2023", "Goswami2008", "Bhardwaj", "gaitbench"]
     assert whole.count("{") == whole.count("}") and f"note = {{Version {CFF['version']}}}" in whole
     assert "author = {Gupta, Pushpendra and Pratihar, Dilip Kumar and Deb, Kalyanmoy}" in whole
-    assert keys(as_json("cite", "nao")["entries"]) == ["nlp-gait", "Gupta2023"]
-    assert "unknown problem, paper or instance 'walk13'; did you mean 'walk12'" in one_sentence("cite", "walk13")
-    assert "known: " in one_sentence("cite", "0")
+    assert keys(as_json("list", "--cite", "nao")["entries"]) == ["nlp-gait", "Gupta2023"]
+    assert "unknown problem, paper or instance 'walk13'; did you mean 'walk12'" in one_sentence(
+        "list", "--cite", "walk13"
+    )
+    assert "known: " in one_sentence("list", "--cite", "0")
 
 
 def test_reports_cite_the_instance_and_leave_user_code_alone() -> None:

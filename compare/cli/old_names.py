@@ -1,0 +1,45 @@
+"""Removed commands and options: what replaces each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from typer.core import TyperGroup
+
+from compare.cli.endings import fail
+
+# By "command", "command --option" or "--option" of any command.
+REPLACEMENTS = {
+    "animate": "export --to gif (or mp4, html) draws a gait",
+    "archive": "verify FOLDER --pack FILE.zip packs a study",
+    "capabilities": "sweep --capabilities reports what a robot can do",
+    "cite": "list --cite [NAME] prints BibTeX",
+    "export-objective": "export --to objective writes an instance of GaitBench in C++",
+    "export-solver": "export --to solver writes a problem with its derivatives in C++",
+    "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
+    "motions": "variants compares richer motions",
+    "motors": "variants compares motors",
+    "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
+    "walk": "sweep --engine simulates the cheapest cycle at each speed",
+}
+
+
+class Commands(TyperGroup):
+    """Commands of the app; a removed command or option ends with one sentence that names the new way."""
+
+    def resolve_command(self, context: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Return the command of the arguments as Typer does, after a look at the removed names."""
+        found = self.get_command(context, args[0])
+        names = [args[0]] if found is None else _list_unknown_options(found, args)
+        for name in names:
+            if name in REPLACEMENTS:
+                fail(f"{name.split()[-1]} was removed: {REPLACEMENTS[name]}", status=2)
+        return super().resolve_command(context, args)
+
+
+def _list_unknown_options(command: Any, args: Sequence[str]) -> list[str]:
+    """Return the keys of options that a command does not have."""
+    known = {flag for parameter in command.params for flag in (*parameter.opts, *parameter.secondary_opts)}
+    given = [arg.split("=")[0] for arg in args[1:] if arg.startswith("--")]
+    return [key for flag in given if flag not in known for key in (f"{args[0]} {flag}", flag)]

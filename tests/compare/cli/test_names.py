@@ -1,0 +1,26 @@
+"""Names of commands and options, and what is said of removed ones."""
+
+import pytest
+from typer.main import get_command
+
+from compare.cli import app
+from compare.cli.old_names import REPLACEMENTS
+from tests.compare.cli.calls import one_sentence
+
+COMMANDS = get_command(app).commands
+
+
+def test_each_option_has_a_text():
+    for name, made in COMMANDS.items():
+        assert [option.name for option in made.params if not (option.help or option.metavar)] == [], name
+
+
+# What the parser does not know; the others are still there.
+REMOVED = [name for name in REPLACEMENTS if name not in COMMANDS]
+
+
+@pytest.mark.parametrize("name", REMOVED)
+def test_a_removed_name_is_answered_by_its_replacement(name):
+    command, dashes, option = name.partition("--")
+    call = [command.strip() or "compare", dashes + option] if dashes else [name]
+    assert REPLACEMENTS[name] in one_sentence(*call, status=2)
