@@ -18,7 +18,7 @@ import numpy as np
 import compare.study
 from nlp_gait import gaitbench
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.backends.identity import describe_difference, identify_problem
 from nlp_gait.decoding import decode
 from nlp_gait.files import read_json, write_json
 from nlp_gait.formulation import GaitProblem, load
@@ -38,7 +38,7 @@ class Found(NamedTuple):
     problem: GaitProblem
     x: Sequence[float]
     found_by: str
-    proven_as: str = ""  # hash of the problem of a certificate in another form; "" for the problem's own
+    proven_as: str = ""  # name of a certificate in another form; "" for the problem's own
 
 
 def from_gaitbench() -> Iterator[Found]:
@@ -47,12 +47,11 @@ def from_gaitbench() -> Iterator[Found]:
         instance = gaitbench.load(id)
         evidence, runs = instance.evidence, instance.evidence.cma_runs
         found_by = f"{evidence.starts} start{'s' * (evidence.starts > 1)} of IPOPT"
-        proof, own = load_certificates().get(id), identify_problem(instance.gait_problem)[HASH]
         yield Found(
             instance.gait_problem,
             instance.best_x.tolist(),
             found_by + f" and {runs} long runs of CMA-ES" * (runs > 0),
-            own if proof is None else proof.problem[HASH],
+            id if id in load_certificates() else "",
         )
 
 
@@ -80,8 +79,7 @@ def from_certificates() -> Iterator[Found]:
 
 def main() -> None:
     """Write the file."""
-    best: dict[str, tuple[float, dict[str, Any]]] = {}
-    described: dict[str, dict[str, Any]] = {}
+    entries: dict[str, dict[str, Any]] = {}  # by description; equal problems of different names share their values
     for problem, x, found_by, proven_as in (*from_gaitbench(), *from_difficulty(), *from_files(), *from_certificates()):
         if len(x) != len(problem.names):
             print(f"{problem.address}: the point has {len(x)} values instead of {len(problem.names)}")
@@ -90,16 +88,26 @@ def main() -> None:
         if not values.violation <= FEASIBILITY_TOLERANCE:
             print(f"{problem.address}: the point found by {found_by} is infeasible by {values.violation:.3g}")
             continue
-        description = identify_problem(problem)
-        objective = problem.objective.sign * values.cost
-        key, before = description[HASH], best.get(description[HASH])
-        described[json.dumps(description, sort_keys=True)] = description
-        if before is None or values.cost < before[0] - ALIKE * abs(before[0]):
-            proof = find_certificate({HASH: proven_as or key})
-            proven = {"bound": proof and proof.certificate.bound, "proven_as": proof.problem[HASH] if proof else ""}
-            best[key] = (values.cost, {"objective": objective, "x": list(x), "found_by": found_by, **proven})
-            print(f"{problem.address} {dict(problem.values)}: {objective:.9g}, was {before}")
-    write_json(FILE, [{"problem": known, **best[known[HASH]][1]} for known in described.values()])
+        problem_part, cost = identify_problem(problem), values.cost
+        equal = (entry for entry in entries.values() if not describe_difference(entry["problem"], problem_part))
+        before = next(equal, None)
+        if before is None or cost < problem.objective.sign * before["objective"] - ALIKE * abs(before["objective"]):
+            name = proven_as or next(
+                (n for n, f in load_certificates().items() if f is find_certificate(problem_part)), ""
+            )
+            bound = load_certificates()[name].certificate.bound if name else None
+            best = {"objective": problem.objective.sign * cost, "x": list(x), "found_by": found_by}
+            best |= {"bound": bound, "proven_as": name}
+            print(
+                f"{problem.address} {dict(problem.values)}: {best['objective']:.9g}, was {before and before['objective']}"
+            )
+            for entry in entries.values():
+                if not describe_difference(entry["problem"], problem_part):
+                    entry |= best
+        else:
+            best = {key: value for key, value in before.items() if key != "problem"}
+        entries.setdefault(json.dumps(problem_part, sort_keys=True), {"problem": problem_part, **best})
+    write_json(FILE, list(entries.values()))
 
 
 if __name__ == "__main__":

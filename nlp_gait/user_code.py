@@ -36,6 +36,7 @@ ENDING = ".py"
 PROGRAM = "cmd:"
 LARGEST_SOURCE = 4 * 2**20  # bytes
 LARGEST_PROGRAM = 64 * 2**20  # it may be compiled
+HAS_DOCSTRING = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 _allowed: dict[str, str] = {}
 # Files that another machine has sent, by the place that a reference names.
@@ -180,12 +181,36 @@ def hash_source(text: str, kind: Kind) -> str:
 
 
 def hash_file(path: Path) -> str:
-    """Return the hash of a source file and of the files in its folder that it imports, directly or not.
+    """Return the hash of a source file and of the files in its folder that it imports, without comments and docstrings.
 
     A file that is not Python's imports those of the same ending whose names occur in it.
     """
-    contents = _read_with_imports(path).values()
+    contents = [
+        strip_source(content) if file.suffix == ENDING else content
+        for file, content in _read_with_imports(path).items()
+    ]
     return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in contents)).hexdigest()
+
+
+@lru_cache(maxsize=256)  # a study hashes its files for every record
+def strip_source(source: bytes) -> bytes:
+    """Return what Python runs of a source, as text: without comments and docstrings, which change nothing."""
+    try:
+        return _dump(ast.parse(source)).encode()
+    except (SyntaxError, ValueError):
+        return source  # running it reports the error
+
+
+def _dump(node: object) -> str:
+    """Return a syntax tree as text; parts that are empty are left out, for other versions of Python have more of them."""
+    if isinstance(node, list):
+        return f"[{', '.join(map(_dump, node))}]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    parts = dict(ast.iter_fields(node))
+    if isinstance(node, HAS_DOCSTRING) and ast.get_docstring(node, clean=False) is not None:
+        parts["body"] = node.body[1:]
+    return f"{type(node).__name__}({', '.join(f'{k}={_dump(v)}' for k, v in parts.items() if v not in (None, []))})"
 
 
 def list_source_files(text: str, kind: Kind) -> list[Path]:

@@ -25,7 +25,7 @@ from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec
 from compare.study.task import Task
 from nlp_gait import gaitbench
-from nlp_gait.backends.identity import HASH
+from nlp_gait.backends.identity import PROBES
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_folder, replace_file, replace_nan, write_json
 
@@ -106,8 +106,8 @@ def shorten(record: RunRecord) -> RunRecord:
     """Return a record without what the leaderboard does not read; of its history, the changes of the best and the last entry."""
     counts, best, verdict = record.history.evaluations, record.history.objective, record.verdict
     kept = [k for k, value in enumerate(best) if value != (best[k - 1] if k else None) or k == len(best) - 1]
-    # An instance is identified by its probe values: the hash of its mathematics depends on the version of CasADi.
-    problem = {key: value for key, value in record.definition["problem"].items() if key != HASH}
+    # The instance has probes of its own in its facts.
+    problem = {key: value for key, value in record.definition["problem"].items() if key != PROBES}
     return replace(
         record,
         definition={**record.definition, "problem": problem},

@@ -10,7 +10,7 @@ from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
 from compare.analysis.record_statistics import compute_signed_rank, correct_by_holm, tie
 from compare.analysis.units import format_percent, join_words
 from compare.analysis.verdict import FOUND, SIGNIFICANT, Pair, compare_pairs
-from nlp_gait.backends.identity import SOURCE
+from compare.study.definition import SOURCE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,17 +14,18 @@ from typing import Any
 
 from compare.analysis.tuning import FILE as TUNING
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
+from compare.study.definition import SOURCE
 from compare.study.record import RunRecord, format_now, hash_installed_code
 from compare.study.record_files import RECORDS
 from compare.study.references import find_reference
 from compare.study.settings import FILE, Manifest, read_manifest
-from nlp_gait.backends.identity import FILES, HASH, SOURCE
+from nlp_gait.backends.identity import FILES
 from nlp_gait.errors import InputError
 from nlp_gait.files import read_bytes, replace_file
 from nlp_gait.proofs.certificate import CERTIFICATES, load_certificates
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.loading import find_robot_file, list_robot_files
-from nlp_gait.user_code import Kind, hash_source, list_source_files, resolve_code
+from nlp_gait.user_code import Kind, hash_source, is_user_code, list_source_files, resolve_code
 
 README, LOCK, CRATE = "README.md", "requirements.txt", "ro-crate-metadata.json"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
@@ -115,10 +116,10 @@ def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> No
     for record in records:
         solver = record.definition["solver"]
         for part in (record.definition["problem"], solver if isinstance(solver, Mapping) else {}):
-            if SOURCE in part and "name" in part:
-                kind: Kind = "algorithm" if part is solver else "problem"
+            kind: Kind = "algorithm" if part is solver else "problem"
+            if (kind == "problem" and is_user_code(part["name"], kind)) or (SOURCE in part and "name" in part):
                 name = resolve_code(part["name"], kind, "the study")
-                if hash_source(name, kind) != part[SOURCE]:
+                if SOURCE in part and hash_source(name, kind) != part[SOURCE]:
                     raise InputError(f"{name!r} has changed since the study; restore it, or rerun the study")
                 for path in list_source_files(name, kind):
                     content[f"code/{path.name}"] = read_bytes(path, "code")
@@ -126,8 +127,8 @@ def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> No
 
 def _collect_certificates(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
     known = {find_reference(record.definition["problem"]).proven_as for record in records}
-    for name, file in load_certificates().items():
-        if file.problem[HASH] in known:
+    for name in load_certificates():
+        if name in known:
             content[f"certificates/{name}.json"] = read_bytes(CERTIFICATES / f"{name}.json", "certificate")
 
 

@@ -14,14 +14,14 @@ from compare.analysis.tuning import read_tunings
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown
-from compare.study.definition import describe_differences, hash_definition
+from compare.study.definition import SOURCE, describe_differences, is_same_definition
 from compare.study.evidence import name_record, read_evidence
 from compare.study.record import RunRecord, hash_installed_code, load_problem
 from compare.study.run_task import try_task
 from compare.study.settings import FILE, Manifest, read_manifest
 from compare.study.simulations import load_simulations
 from compare.study.task import Handling, ProblemSpec, Stop, Task
-from nlp_gait.backends.identity import FILES, SOURCE
+from nlp_gait.backends.identity import FILES
 from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import make_temporary_folder, read_text
@@ -145,8 +145,8 @@ def _check_certificate(path: Path) -> str:
 
 
 def _check_code_files(folder: Path, records: Sequence[RunRecord]) -> list[Finding]:
-    """Compare archived user code, which is not run, with the hashes in the records."""
-    parts = [part for r in records for part in (r.definition["problem"], r.definition["solver"]) if SOURCE in part]
+    """Compare the archived code of user-defined solvers, which is not run, with the hashes in the records."""
+    parts = [part for r in records if SOURCE in (part := r.definition["solver"])]
     known = {(parse_reference(part["name"], "algorithm").short.partition(":")[0], part[SOURCE]) for part in parts}
     findings = []
     for name, digest in sorted(known):
@@ -234,7 +234,7 @@ def _make_task(record: RunRecord, definition: Mapping[str, Any]) -> Task:
     own, wanted = task.definition(), dict(record.definition)
     if polishes:  # its key is of the search, whose record is compared
         wanted["polishes"] = {key: value for key, value in polishes.items() if key != "key"}
-    if hash_definition(own) != hash_definition(wanted):
+    if not is_same_definition(own, wanted):
         raise InputError(f"it has another definition here: {describe_differences(wanted, own)}")
     return task
 

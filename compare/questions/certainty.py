@@ -20,16 +20,16 @@ from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.minimize import minimize
 from metaheuristics.registry import make_algorithm
-from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem
+from nlp_gait.backends.identity import fingerprint, hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
-from nlp_gait.proofs.bounds import has_power_form, make_bounds
+from nlp_gait.proofs.bounds import has_power_form
 from nlp_gait.proofs.branch_and_bound import TOLERANCE, Certificate, certify
 from nlp_gait.proofs.certificate import make_certificate_file
-from nlp_gait.proofs.checkpoint import hash_code
+from nlp_gait.proofs.checkpoint import PROVER
 
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4
@@ -154,7 +154,7 @@ class Certainty(Question[FoundCertainty]):
         limits = {"tolerance": self.tolerance, "time_limit_s": self.time_limit_s}
 
         def prove() -> Certificate:
-            name = f"proof-{hash_json({**identity, 'tolerance': self.tolerance})[:12]}.npz"
+            name = f"proof-{hash_json({**make_key(identity), 'tolerance': self.tolerance})[:12]}.npz"
             checkpoint = None if store.folder is None else store.folder / name
             return certify(problem, np.array(x), **limits, progress=progress, checkpoint=checkpoint)
 
@@ -165,7 +165,7 @@ class Certainty(Question[FoundCertainty]):
             search = work.compute(LongSearch, "cma-{key}", inputs, function)
             work.progress("long search")
         if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
-            inputs = {**identity, **limits, "proof_code_sha256": hash_code(make_bounds(problem))}
+            inputs = {**identity, **limits, "prover": PROVER}
             certificate = work.compute(Certificate, "certificate-{key}", inputs, prove)
         yield FoundCertainty(
             problem=problem,

@@ -16,7 +16,7 @@ from compare.study.references import find_reference
 from compare.study.task import GRADIENT_SOLVERS, describe_settings, list_solvers
 from metaheuristics.errors import SearchError
 from metaheuristics.registry import ALGORITHMS, make_algorithm
-from nlp_gait.backends.identity import HASH
+from nlp_gait.backends.identity import hash_json, make_key
 from nlp_gait.backends.solvers.registry import make_solver
 from nlp_gait.errors import GaitError
 
@@ -50,7 +50,7 @@ def make_reference_table(records: Iterable[RunRecord]) -> Table | str:
     """Return the best of the records next to the shipped best known value, a row for each problem that has one."""
     groups: dict[str, list[RunRecord]] = {}
     for record in records:
-        groups.setdefault(str(record.definition["problem"].get(HASH)), []).append(record)
+        groups.setdefault(hash_json(make_key(record.definition["problem"])), []).append(record)
     rows = []
     for group in groups.values():
         known, objective = find_reference(group[0].definition["problem"]), read_objective(group[0])

@@ -1,4 +1,4 @@
-"""What a run depends on: hashes of definitions, and their differences in words.
+"""What a run depends on: keys of definitions, whether two are equal, and their differences in words.
 
 Paths are part of a definition, for its readers, but not of its hash: a robot or user code is identified by its content.
 """
@@ -8,20 +8,20 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.backends.identity import FILES, FORMULAS, HASH, SOURCE, hash_json
+from nlp_gait.backends.identity import PROBES, VALUES, describe_difference, hash_json, make_key
 from nlp_gait.user_code import hash_file, shorten_name
 
 SHOWN_DIGITS = 8  # of a hash
+SOURCE = "source_sha256"  # of user code, see ``hash_file``
 MATHEMATICS = "the problem's mathematics or limits"
 WORDS: Mapping[tuple[str, ...], str] = {
-    ("problem", HASH): MATHEMATICS,
-    ("problem", SOURCE): "the problem's source",
+    ("problem", VALUES): MATHEMATICS,
     ("solver", SOURCE): "the solver's source",
     ("polishes", "key"): "the search that it polishes",
 }
 INPUT_WORDS = {
-    FORMULAS: MATHEMATICS,
-    "parameters": "values of the problem's parameters",
+    VALUES: MATHEMATICS,
+    "parameters": "values of the problem's parameters",  # any of them
     "code_sha256": "the program has changed",
 }
 
@@ -39,8 +39,13 @@ def hash_solver_source(solver: object) -> str | None:
 
 
 def hash_definition(definition: Mapping[str, Any]) -> str:
-    """Return the hash of a definition without paths."""
+    """Return the hash of a definition without paths and probes, for names of files."""
     return hash_json(_remove_paths(definition))
+
+
+def is_same_definition(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Return whether two definitions have equal results: the problem evaluates to the same values, all else is equal."""
+    return not describe_difference(old["problem"], new["problem"]) and hash_definition(old) == hash_definition(new)
 
 
 def select_shared(definition: Mapping[str, Any]) -> dict[str, Any]:
@@ -50,21 +55,26 @@ def select_shared(definition: Mapping[str, Any]) -> dict[str, Any]:
 
 def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     """Return the differences of two definitions in words: ``evaluations 500 -> 1000, the solver's source``."""
-    return _join(_compare_definitions(old, new))
+    differences = _join(_compare_definitions(old, new))
+    changed = describe_difference(old["problem"], new["problem"])
+    return f"{MATHEMATICS}: {changed}" if differences in ("", MATHEMATICS) and changed else differences
 
 
 def describe_input_differences(old: Any, new: Any) -> str:
     """Return the differences of the inputs of a stored result in words: ``starts 5 -> 10``."""
-    places = list(_compare(old, new))
-    return _join([place for place in places if place[0][-1] != FORMULAS] or places)
+    places = [place for place in _compare(old, new) if PROBES not in place[0]]
+    differences = _join([place for place in places if place[0][-1] != VALUES])
+    return differences or f"{MATHEMATICS}: {describe_difference(old, new)}"
 
 
 def describe_edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     """Return what a definition has where it differs from another one: ``evaluations 500``, ``source 3fa9c1d2``."""
     parts = []
     for place, before, _ in _compare_definitions(old, new):
-        name = {HASH: "mathematics", SOURCE: "source"}.get(place[-1], place[-1])
-        parts.append(f"{name} {str(before)[:SHOWN_DIGITS] if place[-1] in (HASH, SOURCE, 'key') else _shorten(before)}")
+        name = {VALUES: "mathematics", SOURCE: "source"}.get(place[-1], place[-1])
+        parts.append(
+            f"{name} {str(before)[:SHOWN_DIGITS] if place[-1] in (VALUES, SOURCE, 'key') else _shorten(before)}"
+        )
     return ", ".join(parts)
 
 
@@ -73,21 +83,17 @@ Difference = tuple[tuple[str, ...], Any, Any]
 
 
 def _remove_paths(definition: Mapping[str, Any]) -> dict[str, Any]:
-    problem, solver = dict(definition["problem"]), definition["solver"]
-    if SOURCE in problem:
-        problem["name"] = shorten_name(problem["name"])
-    # The hash of the mathematics includes the content of files.
-    problem["options"] = {**problem["options"], **dict.fromkeys(problem.pop(FILES, ()), "")}
+    problem, solver = make_key(definition["problem"]), definition["solver"]
     if isinstance(solver, Mapping) and "name" in solver:
         solver = {**solver, "name": shorten_name(solver["name"])}
     return {**definition, "problem": problem, "solver": solver}
 
 
 def _compare_definitions(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[Difference]:
-    """Differences of two definitions; that of the mathematics only if nothing else in the problem explains it."""
+    """Differences of two definitions; that of the values only if nothing else in the problem explains it."""
     found = list(_compare(_remove_paths(old), _remove_paths(new)))
-    explained = any(place[0] == "problem" and place[-1] != HASH for place, _, _ in found)
-    return [difference for difference in found if not explained or difference[0] != ("problem", HASH)]
+    explained = any(place[0] == "problem" and place[-1] != VALUES for place, _, _ in found)
+    return [difference for difference in found if not explained or difference[0] != ("problem", VALUES)]
 
 
 def _compare(old: Any, new: Any) -> Iterator[Difference]:
@@ -106,10 +112,10 @@ def _list_leaves(data: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple
 
 
 def _join(found: list[Difference]) -> str:
-    texts = [
-        WORDS.get(place) or INPUT_WORDS.get(place[-1]) or f"{place[-1]} {_shorten(before)} -> {_shorten(after)}"
-        for place, before, after in found
-    ]
+    texts = []
+    for place, before, after in found:
+        words = WORDS.get(place) or INPUT_WORDS.get(place[-1]) or INPUT_WORDS.get(place[0])
+        texts.append(words or f"{place[-1]} {_shorten(before)} -> {_shorten(after)}")
     return ", ".join(dict.fromkeys(texts))
 
 

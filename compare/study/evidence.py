@@ -15,11 +15,11 @@ import numpy as np
 
 from compare.judge import evaluate
 from compare.study.definition import select_shared
-from compare.study.record import Origin, RunRecord, Verdict, hash_installed_code, load_problem
+from compare.study.record import RunRecord, Verdict, hash_installed_code, load_problem
 from compare.study.record_files import read_each
 from compare.study.references import SAME_VALUE, find_reference
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH, hash_json, identify_problem
+from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.formulation import Array, GaitProblem, Objective
@@ -125,13 +125,11 @@ def name_record(record: RunRecord) -> str:
 
 def _check_points(problem: GaitProblem, records: Sequence[RunRecord], reasons: "Reasons") -> None:
     """Compare objective, violation, feasibility and indexes with the exact functions at x."""
-    identity, described, here = identify_problem(problem), asdict(problem.objective), Origin.make()
+    identity, described = identify_problem(problem), asdict(problem.objective)
     points: dict[int, Array] = {}
     for k, (record, why) in enumerate(zip(records, reasons, strict=True)):
-        known = record.definition["problem"].get(HASH)
-        other_casadi = record.origin is not None and record.origin.casadi != here.casadi
-        if known != identity[HASH] and not other_casadi:
-            why.append("its problem has changed since: the hashes of the exact functions or values differ")
+        if difference := describe_difference(record.definition["problem"], identity):
+            why.append(f"its problem has changed since: {difference}")
         if record.definition["objective"] != described:
             why.append(f"its objective is {record.definition['objective']}, that of the problem {described}")
         if not record.x:

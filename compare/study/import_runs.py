@@ -13,7 +13,7 @@ from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.record_files import RECORDS, read_records
 from compare.study.store import pass_through_json
 from compare.study.task import LABEL, ProblemSpec
-from nlp_gait.backends.identity import hash_json, identify_problem
+from nlp_gait.backends.identity import describe_difference, hash_json, identify_problem
 from nlp_gait.columns import CsvTable, read_table
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
@@ -153,12 +153,12 @@ def read_imported_records(folder: Path, records: Sequence[RunRecord]) -> Checked
     """Return the checked imported records in a folder whose problems are those of some records."""
     if not (folder / RECORDS).is_dir():
         return CheckedRecords([], [])
-    known = {record.problem: record.definition["problem"].get("sha256") for record in records}
+    known = {record.problem: record.definition["problem"] for record in records}
     imported = [
         record
         for record in read_records(folder)
         if "imported" in record.definition
         and record.problem in known
-        and record.definition["problem"].get("sha256") == known[record.problem]
+        and not describe_difference(record.definition["problem"], known[record.problem])
     ]
     return check_records(imported)

@@ -27,11 +27,10 @@ from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import format_html_table, import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
-from nlp_gait.user_code import resolve_code
+from nlp_gait.user_code import resolve_code, strip_source
 
-# Packages and modules that decide the result of a run, next to the problem's mathematics, whose hash is in the definition.
-CODE = ("metaheuristics", "nlp_gait.backends", "compare.study.run_task")
-ENDINGS = (".py", ".hpp")
+# Packages and modules that decide the result of a run, next to the problem, whose probes are in the definition.
+CODE = ("metaheuristics", "nlp_gait.backends.solvers", "nlp_gait.backends.nlp", "compare.study.run_task")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +39,7 @@ class Origin:
 
     version: str  #: of this package
     code_sha256: str  #: hash of the installed code that runs solvers
-    casadi: str  #: its version, on which the hash of a problem depends
+    casadi: str  #: its version
     machine: str  #: processor and system
 
     @classmethod
@@ -78,18 +77,17 @@ def describe_system() -> str:
 
 @cache
 def hash_installed_code() -> str:
-    """Return the hash of the installed code that runs solvers."""
+    """Return the hash of the installed code that runs solvers, without comments and docstrings."""
     found = {}
     for name in CODE:
         package, _, module = name.rpartition(".")
         path = Path(str(files(package or module))) / (module if package else "")
-        sources = sorted(path.rglob("*")) if path.is_dir() else [path.with_suffix(".py")]
-        own = [source for source in sources if source.suffix in ENDINGS]
-        found[name] = [(s.relative_to(path.parent).as_posix(), s.read_text(encoding="utf-8")) for s in own]
+        sources = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
+        found[name] = [(s.relative_to(path.parent).as_posix(), strip_source(s.read_bytes()).decode()) for s in sources]
     return hash_json(found)
 
 
-SCHEMA = 3
+SCHEMA = 4
 REMEDY = "delete it to have the run repeated"
 CALLS = tuple(field.name for field in fields(Evaluations))
 JUDGED = ("objective", "violation", "feasible", "feasible_between_samples", "guaranteed")

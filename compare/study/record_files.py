@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from compare.study.definition import hash_definition
+from compare.study.definition import hash_definition, is_same_definition
 from compare.study.record import RunRecord, read_record
 from compare.study.task import Task
 from nlp_gait.errors import InputError, OutputError
@@ -38,7 +38,7 @@ def write_record(record: RunRecord, folder: Path) -> Path:
         if path.exists():
             with suppress(InputError):  # a damaged record is overwritten
                 earlier = read_record(path).definition
-                if hash_definition(earlier) != hash_definition(record.definition):
+                if not is_same_definition(earlier, record.definition):
                     rename(path, _add_key(path, earlier))
         write_json(path, record.to_json())
         # Another study in this folder may have renamed a record of the same definition.
@@ -92,7 +92,7 @@ def find_record(folder: Path, task: Task) -> tuple[RunRecord | None, RunRecord |
         for candidate in (path, _add_key(path, definition)):
             if candidate.exists():
                 record = _read_checked(candidate)
-                if hash_definition(record.definition) == hash_definition(definition):
+                if is_same_definition(record.definition, definition):
                     return record, None
                 other = other or record
     return None, other
@@ -108,10 +108,6 @@ def _read_checked(path: Path) -> RunRecord:
     own = _locate(path.parents[1], record)
     if path not in (own, _add_key(own, record.definition)):
         raise InputError(f"record {str(path)!r} belongs to {own.parent.name}/{own.name}; rename or delete it")
-    if (
-        path != own
-        and own.exists()
-        and hash_definition(read_record(own).definition) == hash_definition(record.definition)
-    ):
+    if path != own and own.exists() and is_same_definition(read_record(own).definition, record.definition):
         raise InputError(f"record {str(path)!r} is also {own.parent.name}/{own.name}; delete one of them")
     return record

@@ -1,20 +1,17 @@
-"""Shipped best known values and proven bounds, by the hash of a problem: the references from which gaps are measured."""
+"""Shipped best known values and proven bounds: the references from which gaps are measured."""
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.backends.identity import PROBES, describe_difference, identify_problem
 from nlp_gait.decoding import decode
-from nlp_gait.errors import GaitError
 from nlp_gait.formulation import Objective, load
 from nlp_gait.formulation.result import StoredProblem
-from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaitbench.facts import SIX_DIGITS
 from nlp_gait.providers import FUNCTIONS, PROBLEMS, import_object
 
@@ -33,7 +30,7 @@ class Reference:
     x: tuple[float, ...] = ()  #: (n,) its point
     bound: float | None = None  #: proven: no feasible point has a better objective; None without a certificate
     source: str = OWN  #: in words, for example "shipped, proven to 1 %"
-    proven_as: str = ""  #: hash of the problem of the certificate
+    proven_as: str = ""  #: name of the certificate
 
     def to_json(self) -> dict[str, Any]:
         """Return value, bound and source as plain data."""
@@ -55,7 +52,7 @@ class Shipped:
     x: tuple[float, ...]  # (n,) its point; its total violation is at most the judge's tolerance
     found_by: str  # solvers and their number of runs, in words
     bound: float | None = None  # of its shipped certificate: no feasible point has a better objective
-    # Hash of the certificate's problem, which may be another form of this one, such as with fixed variables for constants
+    # Name of the certificate, whose problem may be another form of this one, such as with fixed variables for constants
     proven_as: str = ""
 
 
@@ -66,22 +63,24 @@ def load_shipped() -> tuple[Shipped, ...]:
     return tuple(decode(Shipped, item) for item in raw)
 
 
-@cache
-def _index_by_hash() -> Mapping[str, Shipped]:
-    return {entry.problem.sha256: entry for entry in load_shipped()}
-
-
 def find_reference(problem: Mapping[str, Any]) -> Reference:
     """Return the reference of a problem as ``identify_problem`` describes it; without a shipped value, one that says so.
 
-    The hash decides. It depends on the version of CasADi, so a problem with an unknown hash and the name, options and values of a
-    shipped one is accepted if its exact functions have the shipped objective at the shipped point.
+    The shipped problem may have another name; it must evaluate to the same values. A description without probes is completed.
     """
-    shipped = _index_by_hash().get(str(problem.get(HASH, ""))) or _find_by_settings(json.dumps(problem, sort_keys=True))
+    if PROBES not in problem and problem.get("name") in PROBLEMS:
+        problem = _identify(json.dumps(problem, sort_keys=True))
+    differences = [(entry, describe_difference(asdict(entry.problem), problem)) for entry in load_shipped()]
+    shipped = next((entry for entry, difference in differences if not difference), None)
     if shipped is None:
+        if generated := _find_generated(str(problem.get("options", {}).get("instance", "")), problem):
+            return generated
+        names = ("name", "options", "parameters")
+        same = [why for entry, why in differences if all(getattr(entry.problem, n) == problem.get(n) for n in names)]
         known = any(entry.problem.name == problem.get("name") for entry in load_shipped())
-        none = Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
-        return _find_generated(str(problem.get("options", {}).get("instance", "")), str(problem.get(HASH, ""))) or none
+        if same:
+            return Reference(source=f"{OWN}; the shipped value is not used, for the problem has changed: {same[0]}")
+        return Reference(source=f"{OWN}; none is shipped for {'these settings' if known else 'this problem'}")
     return Reference(
         proven_as=shipped.proven_as,
         objective=shipped.objective,
@@ -94,11 +93,22 @@ def find_reference(problem: Mapping[str, Any]) -> Reference:
 
 
 @cache
-def _find_generated(id: str, sha256: str) -> Reference | None:
+def _identify(description: str) -> Mapping[str, Any]:
+    stored = decode(StoredProblem, json.loads(description))
+    return identify_problem(load(stored.name, **stored.options).with_values(**stored.parameters))
+
+
+def _find_generated(id: str, problem: Mapping[str, Any]) -> Reference | None:
     """Return the best known point of a generated instance, which may take some seconds if this machine has not found it yet."""
     instance = import_object(FUNCTIONS["load_generated"])(id)
-    if instance is None or identify_problem(instance.gait_problem)[HASH] != sha256:
+    if instance is None or describe_difference(problem, identify_problem(instance.gait_problem)):
         return None
+    return _make_generated_reference(id)
+
+
+@cache
+def _make_generated_reference(id: str) -> Reference:
+    instance = import_object(FUNCTIONS["load_generated"])(id)
     sign = instance.gait_problem.objective.sign
     source = f"generated with {instance.evidence}"
     return Reference(objective=sign * instance.best_known, x=tuple(instance.best_x.tolist()), source=source)
@@ -108,26 +118,3 @@ def describe_gap(bound: float, objective: float) -> str:
     """Return the relative gap of a proof in words: ``six digits`` or ``1 %``."""
     gap = abs(bound - objective) / (abs(objective) or 1.0)
     return "six digits" if gap <= SIX_DIGITS else f"{100 * gap:.2g} %"
-
-
-@cache
-def _find_by_settings(description: str) -> Shipped | None:
-    """Return the shipped value of a problem with the same name, options and values, if it has the same exact functions."""
-    raw = json.loads(description)
-    if raw.get("name") not in PROBLEMS:  # user code is not run
-        return None
-    try:
-        problem = decode(StoredProblem, {**raw, HASH: ""})
-        return next((s for s in load_shipped() if replace(s.problem, sha256="") == problem and _has_value(s)), None)
-    except (GaitError, ValueError):
-        return None
-
-
-def _has_value(shipped: Shipped) -> bool:
-    stored = shipped.problem
-    problem = load(stored.name, **stored.options).with_values(**stored.parameters)
-    if len(shipped.x) != len(problem.names):
-        return False
-    values = build_exact_model(problem).at(shipped.x, problem.p)
-    same = abs(problem.objective.sign * values.cost - shipped.objective) <= SAME_VALUE * abs(shipped.objective)
-    return same and values.violation <= FEASIBILITY_TOLERANCE

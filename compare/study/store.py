@@ -1,6 +1,5 @@
 """Finished results on disk: each is computed once for equal inputs, so that an interrupted command can be rerun to continue."""
 
-import inspect
 import io
 import json
 import math
@@ -17,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, get_type_hints
 import numpy as np
 
 from compare.study.definition import describe_input_differences
-from nlp_gait.backends.identity import fingerprint, hash_json
+from nlp_gait.backends.identity import PROBES, describe_difference, fingerprint, hash_json, split_probes
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.solvers import ipopt
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -29,6 +28,7 @@ from nlp_gait.formulation.solution import Best, Evaluations, Guess, Outcome
 from nlp_gait.interrupts import never
 from nlp_gait.processes import run_in_processes
 from nlp_gait.progress import Progress, ignore_progress
+from nlp_gait.user_code import strip_source
 
 FOLDER = "store"  # in the folder of the work
 KEY = "{key}"  # in a name
@@ -113,7 +113,7 @@ class Store:
             OutputError: a result cannot be stored, and the store has no ``report``.
             ValueError: a result is no plain data, or not finite.
         """
-        source = {CODE: hash_json([inspect.getsource(module) for module in code])} if code else {}
+        source = {CODE: _hash_code(code)} if code else {}
         inputs = {computation.name: {**computation.inputs, **source} for computation in computations}
         values: dict[str, Any] = dict.fromkeys(inputs)
         waiting: dict[str, Callable[[], Any]] = {}
@@ -150,13 +150,15 @@ class Store:
         if not isinstance(content, dict) or not content.keys() >= {"inputs", "result", "sha256", "result_sha256"}:
             return None
         intact = content["result_sha256"] == hash_json([content["result"], content["inputs"]])
-        fits = inputs is None or content["sha256"] == hash_json(inputs)
+        fits = inputs is None or (
+            content["sha256"] == _hash_inputs(inputs) and _has_same_probes(content["inputs"], inputs)
+        )
         return StoredResult(content["result"], content["inputs"]) if intact and fits else None
 
     def save(self, name: str, inputs: Mapping[str, Any], value: Any) -> Any:
         """Store a result, and return it as ``load`` does; raises as ``compute_all``."""
         value, inputs = pass_through_json(value), pass_through_json(inputs)
-        hashes = {"sha256": hash_json(inputs), "result_sha256": hash_json([value, inputs])}
+        hashes = {"sha256": _hash_inputs(inputs), "result_sha256": hash_json([value, inputs])}
         with self._writing(name, inputs, ".json") as path:
             if path is not None:
                 write_json(path, {"inputs": inputs, "result": value, **hashes})
@@ -173,14 +175,20 @@ class Store:
         except Exception:  # NumPy and zipfile raise a dozen kinds of errors on damaged archives
             return None
         identity = str(arrays.pop(IDENTITY, ""))
-        return arrays if identity == _identify_arrays(inputs, arrays) else None
+        try:
+            stored = json.loads(identity)
+        except ValueError:
+            return None
+        wanted = pass_through_json(_identify_arrays(inputs, arrays))
+        same = split_probes(stored)[0] == split_probes(wanted)[0] and _has_same_probes(stored, wanted)
+        return arrays if same else None
 
     def save_arrays(self, name: str, inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
         """Store arrays by name as an npz file; raises OutputError as ``compute_all``."""
         with self._writing(name, inputs, ".npz") as path:
             if path is not None:
                 with replace_file(path) as temporary, open(temporary, "wb") as file:
-                    identity = np.array(_identify_arrays(inputs, arrays))
+                    identity = np.array(json.dumps(_identify_arrays(inputs, arrays), sort_keys=True))
                     np.savez_compressed(file, allow_pickle=False, **arrays, **{IDENTITY: identity})
 
     def report_changes(self, question: str, problem: GaitProblem, **inputs: Any) -> None:
@@ -212,7 +220,7 @@ class Store:
     def _path(self, name: str, inputs: Mapping[str, Any] | None, suffix: str) -> Path | None:
         if self.folder is None:
             return None
-        return self.folder / f"{name.replace(KEY, hash_json(inputs)[:KEY_DIGITS])}{suffix}"
+        return self.folder / f"{name.replace(KEY, _hash_inputs(inputs)[:KEY_DIGITS])}{suffix}"
 
     @contextmanager
     def _writing(self, name: str, inputs: Mapping[str, Any], suffix: str) -> Iterator[Path | None]:
@@ -235,8 +243,24 @@ class Store:
                 self._counts.write(kind)
 
 
-def _identify_arrays(inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
-    return json.dumps({"inputs": inputs, "arrays": sorted(arrays)}, sort_keys=True)
+def _identify_arrays(inputs: Mapping[str, Any], arrays: Mapping[str, Array]) -> dict[str, Any]:
+    return {"inputs": inputs, "arrays": sorted(arrays)}
+
+
+def _hash_inputs(inputs: Mapping[str, Any] | None) -> str:
+    return hash_json(split_probes(inputs)[0])
+
+
+def _has_same_probes(stored: Any, inputs: Any) -> bool:
+    """Return whether the problems in stored inputs evaluate to the same values as those in others with the same key."""
+    before, after = split_probes(stored)[1], split_probes(pass_through_json(inputs))[1]
+    pairs = zip(before, after, strict=True)
+    return len(before) == len(after) and not any(describe_difference({PROBES: a}, {PROBES: b}) for a, b in pairs)
+
+
+def _hash_code(modules: Sequence[ModuleType]) -> str:
+    """Return the hash of the text of modules, without comments and docstrings."""
+    return hash_json([strip_source(Path(str(module.__file__)).read_bytes()).decode() for module in modules])
 
 
 def pass_through_json(data: Any) -> Any:

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from compare.study.definition import hash_solver_source, select_shared
+from compare.study.definition import SOURCE, hash_solver_source, select_shared
 from metaheuristics.external_program import ExternalProgram
 from metaheuristics.interface import Algorithm
 from metaheuristics.preparation import check_limits
 from metaheuristics.registry import ADAPTERS, ALGORITHMS, make_algorithm, make_handling
 from metaheuristics.user_algorithm import PlainFunction, to_algorithm
-from nlp_gait.backends.identity import SOURCE, hash_json, identify_problem
+from nlp_gait.backends.identity import hash_json, identify_problem
 from nlp_gait.backends.solvers.registry import SOLVERS, list_settings, make_solver
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, unknown

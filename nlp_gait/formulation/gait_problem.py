@@ -85,6 +85,7 @@ class GaitProblem:
     power_form: Callable[[GaitProblem], PowerForm] | None = None
     display: Display = Display()  #: what shows its gaits
     hints: SolverHints = SolverHints()  #: for solvers
+    mathematics: int = 1  #: version of the formulas, raised by hand where they change on purpose
     loaded_as: str = ""  #: argument of ``load``, if that is not the name but user code
     # No arguments: only copies made by ``with_values`` and ``with_origin`` share them.
     _cache: Cache = field(default_factory=Cache, init=False, repr=False)

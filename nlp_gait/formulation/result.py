@@ -25,22 +25,32 @@ FINE_INTERVALS = 1000  # of a grid that splines are fitted to: their error is be
 
 
 @dataclass(frozen=True, kw_only=True)
+class StoredProbe:
+    """Values of a problem at a point, see ``nlp_gait.backends.identity``; None where they are not finite."""
+
+    x: tuple[float, ...]
+    objective: float | None
+    violation: float | None
+    rows: Mapping[str, float | None]
+
+
+@dataclass(frozen=True, kw_only=True)
 class StoredProblem:
-    """A problem in a study's record."""
+    """A problem in a certificate or a study's record."""
 
     name: str  # argument of ``load``
     options: Mapping[str, str | int | float | bool]  # of its maker
     parameters: Mapping[str, float]  # that differ from the defaults
-    sha256: str  # hash of the mathematics and the parameters
-    source_sha256: str = ""  # hash of the source of a user-defined problem
-    files: tuple[str, ...] = ()  # options that name files; their content is part of the mathematics
+    mathematics: int = 1  # version of the formulas
+    files: Mapping[str, str] = field(default_factory=dict)  # hashes of the files that options name
+    probes: tuple[StoredProbe, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class _RecordFile:
     """Keys of a study's record that are read here."""
 
-    schema: Literal[3]
+    schema: Literal[4]
     definition: Mapping[str, Any]
     x: Mapping[str, float]
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.backends.identity import AGREEMENT, hash_json, identify_problem, make_key
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.backends.kernel.library_cache import find_cache_folder
 from nlp_gait.backends.solve import solve
@@ -20,6 +20,8 @@ from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
 SLACK = 1e-10
+# Where the objective exceeds this, joints almost cannot reach, and rounding is amplified so much that these digits agree.
+AMPLIFIED, AMPLIFIED_AGREEMENT = 1e15, 1e-7
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
@@ -45,7 +47,7 @@ def find_facts(instance: Judged) -> Facts:
     """
     if (shipped := find_shipped_facts(instance.id)) is not None:
         return shipped
-    digest = str(identify_problem(instance.gait_problem)[HASH])
+    digest = hash_json(make_key(identify_problem(instance.gait_problem)))
     path = find_cache_folder() / "gaitbench" / f"{instance.id.replace(':', '-')}-{digest[:16]}.json"
     try:
         return read_dataclass(Facts, path, "stored best known point", error=InputError)
@@ -125,14 +127,29 @@ def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
+def check_shipped_facts(instance: Judged) -> None:
+    """Compare the values of an instance with those in its shipped facts, if it has any; raises InputError."""
+    facts = find_shipped_facts(instance.id)
+    for number, probe in enumerate(() if facts is None else facts.probes, 1):
+        now = asdict(_make_probe(instance, np.array(probe.x)))
+        for name, before in asdict(probe).items():
+            agreement = AGREEMENT if abs(probe.objective) < AMPLIFIED else AMPLIFIED_AGREEMENT
+            if name != "x" and not abs(now[name] - before) <= agreement * max(1.0, abs(before)):
+                raise InputError(
+                    f"{instance.id} has changed: {name} at probe {number} is {now[name]:.10g}, not {before:.10g}; its best known "
+                    "point and its evidence are not used"
+                )
+
+
 def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
     """Return values at random points, between them and the best one, and at the best one."""
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
     X = np.concatenate([draws[:2], best + np.array([[0.3], [0.02]]) * (draws[2:] - best), best[None]])
-    values = [evaluate_interpreted(instance, x) for x in X]
-    weights = 1.0 + np.arange(len(values[0][1])) % 7
-    return tuple(
-        Probe(x=tuple(x.tolist()), objective=f, violation=float(np.maximum(G, 0.0).sum()), rows=float(G @ weights))
-        for x, (f, G) in zip(X, values, strict=True)
-    )
+    return tuple(_make_probe(instance, x) for x in X)
+
+
+def _make_probe(instance: Judged, x: Array) -> Probe:
+    f, G = evaluate_interpreted(instance, x)
+    rows = float(G @ (1.0 + np.arange(len(G)) % 7))
+    return Probe(x=tuple(x.tolist()), objective=f, violation=float(np.maximum(G, 0.0).sum()), rows=rows)

@@ -13,7 +13,7 @@ from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
 from nlp_gait.errors import InputError, check_name
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
-from nlp_gait.gaitbench.best_known import find_facts
+from nlp_gait.gaitbench.best_known import check_shipped_facts, find_facts
 from nlp_gait.gaitbench.facts import Evidence, Facts, Features
 from nlp_gait.gaitbench.generated import define, is_generated, make_id
 from nlp_gait.gaitbench.suite_problem import gaitbench
@@ -180,7 +180,9 @@ class Instance:
     @cached_property
     def _objective(self) -> CompiledObjective:
         with _BUILDING:
-            return compile_objective(self.gait_problem, threads=1)  # a pool of threads does not survive a fork
+            objective = compile_objective(self.gait_problem, threads=1)  # a pool of threads does not survive a fork
+            check_shipped_facts(load(self.id))
+            return objective
 
     @cached_property
     def _sides(self) -> OneSidedRows:

@@ -7,21 +7,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields
 from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.power_form import AGREEMENT, WIDENING, Integers, PowerForm
+from nlp_gait.formulation.power_form import AGREEMENT, WIDENING, PowerForm
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.boxes import Flags, Numbers, Remaining
@@ -42,7 +38,6 @@ class Bounds(ABC):
     """Bounds over boxes of z, which are the points x in some coordinates."""
 
     root: Array  # (1, n, 2) box that contains the z of all x within their bounds
-    identity: str  # hash of the functions and numbers that are enclosed
 
     def to_z(self, x: Array) -> Array:
         """Return the z (P, n) of points (P, n)."""
@@ -97,8 +92,6 @@ class AffineBounds(Bounds):
         # Of x and p to cost and rows; the last n rows are the variables themselves.
         self.function = AffineFunction(kernel.function)
         self.root = np.stack([problem.lower, problem.upper], axis=-1)[None]
-        numbers = (self._lower, self._upper, self._p, self._scale, self.root)
-        self.identity = _hash([kernel.function], numbers)
 
     def _prune(self, boxes: Array, target: float) -> Remaining:
         origin, done = np.arange(len(boxes)), list[Remaining]()
@@ -175,8 +168,6 @@ class PowerBounds(Bounds):
         _compare(problem, form)
         self._function, self._poses = QuadraticFunction(form.function), QuadraticFunction(form.poses)
         self._form, self.root = form, form.box[None]
-        numbers = [np.asarray(getattr(form.rows, field.name)) for field in fields(form.rows)]
-        self.identity = _hash([form.function, form.poses], [*numbers, form.pose_rows, self.root])
 
     def to_z(self, x: Array) -> Array:
         """Return the z of the form."""
@@ -217,10 +208,6 @@ def _compare(problem: GaitProblem, form: PowerForm) -> None:
     raise InputError(
         f"problem {problem.name!r}: none of {TRIES} random points satisfies the constraints {form.domain}...]"
     )
-
-
-def _hash(functions: Sequence[ca.Function], numbers: Sequence[Array | Integers]) -> str:
-    return hash_json([*(each.serialize() for each in functions), *(each.tolist() for each in numbers)])
 
 
 def _up(values: Array) -> Array:

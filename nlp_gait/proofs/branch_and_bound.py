@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import fingerprint, hash_json
+from nlp_gait.backends.identity import hash_json, identify_problem, make_key
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.bounds import Bounds, make_bounds
 from nlp_gait.proofs.boxes import halve
-from nlp_gait.proofs.checkpoint import Tree, hash_code, read_checkpoint, write_checkpoint
+from nlp_gait.proofs.checkpoint import Tree, read_checkpoint, write_checkpoint
 
 # Number of boxes that are halved together, at least: this, or one in SHARE of the open ones, so that sorting costs little.
 BATCH, SHARE = 1024, 8
@@ -73,7 +73,7 @@ def certify(
         time_limit_s: wall time after which the bound so far is returned [s].
         progress: receives the number of boxes, the bound in the problem's sense, and the share of the tree that is left.
         checkpoint: file with the open boxes, written every half minute and at the end; a killed proof continues from it. A
-            proof starts again, and reports it, if other code made the file.
+            proof starts again, and reports it, if another version of the prover made the file.
 
     Raises:
         InputError: the incumbent is not feasible, tolerance or time limit are not positive, or the checkpoint is damaged or
@@ -90,15 +90,15 @@ def certify(
         raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
     started, used = time.perf_counter(), time.process_time()
     bounds, target = make_bounds(problem), target_cost(at.cost, tolerance)
-    identity = hash_json(
-        {**fingerprint(problem), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()}
-    )
-    code = hash_code(bounds)
+    identity = identify_problem(problem)
+    proof = hash_json({**make_key(identity), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()})
     tree = None
     if checkpoint is not None and checkpoint.exists():
-        tree = read_checkpoint(checkpoint, identity, code, bounds.root)
+        tree = read_checkpoint(checkpoint, identity, proof, bounds.root)
         if tree is None:
-            progress(f"checkpoint {str(checkpoint)!r} was made by other code; the proof starts again")
+            progress(
+                f"checkpoint {str(checkpoint)!r} was made by another version of the prover; the proof starts again"
+            )
     if tree is None:
         whole = bounds.prune(bounds.root, target)
         tree = Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
@@ -116,10 +116,10 @@ def certify(
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
             saved = time.perf_counter()
             tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
-            write_checkpoint(checkpoint, identity, code, tree)
+            write_checkpoint(checkpoint, identity, proof, tree)
     tree.time_s, tree.cpu_s = time.perf_counter() - started, time.process_time() - used
     if checkpoint is not None:
-        write_checkpoint(checkpoint, identity, code, tree)
+        write_checkpoint(checkpoint, identity, proof, tree)
     return Certificate(
         objective=problem.objective.sign * at.cost,
         bound=compute_bound(),

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.identity import HASH, identify_problem
+from nlp_gait.backends.identity import describe_difference, identify_problem
 from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
@@ -27,7 +27,7 @@ from nlp_gait.progress import Progress
 from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.boxes import halve
 from nlp_gait.proofs.branch_and_bound import Certificate, certify, target_cost
-from nlp_gait.proofs.checkpoint import hash_code
+from nlp_gait.proofs.checkpoint import PROVER
 from nlp_gait.user_code import resolve_code
 
 CERTIFICATES = Path(str(files("nlp_gait.proofs") / "certificates"))
@@ -43,16 +43,15 @@ NEAREST, FARTHEST = -6.0, -1.0
 class CertificateFile:
     """A certificate and its problem."""
 
-    schema: Literal[1] = 1  # version of the file format
-    problem: Mapping[str, Any]  # name, options, parameters, and the hash of its mathematics
-    code_sha256: str  # hash of the code that made the proof, see ``hash_code``
+    schema: Literal[2] = 2  # version of the file format
+    problem: Mapping[str, Any]  # see ``identify_problem``
+    prover: int  # version that made the proof, see ``PROVER``
     certificate: Certificate  # the proven bound
 
 
 def make_certificate_file(problem: GaitProblem, certificate: Certificate) -> CertificateFile:
-    """Return the certificate of a problem with its problem and code."""
-    code = hash_code(make_bounds(problem))
-    return CertificateFile(problem=identify_problem(problem), code_sha256=code, certificate=certificate)
+    """Return the certificate of a problem with the problem and the version of the prover."""
+    return CertificateFile(problem=identify_problem(problem), prover=PROVER, certificate=certificate)
 
 
 def read_certificate(path: Path) -> CertificateFile:
@@ -69,8 +68,8 @@ def load_certificates() -> Mapping[str, CertificateFile]:
 
 
 def find_certificate(problem: Mapping[str, Any]) -> CertificateFile | None:
-    """Return the shipped certificate of a problem with the smallest gap, see ``identify_problem``; None if there is none."""
-    found = [file for file in load_certificates().values() if file.problem[HASH] == problem.get(HASH)]
+    """Return the shipped certificate with the smallest gap of an equal problem, which may have another name; None for none."""
+    found = [file for file in load_certificates().values() if not describe_difference(file.problem, problem)]
     return min(found, key=lambda file: file.certificate.gap, default=None)
 
 
@@ -84,7 +83,8 @@ class CertificateCheck:
     pieces: int  # number of boxes dropped on the way; each is proven to contain nothing better
     deepest: int  # number of halvings on the longest path
     boxes: float  # estimated number of boxes of the whole tree (Knuth 1975)
-    same_code: bool  # whether this code made the file; otherwise the paths prove what this code would prove
+    #: Whether this version of the prover made the file; otherwise the paths prove what this one would prove
+    same_prover: bool
 
 
 def load_certified_problem(file: CertificateFile) -> GaitProblem:
@@ -93,9 +93,12 @@ def load_certified_problem(file: CertificateFile) -> GaitProblem:
         stored = decode(StoredProblem, file.problem, "problem")
         name = resolve_code(stored.name, "problem", "the certificate")
         problem = load(name, **stored.options).with_values(**stored.parameters)
-    if identify_problem(problem) != dict(file.problem):
-        remedy = "rerun `nlp-gait certainty` on it"
-        raise InputError(f"problem {problem.name!r} has changed since the certificate was made; {remedy}")
+    difference = describe_difference(file.problem, identify_problem(problem))
+    if difference:
+        raise InputError(
+            f"problem {problem.name!r} has changed since the certificate was made: {difference}; its bound is not used, "
+            "rerun `nlp-gait certainty`"
+        )
     return problem
 
 
@@ -134,9 +137,9 @@ def check_certificate(
     for depth in range(DEEPEST_PATH):
         if not len(path):
             size = float(sizes[: (paths + 1) // 2].mean())
-            same = file.code_sha256 == hash_code(bounds)
+            same = file.prover == PROVER
             return CertificateCheck(
-                best=best, source=source, paths=paths, pieces=dropped, deepest=depth, boxes=size, same_code=same
+                best=best, source=source, paths=paths, pieces=dropped, deepest=depth, boxes=size, same_prover=same
             )
         sizes[path] += 2.0 * weight
         halves = bounds.prune(halve(open_, cut), target)

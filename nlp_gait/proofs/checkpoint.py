@@ -1,4 +1,4 @@
-"""Checkpoints of proofs: the open boxes in a file, with hashes of the proof, of the code that made it, and of the content.
+"""Checkpoints of proofs: the open boxes in a file, with the problem, the version of the prover, and a hash of the content.
 
 A file is a line of JSON and then rows of doubles, one for each open box: its ends, the lower bound of its cost, its next cut and
 its depth. It cannot unpack to more than its size.
@@ -9,31 +9,24 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from nlp_gait.backends.identity import hash_json
+from nlp_gait.backends.identity import describe_difference
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_bytes, replace_file
 from nlp_gait.formulation import Array
-from nlp_gait.proofs.bounds import Bounds
+from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.proofs.boxes import Numbers
 
-# Files of this package that decide what remains of a box, and what a proof is.
-PACKAGE = Path(str(files("nlp_gait.proofs")))
-CODE = (
-    "affine.py",
-    "quadratic.py",
-    "quadratic_tape.py",
-    "boxes.py",
-    "bounds.py",
-    "branch_and_bound.py",
-    "checkpoint.py",
-)
+# Version of the prover, written into certificates and checkpoints: raise it by hand where a change of this package decides what
+# remains of a box, or what a proof is.
+PROVER = 1
 LARGEST_CHECKPOINT = 2**31  # bytes; ten million open boxes of nine variables
 DEEPEST = 1000  # halvings; boxes of doubles have fewer
 
@@ -59,33 +52,29 @@ class Tree:
 class _Header:
     """First line of a checkpoint."""
 
+    problem: StoredProblem
     proof: str  # hash of problem, incumbent and tolerance
-    code: str  # see ``hash_code``
+    prover: int  # version
     content: str  # hash of the next three numbers and of all rows
     enclosed: int
     time_s: float
     cpu_s: float
 
 
-def hash_code(bounds: Bounds) -> str:
-    """Return the hash of all code that decides what remains of a box, and of the functions that it encloses."""
-    sources = [PACKAGE / name for name in CODE] + sorted((PACKAGE / "native").glob("*.hpp"))
-    return hash_json([bounds.identity, *(path.read_text(encoding="utf-8") for path in sources)])
-
-
-def write_checkpoint(path: Path, proof: str, code: str, tree: Tree) -> None:
+def write_checkpoint(path: Path, problem: Mapping[str, Any], proof: str, tree: Tree) -> None:
     """Write a checkpoint atomically; raises OutputError."""
     count, n, _ = tree.boxes.shape
     columns = [tree.boxes.reshape(count, 2 * n), tree.lowest[:, None], tree.cut[:, None], tree.depth[:, None]]
     rows = np.concatenate(columns, axis=1).astype("<f8").tobytes()
     work = tree.enclosed, tree.time_s, tree.cpu_s
-    header = _Header(proof, code, _hash_content(rows, work), *work)
+    stored = decode(StoredProblem, problem, "problem")
+    header = _Header(stored, proof, PROVER, _hash_content(rows, work), *work)
     with replace_file(path) as temporary:
         temporary.write_bytes(json.dumps(asdict(header)).encode() + b"\n" + rows)
 
 
-def read_checkpoint(path: Path, proof: str, code: str, root: Array) -> Tree | None:
-    """Return the open boxes of a proof within ``root`` (1, n, 2); None if other code made them.
+def read_checkpoint(path: Path, problem: Mapping[str, Any], proof: str, root: Array) -> Tree | None:
+    """Return the open boxes of a proof within ``root`` (1, n, 2); None if another version of the prover made them.
 
     Raises:
         InputError: the file is damaged, or belongs to another proof.
@@ -99,7 +88,9 @@ def read_checkpoint(path: Path, proof: str, code: str, root: Array) -> Tree | No
             raise ValueError("its content does not have the hash that its header states")
         if header.proof != proof:
             raise ValueError("it belongs to another problem, incumbent or tolerance")
-        if header.code != code:
+        if difference := describe_difference(asdict(header.problem), problem):
+            raise ValueError(f"its problem has changed: {difference}")
+        if header.prover != PROVER:
             return None
         n = root.shape[1]
         table = np.frombuffer(rows, dtype="<f8").reshape(-1, 2 * n + 3).astype(np.float64)

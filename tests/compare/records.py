@@ -47,7 +47,7 @@ def record(
     """A run of two variables with a history of (evaluations, best objective so far)."""
     value = next((v for _, v in reversed(history) if v is not None), None)
     definition: dict[str, Any] = {
-        "problem": {"name": problem, "options": {}, "parameters": {}, "sha256": "0" * 64},
+        "problem": {"name": problem, "options": {}, "parameters": {}},
         "objective": objective,
         "solver": solver,
         "settings": {},

@@ -106,7 +106,9 @@ def _definitions() -> dict[str, Callable[[Raw], None]]:
     problem = ("definition", "problem")
     return {
         "another weight": _put(*problem, "parameters", value={"lambda": 0.1}),
-        "another hash": _put(*problem, "sha256", value="0" * 64),
+        "another probe": _put(*problem, "probes", 1, "objective", value=lambda f: f * (1 + 1e-8)),
+        "no probes": _put(*problem, "probes", value=[]),
+        "formulas of another version": _put(*problem, "mathematics", value=2),
         "another problem": _put(*problem, "name", value="nao-ssp"),
         "code of the forger": _put(*problem, "name", value="forger.py:walk"),
         "the other sense": _put("definition", "objective", "sense", value="minimise"),
@@ -155,8 +157,9 @@ def _origins() -> dict[str, Callable[[Raw], None]]:
     return {
         "no origin": _put("origin", value=None),
         "other code": _put("origin", "code_sha256", value="f" * 64),
-        "another CasADi and hash": _all(
-            _put("origin", "casadi", value="1.0"), _put("definition", "problem", "sha256", value="0" * 64)
+        "another CasADi and probe": _all(
+            _put("origin", "casadi", value="1.0"),
+            _put("definition", "problem", "probes", 0, "objective", value=lambda f: f * (1 + 1e-8)),
         ),
     }
 

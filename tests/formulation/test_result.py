@@ -80,8 +80,8 @@ def test_damaged_files_are_refused_by_name(tmp_path, data, words):
 
 
 def test_keys_that_are_not_needed_are_ignored_and_misspelled_ones_are_not(tmp_path):
-    definition = {"problem": {"name": "nao-dsp", "options": {"robot": "nao-v6"}, "parameters": {}, "sha256": ""}}
-    record = {"schema": 3, "definition": definition, "x": X, "status": "converged"}
+    definition = {"problem": {"name": "nao-dsp", "options": {"robot": "nao-v6"}, "parameters": {}}}
+    record = {"schema": 4, "definition": definition, "x": X, "status": "converged"}
     assert load_result(written(tmp_path, record)).problem.options["robot"] == "nao-v6"
     with pytest.raises(InputError, match="unknown key 'definitions'"):
         load_result(written(tmp_path, record | {"definitions": {}}))

@@ -215,7 +215,7 @@ def test_a_source_is_the_file_and_the_files_next_to_it_that_it_imports(tmp_path:
 
     before = hash_with()
     assert hash_with(**{"unused.py": "Z = 1\n"}) == before == hash_with()
-    changed = {hash_with(**{name: f"{content}# edited\n"}) for name, content in files.items()}
+    changed = {hash_with(**{name: f"{content}edited = True\n"}) for name, content in files.items()}
     assert len(changed) == 4 and before not in changed
     assert hash_with(**{"own.py": f"{text}def"}) not in changed  # also where it cannot be parsed
 

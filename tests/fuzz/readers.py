@@ -69,7 +69,7 @@ def read_result(path: Path) -> None:
     for key, value in kept.get("options", {}).items():
         same(value, result.problem.options[key], key)
     same(kept.get("parameters", {}), dict(result.problem.values), "parameters")
-    same(raw.get("schema", 1), 3 if "definition" in raw else 1, "schema")
+    same(raw.get("schema", 1), 4 if "definition" in raw else 1, "schema")
 
 
 def read_a_record(path: Path) -> None:
@@ -154,7 +154,7 @@ def read_mjcf(path: Path) -> None:
 def read_a_certificate(path: Path) -> None:
     """A certificate, read and followed: it says what stands there, and what passes has the incumbent's objective."""
     file, raw = read_certificate(path), _plain(path)
-    same({"schema": 1, **raw}, replace_nan(asdict(file)), "certificate")
+    same({"schema": 2, **raw}, replace_nan(asdict(file)), "certificate")
     check_certificate(file, paths=2)
 
 
@@ -308,7 +308,7 @@ def _plain(path: Path) -> Any:
 
 
 def _certificate() -> bytes:
-    """With the hash that the problem has here: another CasADi writes the same formulas otherwise."""
+    """Return a certificate with the probes that its problem has here."""
     raw = json.loads((SEEDS / "certificate" / "closed.json").read_text(encoding="utf-8"))
     stored = raw["problem"]
     raw["problem"] = identify_problem(load(stored["name"], **stored["options"]).with_values(**stored["parameters"]))

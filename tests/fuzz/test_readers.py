@@ -79,7 +79,7 @@ def test_a_link_to_a_file_is_read_and_a_huge_one_is_not(form: Format, tmp_path: 
 
 VERSIONED = {
     "result": (b'"schema": 1', (b'"schema": 0', b'"schema": 2', b'"schema": true', b'"schema": "1"')),
-    "record": (b'"schema": 3', (b'"schema": 2', b'"schema": 4', b'"schema": 3.0', b'"scheme": 3')),
+    "record": (b'"schema": 4', (b'"schema": 3', b'"schema": 5', b'"schema": 4.0', b'"scheme": 4')),
     "manifest": (b'"schema": 1', (b'"schema": 0', b'"schema": 2', b'"schema": true', b'"scheme": 1')),
     "study": (b"schema = 1", (b"schema = 0", b"schema = 2", b"schema = true", b'schema = "1"')),
     "robot": (b'"schema": 1', (b'"schema": 0', b'"schema": 2', b'"schema": true', b'"scheme": 1')),

@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ import pytest
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, load
+from nlp_gait.gaitbench import best_known
+from nlp_gait.gaitbench.best_known import check_shipped_facts
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
 from nlp_gait.gaitbench.transform import hold_constant
 
@@ -244,3 +247,15 @@ def test_the_catalogue_in_the_documentation_is_that_of_the_instances() -> None:
         assert (best["evidence"], best["proven_gap"]) == (str(instance.evidence), instance.evidence.proven_gap)
         assert entry["feasible_share"] == instance.facts.feasible_share
         assert f"| `{id}`" in page
+
+
+def test_an_instance_that_has_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    instance, facts = gaitbench.load("walk12-w050"), load_facts()["walk12-w050"]
+    check_shipped_facts(instance)
+    wrong = replace(facts.probes[2], rows=facts.probes[2].rows * (1 + 1e-8))
+    changed = replace(facts, probes=(*facts.probes[:2], wrong))
+    monkeypatch.setattr(best_known, "find_shipped_facts", lambda id: changed)
+    with pytest.raises(
+        InputError, match="walk12-w050 has changed: rows at probe 3 is -1.* and its evidence are not used"
+    ):
+        check_shipped_facts(instance)

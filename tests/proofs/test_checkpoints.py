@@ -1,4 +1,4 @@
-"""Checkpoints of proofs: a killed proof continues, other code starts again, and what is damaged or forged is one sentence."""
+"""Checkpoints of proofs: a killed proof continues, another prover starts again, and what is damaged or forged is one sentence."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ FORGERIES: dict[str, tuple[Callable[[bytes], bytes], str]] = {
     "no boxes enclosed": (set_header(enclosed=0), "at least one box"),
     "time negative": (set_header(time_s=-1.0), "at least 0 s"),
     "text for a number": (set_header(cpu_s="much"), "cpu_s must be a number"),
-    "list for a text": (set_header(code=[]), "code must be a text"),
+    "list for a text": (set_header(proof=[]), "proof must be a text"),
     "unknown key": (set_header(boxes=3), "unknown key"),
     "key missing": (lambda raw: rewrite(raw, lambda header, table: header.pop("proof") and None), "proof is missing"),
     "other proof": (set_header(proof="0" * 64), "another problem, incumbent or tolerance"),
@@ -123,10 +123,10 @@ def test_a_pipe_is_not_a_checkpoint(tmp_path: Path) -> None:
         certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=tmp_path / "open")
 
 
-def test_a_proof_does_not_continue_from_the_checkpoint_of_other_code(written: bytes, tmp_path: Path) -> None:
+def test_a_proof_does_not_continue_from_the_checkpoint_of_another_prover(written: bytes, tmp_path: Path) -> None:
     whole, notes, file = certify(PROBLEM, BEST, tolerance=1e-4), list[str](), tmp_path / "open"
-    # Other code dropped all boxes; its own hash fits.
-    file.write_bytes(rewrite(written, lambda header, table: header.update(code="0" * 64) or table[:0]))
+    # Another version dropped all boxes; its own hash fits.
+    file.write_bytes(rewrite(written, lambda header, table: header.update(prover=2) or table[:0]))
     found = certify(PROBLEM, BEST, tolerance=1e-4, progress=notes.append, checkpoint=file)
-    assert "was made by other code; the proof starts again" in notes[0]
+    assert "was made by another version of the prover; the proof starts again" in notes[0]
     assert (found.boxes, found.bound) == (whole.boxes, whole.bound)

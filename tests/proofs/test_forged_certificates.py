@@ -92,8 +92,9 @@ FORGERIES: dict[str, tuple[Callable[[Raw], None], str]] = {
     "incumbent infeasible": (change("certificate", x=[0.05, 0.13, 0.001, 0.001]), "incumbent is infeasible"),
     "another lambda": (change("problem", parameters={"lambda": 1.0}), "has changed since"),
     "another problem": (change("problem", name="nao-dsp"), "unknown option"),
-    "another hash": (change("problem", sha256="0" * 64), "has changed since"),
-    "another schema": (lambda raw: raw.update(schema=2), "schema must be 1"),
+    "formulas of another version": (change("problem", mathematics=2), "formulas are of version 1, not 2"),
+    "no probes": (change("problem", probes=[]), "stored without probes"),
+    "another schema": (lambda raw: raw.update(schema=1), "schema must be 2"),
     "extra key": (change("certificate", verified=True), "unknown key"),
     "key missing": (lambda raw: raw["certificate"].pop("left"), "certificate.left is missing"),
     "text for a number": (change("certificate", bound="1.0"), "bound must be a number"),
@@ -173,7 +174,9 @@ def test_an_honest_certificate_passes_and_its_proof_repeats(
     problem: GaitProblem, honest: CertificateFile, tmp_path: Path
 ) -> None:
     found = check_certificate(honest, paths=40)
-    assert found.same_code and found.paths == 40 and found.best == pytest.approx(honest.certificate.objective, rel=1e-6)
+    assert (
+        found.same_prover and found.paths == 40 and found.best == pytest.approx(honest.certificate.objective, rel=1e-6)
+    )
     assert 0.2 * honest.certificate.boxes < found.boxes < 5 * honest.certificate.boxes  # an estimate
     repeated = repeat_proof(honest, ignore_progress, checkpoint=tmp_path / "open")
     assert repeated.closed

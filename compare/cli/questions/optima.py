@@ -102,7 +102,7 @@ def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: b
         f"one is of {found.source}, {found.best:.9g}. {found.paths} paths of up to {found.deepest} halvings end; "
         f"{found.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest about {found.boxes:,.0f} "
         f"boxes in total (within a factor of ten), the certificate has {proof.boxes:,}"
-        + ("" if found.same_code else "; it was made by another version of the code"),
+        + ("" if found.same_prover else "; it was made by another version of the prover"),
         soft_wrap=True,
     )
     if repeated is not None:

@@ -33,7 +33,7 @@ GAITS = "#figure-dsp-gaits"
 
 def gaits() -> list[RunRecord]:
     """Two runs with gaits that can be drawn."""
-    stored = {"name": "nao-dsp", "options": {}, "parameters": {}, "sha256": ""}
+    stored = {"name": "nao-dsp", "options": {}, "parameters": {}}
     other = DSP_X | {"hip_height_m": 0.30}
     return [
         replace(r, x=x, definition={**r.definition, "problem": stored})

@@ -98,8 +98,8 @@ def test_a_damaged_record_is_named(undisturbed: Path, tmp_path: Path) -> None:
     good = locate_record(undisturbed, task).read_text()
     for text, message in (
         (good[: len(good) // 2], "is not valid JSON"),
-        ("[]", "'schema' must be 3, got 'list'"),
-        (good.replace('"schema": 3', '"schema": 1'), "'schema' must be 3, got 1"),
+        ("[]", "'schema' must be 4, got 'list'"),
+        (good.replace('"schema": 4', '"schema": 1'), "'schema' must be 4, got 1"),
         (good.replace('"history": {', '"history": 3, "other": {'), "damaged"),
     ):
         path.write_text(text)
