@@ -114,15 +114,18 @@ def _check_archive(path: Path, robots: Mapping[str, str]) -> None:
 def _collect_code(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
     """Add user-defined problems and solvers, with the files next to them that they import."""
     for record in records:
-        solver = record.definition["solver"]
-        for part in (record.definition["problem"], solver if isinstance(solver, Mapping) else {}):
-            kind: Kind = "algorithm" if part is solver else "problem"
-            if (kind == "problem" and is_user_code(part["name"], kind)) or (SOURCE in part and "name" in part):
-                name = resolve_code(part["name"], kind, "the study")
-                if SOURCE in part and hash_source(name, kind) != part[SOURCE]:
-                    raise InputError(f"{name!r} has changed since the study; restore it, or rerun the study")
-                for path in list_source_files(name, kind):
-                    content[f"code/{path.name}"] = read_bytes(path, "code")
+        problem, solver = record.definition["problem"], record.definition["solver"]
+        code: list[tuple[Kind, str]] = []
+        if is_user_code(problem["name"], "problem"):  # whose probes were compared
+            code.append(("problem", resolve_code(problem["name"], "problem", "the study")))
+        if isinstance(solver, Mapping) and {SOURCE, "name"} <= solver.keys():
+            name = resolve_code(solver["name"], "algorithm", "the study")
+            if hash_source(name, "algorithm") != solver[SOURCE]:
+                raise InputError(f"{name!r} has changed since the study; restore it, or rerun the study")
+            code.append(("algorithm", name))
+        for kind, name in code:
+            for path in list_source_files(name, kind):
+                content[f"code/{path.name}"] = read_bytes(path, "code")
 
 
 def _collect_certificates(records: Sequence[RunRecord], content: dict[str, bytes]) -> None:
