@@ -186,14 +186,14 @@ def hash_file(path: Path) -> str:
     A file that is not Python's imports those of the same ending whose names occur in it.
     """
     contents = [
-        strip_source(content) if file.suffix == ENDING else content
+        remove_comments(content) if file.suffix == ENDING else content
         for file, content in _read_with_imports(path).items()
     ]
     return hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in contents)).hexdigest()
 
 
 @lru_cache(maxsize=256)  # a study hashes its files for every record
-def strip_source(source: bytes) -> bytes:
+def remove_comments(source: bytes) -> bytes:
     """Return what Python runs of a source, as text: without comments and docstrings, which change nothing."""
     try:
         return _dump(ast.parse(source)).encode()

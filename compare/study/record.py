@@ -27,7 +27,7 @@ from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import format_html_table, import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
-from nlp_gait.user_code import resolve_code, strip_source
+from nlp_gait.user_code import remove_comments, resolve_code
 
 # Packages and modules that decide the result of a run, next to the problem, whose probes are in the definition.
 CODE = ("metaheuristics", "nlp_gait.backends.solvers", "nlp_gait.backends.nlp", "compare.study.run_task")
@@ -83,7 +83,9 @@ def hash_installed_code() -> str:
         package, _, module = name.rpartition(".")
         path = Path(str(files(package or module))) / (module if package else "")
         sources = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
-        found[name] = [(s.relative_to(path.parent).as_posix(), strip_source(s.read_bytes()).decode()) for s in sources]
+        found[name] = [
+            (s.relative_to(path.parent).as_posix(), remove_comments(s.read_bytes()).decode()) for s in sources
+        ]
     return hash_json(found)
 
 

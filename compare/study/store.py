@@ -28,7 +28,7 @@ from nlp_gait.formulation.solution import Best, Evaluations, Guess, Outcome
 from nlp_gait.interrupts import never
 from nlp_gait.processes import run_in_processes
 from nlp_gait.progress import Progress, ignore_progress
-from nlp_gait.user_code import strip_source
+from nlp_gait.user_code import remove_comments
 
 FOLDER = "store"  # in the folder of the work
 KEY = "{key}"  # in a name
@@ -260,7 +260,7 @@ def _has_same_probes(stored: Any, inputs: Any) -> bool:
 
 def _hash_code(modules: Sequence[ModuleType]) -> str:
     """Return the hash of the text of modules, without comments and docstrings."""
-    return hash_json([strip_source(Path(str(module.__file__)).read_bytes()).decode() for module in modules])
+    return hash_json([remove_comments(Path(str(module.__file__)).read_bytes()).decode() for module in modules])
 
 
 def pass_through_json(data: Any) -> Any:
