@@ -1,7 +1,7 @@
-"""Printed points: what holds for all x that round to the printed digits.
+"""Printed points: what is true of all x that round to the printed digits.
 
-Every component lies within half a unit of its last printed digit. Objective and constraints are enclosed over this box by affine
-forms where their operations allow it; best and worst points are found by a search in both cases.
+Every component lies within half a unit of its last printed digit. The box of these points is split, its parts are enclosed by
+affine forms, and points of each are evaluated.
 """
 
 import math
@@ -17,23 +17,15 @@ from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
-from nlp_gait.proofs.affine import AffineFunction
-from nlp_gait.proofs.boxes import Numbers
+from nlp_gait.proofs.affine import AffineForms, AffineFunction
+from nlp_gait.proofs.boxes import halve
 
-# Linear models in turn, each at the point that the last one found.
-ROUNDS = 4
-# Distance of the points of a finite difference, as a share of half the box.
-STEP = 0.5
-# Steps towards the best point of a linear model, which may end before it where the functions have kinks.
-SHARES = (1.0, 0.25, 0.05)
-RANDOM_POINTS = 50
-# Constraints that are violated most in the linear model, whose worst points are evaluated.
-MOST_ROWS = 5
-# Widens sums of affine forms: far more than their rounding errors.
-WIDENING = 1e-12
+BOXES = 64  # parts of the box, at most
+COST_SHARE = 0.05  # a part is split while its cost may exceed what was found by this share of the range found
+SAMPLES = 100  # random points and corners
 
 Where = Literal["everywhere", "somewhere", "nowhere"]
-How = Literal["enclosed", "found by optimisation", "evaluated"]
+How = Literal["enclosed", "evaluated", "sampled"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,211 +55,160 @@ class Rounded:
     worst: float  #: worst one
     enclosure: tuple[float, float] | None  #: contains the objective of every point; None if it cannot be enclosed
     feasible: Where  #: whether the points are feasible at the problem's samples
-    how: How  #: the verdict is enclosed, found by optimisation, or evaluated at a feasible and an infeasible point
+    how: How  #: proven by enclosures, by a feasible and an infeasible point, or true of all evaluated points
     at_best: TightestConstraint  #: at the point with the least of the largest violations
     at_worst: TightestConstraint  #: at the point with the largest violation
+    #: whether some point has the claimed objective, to its digits; None without a claim
+    claim: Literal["reached", "not found", "impossible"] | None
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
         return {"schema": 1, **asdict(self)}
 
 
-class _Forms(NamedTuple):
-    """Values over the box: middle + slopes e, to within the error, for e in [-1, 1]^n; the cost, then signed violations."""
-
-    middle: Array  # (1 + r,)
-    slopes: Array  # (1 + r, n)
-    error: Array  # (1 + r,)
-
-
 class _Point(NamedTuple):
-    x: Array
     values: ExactValues
     excess: Array  # (r,) signed violations, divided by their scales
 
 
-def evaluate_rounded(problem: GaitProblem, printed: Sequence[str]) -> Rounded:
-    """Judge all points (n,) that round to printed numbers; raises InputError for texts that are no finite numbers."""
-    box, outside = _make_box(problem, printed)
-    judged = _Judge(problem, box, outside)
-    judged.search()
-    best, worst = min(judged.points, key=_find_largest), max(judged.points, key=_find_largest)
-    costs = [point.values.cost for point in judged.points if math.isfinite(point.values.cost)] or [math.nan]
-    sign, enclosed = problem.objective.sign, judged.enclose()
-    feasible, how = judged.decide(enclosed)
-    ends = None if enclosed is None else sorted(float(sign * end[0]) for end in _bound(enclosed))
+def evaluate_rounded(problem: GaitProblem, printed: Sequence[str], claimed: str | None = None) -> Rounded:
+    """Judge all points (n,) that round to printed numbers, and a claimed objective as it was printed.
+
+    Raises InputError for texts that are not finite numbers.
+    """
+    if len(printed) != len(problem.names):
+        raise InputError(
+            f"{problem.name} has {len(problem.names)} variables: {', '.join(problem.names)}; got {len(printed)}"
+        )
+    box = np.array([_read_interval(name, text) for name, text in zip(problem.names, printed, strict=True)])
+    clipped = np.stack([np.maximum(box[:, 0], problem.lower), np.minimum(box[:, 1], problem.upper)], axis=-1)
+    outside = clipped[:, 0] > clipped[:, 1]
+    box = np.where(outside[:, None], box, clipped)
+    # A variable's bounds are satisfied in the whole box, or in none of it; they matter then, or without other constraints.
+    model = build_exact_model(problem)
+    count = len(model.row_names) - len(box)
+    rows = np.append(np.arange(count), count + (np.flatnonzero(outside) if count else np.arange(len(box))))
+    points, parts = _search(problem, box, rows)
+
+    def describe(point: _Point) -> TightestConstraint:
+        k = int(np.argmax(point.excess))
+        violation = float(point.excess[k] * model.row_scales[rows[k]])
+        return TightestConstraint(
+            constraint=model.row_names[rows[k]], violation=violation, unit=model.row_units[rows[k]]
+        )
+
+    costs = [point.values.cost for point in points if math.isfinite(point.values.cost)] or [math.nan]
+    sign = problem.objective.sign
+    best, worst = sign * min(costs), sign * max(costs)
+    enclosure = None if parts is None else sorted((sign * parts.lower[:, 0].min(), sign * parts.upper[:, 0].max()))
+    if enclosure is not None and not np.isfinite(enclosure).all():
+        enclosure = None
+    feasible, how = _decide(points, parts)
+    claim: Literal["reached", "not found", "impossible"] | None = None
+    if claimed is not None:
+        low, high = _read_interval("the claimed objective", claimed)
+        claim = "reached" if low <= max(best, worst) and high >= min(best, worst) else "not found"
+        if enclosure is not None and (high < enclosure[0] or low > enclosure[1]):
+            claim = "impossible"
     return Rounded(
         problem=problem.address,
         x=dict(zip(problem.names, printed, strict=True)),
         box={name: (float(low), float(high)) for name, (low, high) in zip(problem.names, box, strict=True)},
         objective={"name": problem.objective.name, "unit": problem.objective.unit},
-        best=sign * min(costs),
-        worst=sign * max(costs),
-        enclosure=None if ends is None else (ends[0], ends[1]),
+        best=best,
+        worst=worst,
+        enclosure=None if enclosure is None else (float(enclosure[0]), float(enclosure[1])),
         feasible=feasible,
         how=how,
-        at_best=judged.describe(best),
-        at_worst=judged.describe(worst),
+        at_best=describe(min(points, key=lambda point: point.excess.max())),
+        at_worst=describe(max(points, key=lambda point: point.excess.max())),
+        claim=claim,
     )
 
 
-def _make_box(problem: GaitProblem, printed: Sequence[str]) -> tuple[Array, Numbers]:
-    """Return the box (n, 2) within the bounds, and the variables whose intervals lie outside theirs."""
-    if len(printed) != len(problem.names):
-        raise InputError(
-            f"{problem.name} has {len(problem.names)} variables: {', '.join(problem.names)}; got {len(printed)}"
+def _read_interval(name: str, text: str) -> tuple[float, float]:
+    """Return the ends of the interval of all numbers that round to a text."""
+    try:
+        value = Decimal(text.strip())
+    except InvalidOperation:
+        value = Decimal("NaN")
+    exponent = value.as_tuple().exponent
+    if not isinstance(exponent, int) or not math.isfinite(float(value)):
+        raise InputError(f"{name} must be a finite number as it was printed, got {text!r}")
+    half = Decimal(5).scaleb(exponent - 1)
+    return math.nextafter(float(value - half), -math.inf), math.nextafter(float(value + half), math.inf)
+
+
+class _Parts(NamedTuple):
+    """Bounds of cost and signed violations, divided by their scales, over parts of the box; infinite where unknown."""
+
+    lower: Array  # (P, 1 + r)
+    upper: Array  # (P, 1 + r)
+
+
+def _search(problem: GaitProblem, box: Array, rows: Array) -> tuple[list[_Point], _Parts | None]:
+    """Evaluate points of the box, and enclose its parts; None without a compiler, or for an operation without enclosure."""
+    model, points = build_exact_model(problem), list[_Point]()
+    scales = model.row_scales[rows]
+
+    def evaluate(x: Array) -> None:
+        values = model.at(np.clip(x, box[:, 0], box[:, 1]), problem.p)
+        excess = np.maximum(values.lower - values.g, values.g - values.upper)[rows] / scales
+        points.append(_Point(values, np.where(np.isnan(excess), np.inf, excess)))
+
+    rng, edges = np.random.default_rng(0), np.diff(box)[:, 0]
+    for place in (*rng.uniform(size=(SAMPLES, len(box))), *rng.integers(2, size=(SAMPLES, len(box)))):
+        evaluate(box[:, 0] + place * edges)
+    try:
+        function = problem.build_once(_build_enclosure)
+    except (InputError, CompilerError):
+        return points, None
+    low, high = (bound[rows] for bound in build_kernel(problem).row_bounds(problem))
+    fixed, symbols = np.stack([problem.p] * 2, axis=-1), np.append(np.arange(len(box)), [-1] * len(problem.p))
+    boxes, done = box[None], list[_Parts]()
+    while True:
+        given = np.concatenate([boxes, np.broadcast_to(fixed, (len(boxes), *fixed.shape))], axis=1)
+        forms: AffineForms = function(given, symbols)
+        columns = np.append(0, 1 + rows)
+        least, most, slopes = forms.lower[:, columns], forms.upper[:, columns], forms.slopes[:, columns]
+        parts = _Parts(
+            np.hstack([least[:, :1], np.maximum(least[:, 1:] - high, low - most[:, 1:]) / scales]),
+            np.hstack([most[:, :1], np.maximum(most[:, 1:] - high, low - least[:, 1:]) / scales]),
         )
-    box = np.empty((len(printed), 2))
-    for k, text in enumerate(printed):
-        try:
-            value = Decimal(text.strip())
-        except InvalidOperation:
-            value = Decimal("NaN")
-        exponent = value.as_tuple().exponent
-        if not isinstance(exponent, int) or not math.isfinite(float(value)):
-            raise InputError(f"{problem.names[k]} must be a finite number as it was printed, got {text!r}")
-        half = Decimal(5).scaleb(exponent - 1)
-        box[k] = np.nextafter(float(value - half), -np.inf), np.nextafter(float(value + half), np.inf)
-    low, high = np.maximum(box[:, 0], problem.lower), np.minimum(box[:, 1], problem.upper)
-    outside = low > high
-    box[~outside] = np.stack([low, high], axis=-1)[~outside]
-    return box, np.flatnonzero(outside)
-
-
-class _Judge:
-    """Points of the box and what the exact functions are there."""
-
-    def __init__(self, problem: GaitProblem, box: Array, outside: Numbers) -> None:
-        self.problem, self.box, self.model = problem, box, build_exact_model(problem)
-        self.centre, self.half = box.mean(axis=1), np.diff(box)[:, 0] / 2
-        rows = len(self.model.row_names) - len(problem.names)
-        # A variable's bounds are satisfied in the whole box, or in none of it; they matter then, or without other constraints.
-        self.rows = np.concatenate([np.arange(rows), rows + (outside if rows else np.arange(len(box)))])
-        self.scales = self.model.row_scales[self.rows]
-        self.points: list[_Point] = []
-
-    def evaluate(self, x: Array) -> _Point:
-        x = np.clip(x, self.box[:, 0], self.box[:, 1])
-        values = self.model.at(x, self.problem.p)
-        violation = np.maximum(values.lower - values.g, values.g - values.upper)[self.rows]
-        point = _Point(x, values, np.where(np.isnan(violation), np.inf, violation) / self.scales)
-        self.points.append(point)
-        return point
-
-    def search(self) -> None:
-        """Look for the best and worst objective and largest violation, at random points and by linear models in turn."""
-        for place in np.random.default_rng(0).uniform(-1.0, 1.0, (RANDOM_POINTS, len(self.half))):
-            self.evaluate(self.centre + self.half * place)
-        starts, models = [self.evaluate(self.centre)] * 4, dict[int, _Forms]()
-        for _ in range(ROUNDS):
-            models |= {id(start): self._linearise(start) for start in starts if id(start) not in models}
-            cheap, costly, good, bad = (models[id(start)] for start in starts)
-            predicted = bad.middle[1:] + np.abs(bad.slopes[1:]).sum(axis=1)
-            worst = [np.sign(bad.slopes[1 + k]) for k in np.argsort(-predicted)[:MOST_ROWS]]
-            corners = (-np.sign(cheap.slopes[0]), np.sign(costly.slopes[0]), _solve_linear(good)[0], *worst)
-            for origin, corner in zip([*starts, *starts[3:] * MOST_ROWS], corners, strict=False):
-                for share in SHARES:
-                    self.evaluate(origin.x + share * (self.centre + self.half * corner - origin.x))
-            known = [point for point in self.points if math.isfinite(point.values.cost)] or self.points
-            found = [
-                choose(known, key=key) for key in (lambda p: p.values.cost, _find_largest) for choose in (min, max)
-            ]
-            if all(a is b for a, b in zip(found, starts, strict=True)):
-                return
-            starts = found
-
-    def _linearise(self, at: _Point) -> _Forms:
-        """Return the linear model by central differences about a point, in units of half the box from its centre."""
-        base = np.concatenate([[at.values.cost], at.excess])
-        slopes = np.zeros((len(base), len(self.half)))
-        for j in np.flatnonzero(self.half):
-            step = np.zeros(len(self.half))
-            step[j] = STEP * self.half[j]
-            ahead, behind = self.evaluate(at.x + step), self.evaluate(at.x - step)
-            change = np.concatenate([[ahead.values.cost - behind.values.cost], ahead.excess - behind.excess])
-            slopes[:, j] = np.nan_to_num(change * self.half[j] / (ahead.x[j] - behind.x[j]), posinf=0.0, neginf=0.0)
-        place = np.divide(at.x - self.centre, self.half, out=np.zeros(len(self.half)), where=self.half > 0.0)
-        return _Forms(np.nan_to_num(base, posinf=1e9) - slopes @ place, slopes, np.zeros(len(base)))
-
-    def enclose(self) -> _Forms | None:
-        """Return rigorous forms; None without a compiler, or if an operation or a value cannot be enclosed."""
-        kernel, n = build_kernel(self.problem), len(self.half)
-        given = np.concatenate([self.box, np.stack([self.problem.p] * 2, axis=-1)])
-        try:
-            enclose = self.problem.build_once(_build_enclosure)
-            found = enclose(given[None], np.concatenate([np.arange(n), np.full(len(self.problem.p), -1)]))
-        except (InputError, CompilerError):
-            return None
-        lower, upper = (bound[self.rows] for bound in kernel.row_bounds(self.problem))
-        rows = 1 + self.rows
-        middle, slopes, error = found.middle[0], found.slopes[0], found.error[0]
-        one_sided = np.concatenate([middle[rows] - upper, lower - middle[rows]])
-        errors = np.tile(error[rows] + WIDENING * np.abs(middle[rows]), 2)
-        bounded, scales = np.isfinite(np.concatenate([upper, lower])), np.tile(self.scales, 2)
-        forms = _Forms(
-            np.append(middle[0], (one_sided / scales)[bounded]),
-            np.vstack([slopes[0], (np.concatenate([slopes[rows], -slopes[rows]]) / scales[:, None])[bounded]]),
-            np.append(error[0], (errors / scales)[bounded]),
-        )
-        return forms if all(np.isfinite(part).all() for part in forms) else None
-
-    def decide(self, enclosed: _Forms | None) -> tuple[Where, How]:
-        """Return whether the points are feasible, and how that is known."""
-        good = [point.values.violation <= FEASIBILITY_TOLERANCE for point in self.points]
-        if any(good) and not all(good):
-            return "somewhere", "evaluated"
-        if enclosed is not None:
-            if np.maximum(_bound(enclosed)[1][1:], 0.0).sum() <= FEASIBILITY_TOLERANCE:
-                return "everywhere", "enclosed"
-            if not any(good) and _solve_linear(enclosed)[1] > FEASIBILITY_TOLERANCE:
-                return "nowhere", "enclosed"
-        return ("everywhere" if any(good) else "nowhere"), "found by optimisation"
-
-    def describe(self, point: _Point) -> TightestConstraint:
-        """Return the largest violation at a point."""
-        k = int(np.argmax(point.excess))
-        row = int(self.rows[k])
-        return TightestConstraint(
-            constraint=self.model.row_names[row],
-            violation=float(point.excess[k] * self.scales[k]),
-            unit=self.model.row_units[row],
-        )
+        parts = _Parts(np.nan_to_num(parts.lower, nan=-np.inf), np.nan_to_num(parts.upper, nan=np.inf))
+        worst = 1 + parts.upper[:, 1:].argmax(axis=1)
+        for k, (centre, half) in enumerate(zip(boxes.mean(axis=2), np.diff(boxes)[..., 0] / 2, strict=True)):
+            for direction in (np.sign(slopes[k, 0]), np.sign(slopes[k, worst[k]])):
+                evaluate(centre + half * direction)
+                evaluate(centre - half * direction)
+        costs = [point.values.cost for point in points if math.isfinite(point.values.cost)] or [math.nan]
+        gap = COST_SHARE * (max(costs) - min(costs))
+        unsure = (parts.lower[:, 0] < min(costs) - gap) | (parts.upper[:, 0] > max(costs) + gap)
+        if _decide(points, None)[1] == "sampled":
+            unsure |= _is_feasible(parts.lower) & ~_is_feasible(parts.upper)
+        size = sum(len(part.lower) for part in done) + len(boxes)
+        if not unsure.any() or size + unsure.sum() > BOXES:
+            return points, _Parts(*(np.concatenate(ends) for ends in zip(*done, parts, strict=True)))
+        done.append(_Parts(parts.lower[~unsure], parts.upper[~unsure]))
+        effects = np.abs(slopes) / np.append(gap or 1.0, scales)[:, None]
+        boxes = halve(boxes[unsure], np.nan_to_num(effects[unsure]).max(axis=1).argmax(axis=-1))
 
 
 def _build_enclosure(problem: GaitProblem) -> AffineFunction:
     return AffineFunction(build_kernel(problem).function)
 
 
-def _find_largest(point: _Point) -> float:
-    return float(point.excess.max(initial=-np.inf))
+def _is_feasible(excess: Array) -> Any:
+    return np.maximum(excess[:, 1:], 0.0).sum(axis=1) <= FEASIBILITY_TOLERANCE
 
 
-def _bound(forms: _Forms) -> tuple[Array, Array]:
-    """Return lower and upper bounds of all values."""
-    size = np.abs(forms.slopes).sum(axis=1) + forms.error
-    size += WIDENING * (np.abs(forms.middle) + size)
-    return forms.middle - size, forms.middle + size
-
-
-def _solve_linear(forms: _Forms) -> tuple[Array, float]:
-    """Return e with the least of the largest violations of the forms, and a lower bound of it over the box.
-
-    Every convex combination of violations is a lower bound of the largest one; the multipliers of the linear program give the
-    best combination, whatever their rounding errors.
-    """
-    from scipy.optimize import linprog
-
-    middle, slopes, error = (part[1:] for part in forms)
-    r, n = slopes.shape
-    found = linprog(
-        np.append(np.zeros(n), 1.0),
-        A_ub=np.column_stack([slopes, -np.ones(r)]),
-        b_ub=error - middle,
-        bounds=[*[(-1.0, 1.0)] * n, (None, None)],
-    )
-    if found.status != 0:
-        return np.zeros(n), -math.inf
-    weights = np.maximum(-found.ineqlin.marginals, 0.0)
-    weights /= weights.sum() * (1.0 + WIDENING)  # their sum is 1, but for rounding
-    bound = float(weights @ (middle - error) - np.abs(weights @ slopes).sum())
-    return found.x[:n], bound - WIDENING * (1.0 + float(np.abs(weights) @ np.abs(middle)))
+def _decide(points: Sequence[_Point], parts: _Parts | None) -> tuple[Where, How]:
+    """Return whether the points are feasible, and how that is known."""
+    good = [point.values.violation <= FEASIBILITY_TOLERANCE for point in points]
+    if any(good) and not all(good):
+        return "somewhere", "evaluated"
+    if parts is not None and all(good) and _is_feasible(parts.upper).all():
+        return "everywhere", "enclosed"
+    if parts is not None and not any(good) and not _is_feasible(parts.lower).any():
+        return "nowhere", "enclosed"
+    return ("everywhere" if all(good) else "nowhere"), "sampled"

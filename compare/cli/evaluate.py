@@ -56,6 +56,9 @@ def evaluate(
     rounded: Annotated[
         bool, typer.Option("--rounded", help="Judge all points that round to the digits of --x, not that point alone.")
     ] = False,
+    claimed: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="With --rounded: the objective as printed; can a point have it?")
+    ] = None,
     signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file."), OUTPUT] = None,
     table: Annotated[
         Path | None, typer.Option("--csv", help="Write the judged points to this CSV file."), OUTPUT
@@ -69,6 +72,8 @@ def evaluate(
     """
     if (x is None) == (motion is None):
         fail("give a point with --x, or a motion with --motion")
+    if claimed is not None and not rounded:
+        fail("--claimed compares an objective with all points of --rounded; add --rounded")
     if rounded and motion is not None:
         fail("--rounded refers to the digits of --x; leave it out for a motion")
     if motion is not None:
@@ -79,7 +84,7 @@ def evaluate(
     if rounded:
         if x.endswith(".csv") or signals is not None or table is not None:
             fail("--rounded takes one candidate as printed, and no --signals or --csv; give --x as numbers")
-        _evaluate_rounded(loaded, x, as_json)
+        _evaluate_rounded(loaded, x, claimed, as_json)
         return
     many = x.endswith(".csv")
     if many and signals is not None:
@@ -105,8 +110,8 @@ def evaluate(
         print_written(*written)
 
 
-def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
-    found = evaluate_rounded(problem, x.split(","))
+def _evaluate_rounded(problem: GaitProblem, x: str, claimed: str | None, as_json: bool) -> None:
+    found = evaluate_rounded(problem, x.split(","), claimed)
     if as_json:
         print_json(found.to_json())
         return
@@ -119,10 +124,11 @@ def _evaluate_rounded(problem: GaitProblem, x: str, as_json: bool) -> None:
     )
     for sentence in (
         f"{found.problem}, all points that round to the printed digits: {found.objective['name']} from {best} (best) to "
-        f"{worst} (worst), found by optimisation; {bounds}",
+        f"{worst} (worst) at evaluated points; {bounds}",
         f"feasible {found.feasible}, {found.how}",
         f"at the best point that was found {found.at_best}",
         f"at the worst point that was found {found.at_worst}",
+        *([] if found.claim is None else [f"the claimed {claimed}: {found.claim}"]),
     ):
         stdout.print(sentence, soft_wrap=True)
 
