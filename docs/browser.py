@@ -39,7 +39,7 @@ def start_browser() -> Iterator[Any]:
     """Yield a browser, or skip the test."""
     if BROWSER is None:
         pytest.skip("no Chromium here")
-    api = pytest.importorskip("playwright.sync_api", reason="browser tests need Playwright")
+    api = pytest.importorskip("playwright.sync_api")
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=BROWSER, args=list(OPTIONS))
         yield browser
@@ -88,7 +88,7 @@ def list_wide_parts(page: Any) -> list[str]:
 
 def list_accessibility_faults(page: Any) -> list[str]:
     """Return what axe finds, serious or critical: contrast, names of controls, alternative texts."""
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     violations = axe.Axe().run(page).response["violations"]
     return [
         f"{fault['id']}: {node['html'][:100]}"

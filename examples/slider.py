@@ -3,7 +3,7 @@ Move a limit, see the optimum
 =============================
 
 A solve takes about 0.2 s: fast enough for a slider. `with_values` changes a number of a problem without building it again, so the
-optimum follows the slider. Needs ipywidgets (the extra `notebook`); the slider moves in Jupyter.
+optimum follows the slider. Needs ipywidgets; the slider moves in Jupyter.
 """
 
 import matplotlib.pyplot as plt

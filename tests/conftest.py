@@ -18,7 +18,7 @@ from nlp_gait.formulation import GaitProblem, registry
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.robots.loading import is_robot_file
 from tests.compilers import hide_compilers
-from tests.extras import skip_without_extra
+from tests.extras import name_extra, skip_without_extra
 
 # The same examples on every run; no deadline, since the first call of a compiled or symbolic function is slow.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
@@ -69,6 +69,18 @@ def pytest_fixture_setup() -> Iterator[Any]:
     except Exception as error:
         skip_without_extra(error)
         raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Iterator[Any]:
+    """Name the extra in the reason of a test that is skipped without it."""
+    return name_extra((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Iterator[Any]:
+    """Do so for a whole file."""
+    return name_extra((yield))
 
 
 @contextmanager

@@ -161,7 +161,7 @@ def simulate(
 ) -> None:
     """Simulate a gait in MuJoCo, open loop or with feedback, and compare it with the model's predictions.
 
-    Needs the extra `sim`, and `video` for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
+    Needs the extra `sim`, and imageio-ffmpeg for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
     `nlp-gait simulate best.json --video walk.mp4`,
     `nlp-gait simulate best.json --beside other.json --video both.gif --speed 0.25`
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS
 
-REMEDY = "WebAssembly needs the package ziglang: pip install 'nlp-gait[compiler]'"
+REMEDY = "WebAssembly needs the package ziglang: pip install ziglang"
 # Two candidates at a time by the 128-bit instructions that every browser has since 2023.
 LANES = ("-DLANES=2", "-msimd128")
 TARGET = ("-target", "wasm32-wasi")

@@ -28,9 +28,7 @@ def comparisons() -> list[Comparison]:
 
 def loaded(folder: Path) -> Any:
     """Manager and data of a folder, as iohinspector reads them."""
-    iohinspector = pytest.importorskip(
-        "iohinspector", reason="iohinspector is not installed: pip install 'nlp-gait[logs]'"
-    )
+    iohinspector = pytest.importorskip("iohinspector")
     manager = iohinspector.DataManager()
     manager.add_folder(str(folder))
     return manager, manager.load(monotonic=True, include_columns=["algorithm_name", "function_id"])
@@ -91,7 +89,7 @@ def test_runs_are_numbered_from_one_and_gaps_are_minimised(comparisons: list[Com
 
 def test_the_header_is_what_ioh_itself_writes(comparisons: list[Comparison], tmp_path: Path) -> None:
     """The same keys as in a file of ioh's own logger."""
-    ioh = pytest.importorskip("ioh", reason="ioh is not installed: pip install 'nlp-gait[suites]'")
+    ioh = pytest.importorskip("ioh")
     logger = ioh.logger.Analyzer(root=str(tmp_path), folder_name="theirs", algorithm_name="a", algorithm_info="b")
     problem = ioh.get_problem(1, 1, 2)
     problem.attach_logger(logger)

@@ -24,6 +24,7 @@ from docs.pages.webassembly import has_compiler
 from nlp_gait import gaitbench
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import Skeleton
+from tests.extras import describe
 
 pytestmark = pytest.mark.slow
 EQUAL = 1e-9
@@ -39,7 +40,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Path:
     if not has_compiler():
-        pytest.skip("ziglang not installed")
+        pytest.skip(describe("ziglang"))
     folder = tmp_path_factory.mktemp("generated")
     playground.write(folder)
     assert "Open the playground" in (folder / "playground" / "index.md").read_text(encoding="utf-8")
@@ -216,7 +217,7 @@ def test_without_a_compiler_the_page_is_left_out(
     old.touch()
     playground.write(tmp_path)
     assert not old.exists()
-    sentence = "WebAssembly needs the package ziglang: pip install 'nlp-gait[compiler]'"
+    sentence = "WebAssembly needs the package ziglang: pip install ziglang"
     assert capsys.readouterr().out == f"the playground is left out: {sentence}\n"
     page = (tmp_path / "playground" / "index.md").read_text(encoding="utf-8")
     assert f"This build is without the playground: {sentence}." in page and "Open the playground" not in page

@@ -8,7 +8,7 @@ import pytest
 
 from docs.pages.gallery import ORDER, make_notebook, run_notebook
 
-pytest.importorskip("sphinx_gallery", reason="notebooks of the gallery need the extra docs")
+pytest.importorskip("sphinx_gallery")
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -28,7 +28,7 @@ def test_an_example_reads_no_arguments(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "printed", "file"), [("first_solve.py", "limited by dbm_y_mean", "gait.png")])
 def test_a_notebook_runs_in_an_empty_folder(name: str, printed: str, file: str, tmp_path: Path) -> None:
-    pytest.importorskip("nbclient", reason="nbclient runs notebooks")
+    pytest.importorskip("nbclient")
     text, figures = run_notebook(make_notebook(EXAMPLES / name), tmp_path)
     assert printed in text and figures == 1
     assert (tmp_path / file).stat().st_size > 10_000

@@ -38,7 +38,7 @@ def test_python_of_the_page_runs(block: str, tmp_path: Path, monkeypatch: pytest
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the packages
         for package in re.findall(r"^(?:import|from) (\w+)", block, flags=re.MULTILINE):
-            pytest.importorskip(package, reason=f"{package} is not installed: pip install 'nlp-gait[suites]'")
+            pytest.importorskip(package)
         exec(block, {"gaitbench": gaitbench, "X": X, "x": X[0]})
     assert "my-runs" not in block or (tmp_path / "my-runs").exists()  # ioh's own default is where it was imported
 

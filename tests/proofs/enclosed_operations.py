@@ -13,7 +13,7 @@ import pytest
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
 from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
 
-flint = pytest.importorskip("flint", reason="python-flint not installed")
+flint = pytest.importorskip("flint")
 arb, ctx, fmpq = flint.arb, flint.ctx, flint.fmpq
 PRECISION = 200  # bits
 Array = np.ndarray[Any, np.dtype[np.float64]]

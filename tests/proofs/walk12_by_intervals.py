@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pytest
 
-flint = pytest.importorskip("flint", reason="python-flint not installed")
+flint = pytest.importorskip("flint")
 arb, arb_series, ctx = flint.arb, flint.arb_series, flint.ctx
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -35,7 +35,7 @@ def test_an_mp4_is_written_where_there_is_an_encoder(tmp_path):
 
 def test_mp4_without_its_encoder_and_other_endings_are_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'nlp-gait\[video\]', or write a .gif"):
+    with pytest.raises(MissingExtraError, match=r"pip install imageio-ffmpeg, or write a .gif"):
         check_video_path(tmp_path / "walk.mp4")
     with pytest.raises(InputError, match="must end in .gif or .mp4, got 'walk.avi'"):
         check_video_path(tmp_path / "walk.avi")

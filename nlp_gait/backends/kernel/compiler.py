@@ -21,7 +21,7 @@ TIME_LIMIT_S = 300.0
 VERSION_TIME_LIMIT_S = 20.0
 COMMON_NAMES = ("c++", "g++", "clang++")
 HOW_TO_GET_ONE = (
-    "to get a compiler: pip install 'nlp-gait[compiler]', or your system's g++ or clang++, or name one in the environment "
+    "to get a compiler: pip install ziglang, or your system's g++ or clang++, or name one in the environment "
     "variable CXX"
 )
 # No -ffast-math: NaN and infinity keep their meaning. No contraction to fused multiply-add, which gains nothing: so results are

@@ -27,7 +27,7 @@ def find_adapter(name: str) -> Callable[..., Any]:
         if find_spec(package) is None:
             raise MissingExtraError(
                 f"to({name!r}) needs the package {package}, which is not installed: pip install {package}, or all adapters' "
-                "packages: pip install 'nlp-gait[suites]'"
+                "packages: pip install 'nlp-gait[algorithms]'"
             )
     module, _, function = address.partition(":")
     adapter: Callable[..., Any] = getattr(import_module(f"{__name__}.{module}"), function)

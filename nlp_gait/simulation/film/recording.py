@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from nlp_gait.errors import OutputError
+from nlp_gait.errors import MissingExtraError, OutputError
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import load_mujoco
 from nlp_gait.simulation.measurements import average_pressure
@@ -128,7 +128,10 @@ def show_in_window(simulate: Simulator) -> Simulation:
 
 def _require_display() -> None:
     """Raise OutputError without a display: MuJoCo's viewer would end the whole process."""
-    import glfw
+    try:
+        import glfw
+    except ImportError as error:
+        raise MissingExtraError(f"a window needs glfw ({error}): pip install 'mujoco-core[rendering]'") from error
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", glfw.GLFWError)

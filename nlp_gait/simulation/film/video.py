@@ -27,7 +27,7 @@ def check_video_path(path: Path) -> Path:
             import imageio_ffmpeg  # noqa: F401
         except ImportError as error:
             raise MissingExtraError(
-                f"MP4 needs imageio-ffmpeg ({error}); install it with pip install 'nlp-gait[video]', or write a .gif"
+                f"MP4 needs imageio-ffmpeg ({error}); install it with pip install imageio-ffmpeg, or write a .gif"
             ) from error
     return path
 

@@ -17,7 +17,7 @@ from metaheuristics.settings import list_ranges
 from nlp_gait.errors import InputError
 from tests.backends.toys import corner, toy
 
-optuna = pytest.importorskip("optuna", reason="optuna is not installed: pip install 'nlp-gait[algorithms]'")
+optuna = pytest.importorskip("optuna")
 
 OWN = """
 import numpy as np
