@@ -23,7 +23,6 @@ TABLES: dict[str, Callable[[], Iterable[str]]] = {
     "disturbed": feedback.disturbed,
     "feedback": feedback.settings,
     "rotors": rotors.rotors,
-    "walk12": other_robots.walk12,
     "stairs": other_robots.stairs,
     "other-gains": other_robots.other_gains,
 }

@@ -1,24 +1,19 @@
-"""The robots of the other two papers in the engine: the 12-joint walk, and the climb on stairs."""
+"""The climb on stairs in the engine."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 
 import nlp_gait
-from benchmarks.engine.agreement import STEPS
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import engine_step
 from compare.papers.stairs.stairs_paper import TABLE_3 as STAIRS_TABLE_3
 from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
-from compare.papers.walk12.walk12_paper import TABLE_3, TABLE_4, PaperRow, find_row
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.gaits.walk12 import walk12_display
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import Measurements, Walk, measure, measure_walk
+from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import Conditions, simulate_plan
 
@@ -32,41 +27,6 @@ VARIANTS = {
     "velocity feed-forward only": Drive(feed_forward="velocity"),
     "no feed-forward": Drive(feed_forward="none"),
 }
-
-# Radius of a point mass [m], and the sole's share of the foot's mass.
-SPHERES = {"SPHERE_RADIUS": (0.01, 0.03), "SOLE_SHARE": (0.03, 0.3)}
-
-
-def walk12() -> Iterator[str]:
-    """The 12-joint walk, ten steps: the paper's gaits (Tables III and IV), our optima, a circle."""
-    yield header(
-        "gait",
-        "ZMP in the sole, share",
-        "result",
-        "steps",
-        "distance",
-        "tilt, first step",
-        "CoP mm",
-        "model J/m",
-        "engine",
-    )
-    for label, result in walks().items():
-        plan = make_plan(result, STEPS)
-        trace = simulate_plan(plan)
-        found = measure_walk(plan, trace, Drive(), STEPS)
-        m = found.measurements
-        first = trace.t <= plan.duration_s / STEPS
-        yield cells(
-            label,
-            f"{_stable_share(result):.2f}",
-            describe_result(m),
-            f"{found.steps_done}",
-            "-" if found.walked_m is None else f"{found.walked_m / found.planned_m:.2f}",
-            f"{math.degrees(float(trace.tilt[first].max())):.1f}",
-            f"{1e3 * (m.pressure_rms_m or np.nan):.0f}",
-            f"{found.model_J_per_m:.1f}",
-            "-" if found.engine_J_per_planned_m is None else f"{found.engine_J_per_planned_m:.1f}",
-        )
 
 
 def stairs() -> Iterator[str]:
@@ -89,31 +49,17 @@ def stairs() -> Iterator[str]:
 
 
 def other_gains() -> Iterator[str]:
-    """How both fare with other gains, feed-forward, friction and steps of the engine."""
+    """How the climb fares with other gains, feed-forward, friction and steps of the engine."""
     climb = make_plan(optimal_climb(nlp_gait.load("stairs-plan")))
-    fast, slow = find_row(0.15), TABLE_4[0]
-    yield header(
-        "variant",
-        "stairs-plan J",
-        "result",
-        "CoP, middle mm",
-        *(f"walk12, {printed.step_time_s:g} s: steps" for printed in (fast, slow)),
-        "distance",
-        "J per planned m",
-    )
+    yield header("variant", "stairs-plan J", "result", "CoP, middle mm")
 
     def row(label: str, drive: Drive, conditions: Conditions | None = None) -> str:
         m = measure(climb, simulate_plan(climb, conditions, drive), drive)
-        first, second = (_walked(printed, drive, conditions) for printed in (fast, slow))
         return cells(
             label,
             "-" if m.fallen else f"{m.measured.mechanical_W * climb.duration_s:.1f}",
             describe_result(m),
             f"{1e3 * (m.pressure_middle_rms_m or np.nan):.1f}",
-            f"{first.steps_done}",
-            f"{second.steps_done}",
-            "-" if second.walked_m is None else f"{second.walked_m / second.planned_m:.2f}",
-            "-" if second.engine_J_per_planned_m is None else f"{second.engine_J_per_planned_m:.1f}",
         )
 
     for label, drive in VARIANTS.items():
@@ -121,50 +67,11 @@ def other_gains() -> Iterator[str]:
     yield row("friction 0.4", Drive(), Conditions(friction=0.4))
     with engine_step(0.00025):
         yield row("engine step 0.25 ms", Drive())
-    for name, values in SPHERES.items():
-        for value in values:
-            with spheres(name, value):
-                yield row(f"walk12: {name.lower().replace('_', ' ')} {value:g}", Drive())
-
-
-@contextmanager
-def spheres(name: str, value: float) -> Iterator[None]:
-    """Other bodies of the 12-joint biped's point masses."""
-    before = getattr(walk12_display, name)
-    setattr(walk12_display, name, value)
-    walk12_display.make_rigid_bodies.cache_clear()
-    try:
-        yield
-    finally:
-        setattr(walk12_display, name, before)
-        walk12_display.make_rigid_bodies.cache_clear()
 
 
 def describe_result(m: Measurements) -> str:
     """In two words."""
     return "stays up" if m.fell_at_s is None else f"falls at {m.fell_at_s:.1f} s"
-
-
-def _walked(printed: PaperRow, drive: Drive, conditions: Conditions | None) -> Walk:
-    problem = nlp_gait.load("walk12").with_values(step_time_s=printed.step_time_s)
-    plan = make_plan(_at(problem, printed.x), STEPS)
-    return measure_walk(plan, simulate_plan(plan, conditions, drive), drive, STEPS)
-
-
-def walks() -> dict[str, Result]:
-    """Gaits of the 12-joint walk."""
-    problem = nlp_gait.load("walk12")
-    found = {f"paper, lambda {row.weight:g}": _at(problem, row.x) for row in TABLE_3}
-    for row in TABLE_4:
-        found[f"paper, {row.step_time_s:g} s"] = _at(problem.with_values(step_time_s=row.step_time_s), row.x)
-    for values in ({"lambda": 0.15}, {"lambda": 0.15, "step_time_s": 2.0}, {"lambda": 1.0}):
-        variant = problem.with_values(**values)
-        name = ", ".join(
-            f"{value:g} s" if key == "step_time_s" else f"{key} {value:g}" for key, value in values.items()
-        )
-        found[f"optimum, {name}"] = _at(variant, nlp_gait.solve(variant, starts=5, seed=0).x)
-    turning = problem.with_values(turn_rad=math.radians(8.0))
-    return found | {"paper, lambda 0.9, on a circle of 8 degrees a step": _at(turning, find_row(0.9).x)}
 
 
 def climbs() -> Iterator[tuple[str, Result]]:
@@ -192,11 +99,3 @@ def optimal_climb(problem: GaitProblem) -> Result:
 
 def _at(problem: GaitProblem, x: object) -> Result:
     return Result(problem=problem, x=problem.check_x(x))  # type: ignore[arg-type]
-
-
-def _stable_share(result: Result) -> float:
-    """Share of the step's time in which the planned ZMP is within the standing sole."""
-    plan = make_plan(result, 1)
-    foot, x, y = plan.robot.feet["left"], *plan.signals.arrays["zmp"].T
-    within = (x >= -foot.back_m) & (x <= foot.front_m) & (y >= -foot.right_m) & (y <= foot.left_m)
-    return float(within.mean())

@@ -12,8 +12,6 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Result
 from nlp_gait.gaits.stairs.display import compute_ground_force
 from nlp_gait.gaits.stairs.planar_biped import MOVING
-from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
-from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
@@ -25,10 +23,6 @@ from tests.simulation.inverse_dynamics_oracle import standing_on  # noqa: E402
 
 # Both are double precision; what remains is rounding, of torques of 100 Nm.
 AGREEMENT_NM = 1e-9
-# A tenth each of the foot's mass is the sole's and the ankle's, and spheres have inertia: measured 1.0 mm.
-POINT_MASSES_M = 0.0015
-# Goswami et al. (2008), Table III, lambda = 0.15 and 1.
-WALKS = ((0.130, 0.109, 0.014, 0.020), (0.055, 0.120, 0.026, 0.010))
 # Optimum of stairs-plan for case 2, to four digits.
 CLIMB = (0.6926, 0.0918, 0.2434, 0.0923, 0.709, 1.4, 0.5763, 0.7783, 1.3287, 0.3169, 0.2)
 
@@ -83,20 +77,6 @@ def test_the_ideal_step_is_simulated_through_its_own_instants(ideal: Result) -> 
     np.testing.assert_allclose(simulated["tau"][:-1, knee], own.arrays["tau"][:-1, joint], atol=AGREEMENT_NM)
 
 
-@pytest.mark.parametrize("x", WALKS)
-def test_small_spheres_need_the_point_masses_pressure_and_the_engines_torques(x: tuple[float, ...]) -> None:
-    plan = make_plan(result_of(nlp_gait.load("walk12"), x))
-    torques, wrench = standing_on(plan.robot, plan.gravity, "left", plan.signals)
-    assert np.abs(torques).max() > 0.1
-    np.testing.assert_allclose(torques, plan.signals.arrays["tau"], atol=AGREEMENT_NM)
-    pressure = np.column_stack([-wrench[:, 4], wrench[:, 3]]) / wrench[:, 2:3]
-    model = compute_steps(load_point_mass_biped(), np.array(x), steps=1, intervals=1000, zmp="moment-free").arrays[
-        "zmp_foot"
-    ]
-    assert np.ptp(model, axis=0).min() > 0.02
-    assert np.abs(pressure - model).max() < POINT_MASSES_M
-
-
 def test_the_stairs_are_two_boxes_and_the_root_stays_in_the_plane(climb: Result) -> None:
     root = Xml.fromstring(make_plan_model(make_plan(climb), Drive()))
     boxes = [geometry for geometry in root.findall("./worldbody/geom") if geometry.get("type") == "box"]
@@ -127,14 +107,6 @@ def test_steps_that_repeat_lead_on_up_with_the_legs_exchanged(ideal: Result) -> 
     np.testing.assert_allclose(left[n + 1 : 2 * n + 1, 2], one.signals.arrays["right_foot"][1:, 2] + rise, atol=1e-12)
     assert np.ptp(right[n + 1 : 2 * n + 1], axis=0).max() < 1e-9
     assert len(three.ground) == 4 and len(one.ground) == 2
-
-
-def test_a_circle_turns_the_torso_by_the_same_angle_each_step() -> None:
-    problem = nlp_gait.load("walk12").with_values(turn_rad=0.1)
-    plan = make_plan(result_of(problem, WALKS[0]), 3)
-    middles = plan.attitude(np.array([0.5, 1.5, 2.5]))
-    np.testing.assert_allclose(2 * np.arctan2(middles[:, 3], middles[:, 0]), [0.0, 0.1, 0.2], atol=1e-12)
-    np.testing.assert_allclose(plan.torso_axis(np.array([0.5, 2.5])), [[0, 0, 1], [0, 0, 1]], atol=1e-12)
 
 
 def test_a_lean_that_changes_gives_the_torso_a_spin() -> None:

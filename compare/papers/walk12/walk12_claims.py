@@ -14,7 +14,6 @@ from compare.papers.walk12 import walk12_findings, walk12_runs
 from compare.papers.walk12.walk12_findings import Walk12Findings, compute_stable_share, follow, list_rounded
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, TABLE_4, find_row
 from compare.papers.walk12.walk12_runs import GA, HORIZONS, PAPER, compute_f, compute_f1, title_table_3, title_table_4
-from compare.papers.walk12.walk12_walks import DRIVES, STEP_TIMES_S, WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
@@ -25,7 +24,6 @@ CONVERGED_EPOCH = 15
 CONVERGED = 1e-3  # relative gain after that epoch
 DIGIT_M, DIGIT_F = 5e-4, 5e-4  # half the last printed digit
 CIRCLE_M = 1e-3
-NO_ENGINE = "the simulator is not installed (extra sim)"
 
 
 def _check_most_stable(findings: Walk12Findings) -> Check:
@@ -237,40 +235,6 @@ def _check_epochs(findings: Walk12Findings) -> Check:
     words = ", ".join(f"{name} {gain:.2f} %" for name, gain in medians.items() if name != "ga")
     own = {"gain": medians["ga"], "worst": 100 * max(gains["ga"]), "others": words}
     return decide([gain < 100 * CONVERGED for gain in medians.values()], **own)
-
-
-def count_upright(walks: Sequence[WalkedGait], drives: str, by: str = "") -> str:
-    """Return how many walks from perturbed starts do not fall, as words, at each step time; of all gaits, or one kind."""
-    parts = []
-    for time in STEP_TIMES_S:
-        chosen = [w for w in walks if (w.drives, w.step_time_s) == (drives, time) and by in ("", w.by)]
-        parts.append(f"{sum(w.upright for w in chosen)} of {sum(w.starts for w in chosen)} at {time:g} s")
-    return " and ".join(parts)
-
-
-def _check_walks(findings: Walk12Findings, step_time_s: float) -> Check:
-    walks = [walk for walk in findings.walks if walk.step_time_s == step_time_s]
-    same = [row.weight for row in TABLE_3 if row.weight < 0.9]
-    texts = []
-    for drives in DRIVES:
-        driven = [walk for walk in walks if walk.drives == drives]
-        equal = [walk.fell_at_s is None for walk in driven if walk.by == IPOPT.upper() and walk.weight in same]
-        counts = (f"{_describe_walks([w for w in driven if w.by == by])} by {by}" for by in ("paper", "IPOPT"))
-        texts.append(f"drives {drives!r}: {', '.join(counts)}; of the equal optima {sum(equal)} of {len(equal)}")
-    apart = float(np.ptp(list_x(findings)[: len(same)], axis=0).max() / 1e3)
-    return decide(ClaimVerdict.UNTESTABLE, found="; ".join(texts) if walks else NO_ENGINE, apart=apart)
-
-
-def _describe_walks(walks: Sequence[WalkedGait]) -> str:
-    upright, starts = sum(walk.upright for walk in walks), sum(walk.starts for walk in walks)
-    walked = sum(walk.fell_at_s is None for walk in walks)
-    return f"{walked} of {len(walks)} gaits and {upright} of {starts} perturbed starts"
-
-
-def _check_same_fate(findings: Walk12Findings) -> Check:
-    drives = [name for name, (_, set_points, *_) in DRIVES.items() if set_points]
-    texts = [f"{name}: {count_upright(findings.walks, name, 'paper')}" for name in drives]
-    return decide(ClaimVerdict.UNTESTABLE, found="; ".join(texts) if findings.walks else NO_ENGINE)
 
 
 def _check_below(findings: Walk12Findings) -> Check:

@@ -13,7 +13,6 @@ from compare.papers.paper_runs import Runs, choose_best, list_objectives
 from compare.papers.walk12 import walk12_runs
 from compare.papers.walk12.walk12_paper import F1MAX, TABLE_3, TABLE_4_DIGITS, PaperRow
 from compare.papers.walk12.walk12_runs import PAPER, PathPoint, compute_f, compute_f1, title_table_3
-from compare.papers.walk12.walk12_walks import WalkedGait
 from compare.study.record import RunRecord
 from compare.study.task import IPOPT
 from nlp_gait.formulation import Array
@@ -31,7 +30,6 @@ class Walk12Findings:
     weighted: Sequence[PathPoint]  # optima of the weighted sum over lambda
     front: Sequence[PathPoint]  # largest f1 for each step length
     printed_step: Mapping[str, float]  # optimal f with the paper's integration step, by lambda
-    walks: Sequence[WalkedGait]  # in the engine; none without it
 
     def best(self, title: str, solver: str = IPOPT) -> RunRecord:
         """Return IPOPT's best start on a problem, or a search's run of median f, of which infeasible runs are the least."""

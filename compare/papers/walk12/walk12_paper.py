@@ -7,8 +7,6 @@ from compare.papers.claims import read_printed
 
 F1MAX = 442.522  # [1/(m^2 s)]
 F2MAX = 0.13  # [m]
-MOTOR_TORQUE_NM = 1.02  # largest holding torque, section 2
-SET_POINTS = 10  # of a step: T / delta t, section 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

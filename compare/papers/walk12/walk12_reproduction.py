@@ -2,10 +2,8 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
 from itertools import product
 from typing import Any, get_args
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 
@@ -14,26 +12,21 @@ from compare.judge import DENSE_INTERVALS
 from compare.papers.claims import bind_checks
 from compare.papers.paper_runs import Runner, choose_best, compute_range, get_point, list_objectives
 from compare.papers.reproduction import Reproduction
-from compare.papers.walk12 import walk12_claims, walk12_paper, walk12_walks
+from compare.papers.walk12 import walk12_claims, walk12_paper
 from compare.papers.walk12 import walk12_runs as runs
-from compare.papers.walk12.walk12_claims import count_upright, list_f1max
+from compare.papers.walk12.walk12_claims import list_f1max
 from compare.papers.walk12.walk12_figures import TURN_RAD, TURNING_WEIGHT, draw_figures
 from compare.papers.walk12.walk12_findings import Walk12Findings, compute_knees, follow, list_f, list_rounded
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, F2MAX, SHARES, TABLE_3, TABLE_4, PaperRow, find_row
 from compare.papers.walk12.walk12_runs import CORNER_M, HORIZONS, MODEL, PAPER, PathPoint, Walk12Effort, compute_f1
-from compare.papers.walk12.walk12_walks import DRIVES, PERTURBATION_RAD, WALKED_STEPS, WalkedGait
 from compare.report.document import Rows, Table, Value
 from compare.study.record import RunRecord
 from compare.study.references import find_reference
 from compare.study.task import IPOPT
 from nlp_gait.formulation import load
-from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS, make_rigid_bodies
 from nlp_gait.gaits.walk12.walk12_model import Zmp, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_problem import Horizon
 from nlp_gait.gaits.walk12.walk12_steps import JOINTS
-from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.mjcf import FRICTION, TIME_STEP
-from nlp_gait.simulation.simulate import FALLEN_HEIGHT, FALLEN_TILT
 
 CHECKS = bind_checks("walk12/walk12_claims.toml", vars(walk12_claims))
 PRINTED_DIGIT = 5e-5  # a difference below this is rounding
@@ -50,13 +43,11 @@ def _run_walk12(runner: Runner, effort: Walk12Effort) -> Walk12Findings:
     weighted, front = ([PathPoint(**row) for row in rows] for rows in paths.values())
     starts = {row.weight: records[runs.title_table_3(PAPER, row.weight), IPOPT] for row in TABLE_3}
     optima = {weight: get_point(choose_best(done)) for weight, done in starts.items()}
-    walks = runner.compute(runs.make_walks(effort, optima), code=(walk12_walks,))
     return Walk12Findings(
         runs=records,
         weighted=weighted,
         front=front,
         printed_step=runner.compute(runs.make_printed_step(effort, optima), code=(runs,))["printed-step"],
-        walks=[WalkedGait(**row) for rows in walks.values() for row in rows],
     )
 
 
@@ -76,7 +67,6 @@ def _compute_values(findings: Walk12Findings) -> dict[str, Any]:
     lengths = [problem.value(f"step_length_m.{end}") for end in ("lower", "upper")]
     every = {n: [run for row in TABLE_3 for run in findings.records(PAPER, row.weight, n)] for n in ("ga", IPOPT)}
     return {
-        "steps": WALKED_STEPS,
         "own": robot,
         "bounds": problem.variables,
         "ga_evaluations": runs.GA_EVALUATIONS,
@@ -196,10 +186,8 @@ def _compute_choices(findings: Walk12Findings) -> dict[str, Any]:
     earlier = [f for h in histories for e, f in zip(h.evaluations, h.objective, strict=True) if e == epoch]
     bounds = {"bound": _find_bound(findings.optimum(PAPER, 1.0)), "simpson_bound": _find_bound(simpson[-1])}
     return {
-        "walked": "; ".join(f"{drives}: {count_upright(findings.walks, drives, 'paper')}" for drives in DRIVES),
         "ga_gap": _compute_ga_gaps(findings, [runs.title_table_3(PAPER, row.weight) for row in TABLE_3]),
         "ga_gap_4": _compute_ga_gaps(findings, [runs.title_table_4(row, "step") for row in TABLE_4]),
-        "simulator": _list_simulator_numbers(),
         "bent_weights": join_words(f"{weight:g}" for weight in weights),
         "unbent": join_words(f"{f:.6f}" for f in list_objectives(unbent)),
         "bent": join_words(f"{findings.optimum(PAPER, weight).verdict.objective:.6f}" for weight in weights),
@@ -219,26 +207,6 @@ def _compute_ga_gaps(findings: Walk12Findings, titles: Iterable[str]) -> tuple[f
     return compute_range(100 * (1 - float(np.median(list_f(ga))) / best.verdict.objective) for ga, best in pairs)
 
 
-def _list_simulator_numbers() -> dict[str, Any]:
-    world = Xml.fromstring(resources.files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
-    contact, drive = world.find("default/geom"), Drive()
-    assert contact is not None  # in our own file
-    torques = [joint.torque_limit_Nm for joint in make_rigid_bodies(load_point_mass_biped()).joints.values()]
-    return {
-        "friction": FRICTION,
-        "contact_ms": 1e3 * float(contact.get("solref", "").split()[0]),
-        "engine_step_ms": 1e3 * TIME_STEP,
-        "drive": drive,
-        "period_ms": 1e3 * drive.period_s,
-        "torques": compute_range(torques),
-        "radius_mm": 1e3 * SPHERE_RADIUS,
-        "sole_share": 200 * SOLE_SHARE,
-        "noise_rad": PERTURBATION_RAD,
-        "fallen_deg": math.degrees(FALLEN_TILT),
-        "fallen_share": 100 * (1 - FALLEN_HEIGHT),
-    }
-
-
 def _find_bound(record: RunRecord) -> float | None:
     return find_reference(record.definition["problem"]).bound
 
@@ -255,19 +223,6 @@ def _make_tables(findings: Walk12Findings) -> dict[str, Rows]:
         "readings": _list_readings(findings),
         "table4": _list_table_4(findings),
         "quadrature": _list_quadratures(findings),
-        "walks": [
-            [
-                w.weight,
-                w.by,
-                w.step_time_s,
-                w.drives,
-                w.steps,
-                w.fell_at_s,
-                w.walked_share,
-                f"{w.upright} of {w.starts}",
-            ]
-            for w in findings.walks
-        ],
         "second-optima": [row for weight in (0.9, 1.0) for row in _list_second_optima(findings, weight)],
     }
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from itertools import product
 from typing import Any, get_args
 
@@ -11,7 +11,6 @@ import numpy as np
 from compare.judge import evaluate
 from compare.papers.paper_runs import Effort, Runs, choose_best, make_computation, make_search_tasks, make_start_tasks
 from compare.papers.walk12.walk12_paper import F1MAX, F2MAX, TABLE_3, TABLE_4, PaperRow
-from compare.papers.walk12.walk12_walks import simulate_walks
 from compare.study.store import Computation
 from compare.study.task import IPOPT, ProblemSpec, Task
 from metaheuristics import GeneticAlgorithm, ParticleSwarm
@@ -58,17 +57,15 @@ class Walk12Effort(Effort):
     )
     lengths_m: tuple[float, ...] = tuple(np.round(np.linspace(0.05, 0.13, 33), 6).tolist())  # steps of the Pareto front
     printed_step_weights: tuple[float, ...] = (0.15, 0.9, 1.0)  # solved with the paper's integration step
-    walked_weights: tuple[float, ...] = tuple(row.weight for row in TABLE_3)  # simulated: printed gait and optimum
-    perturbed_starts: int = 4  # of each of these with each drive
 
     @property
     def steps(self) -> int:
-        """Runs, the two paths, the printed integration step, the walks, and the report."""
+        """Runs, the two paths, the printed integration step, and the report."""
         table_3, table_4 = len(TABLE_3) * (self.starts + 2 * self.runs), len(TABLE_4) * len(HORIZONS) * self.starts
         variants = sum(map(len, READINGS.values())) + len(BENT_FREELY_WEIGHTS) + len(TABLE_3) + 1
         searches = len(GA_VARIANTS) + 2 * len(TABLE_4) * len(HORIZONS)
         runs = 2 * (table_3 + table_4) + variants * self.starts + searches * self.runs + 1
-        return runs + 2 + 1 + 2 * len(self.walked_weights) + 1
+        return runs + 2 + 1 + 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -179,15 +176,6 @@ def make_printed_step(effort: Walk12Effort, optima: Mapping[float, Sequence[floa
     """Return solving with the paper's integration step from the optima, by lambda."""
     starts = {f"{weight:g}": optima[weight] for weight in effort.printed_step_weights}
     return [make_computation("printed-step", ProblemSpec(name="walk12"), solve_with_printed_step, starts=starts)]
-
-
-def make_walks(effort: Walk12Effort, optima: Mapping[float, Sequence[float]]) -> list[Computation]:
-    """Return walking in the engine, for the paper's gaits and the optima."""
-    spec, starts = ProblemSpec(name="walk12"), effort.perturbed_starts
-    rows = [row for row in TABLE_3 if row.weight in effort.walked_weights]
-    gaits = [(row.weight, by, x) for row in rows for by, x in (("paper", [*row.x]), ("IPOPT", [*optima[row.weight]]))]
-    make = partial(make_computation, spec=spec, function=simulate_walks, starts=starts)
-    return [make(f"walks-{gait[0]:g}-{gait[1]}", gait=gait) for gait in gaits]
 
 
 def solve_with_printed_step(starts: Mapping[str, Sequence[float]]) -> dict[str, float]:

@@ -12,7 +12,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Assembly, Constraint, Display, GaitProblem, Grid, Objective, Point, SolverHints, maker
 from nlp_gait.formulation.assembly import RowsOverTime, Variable, make_parameters
 from nlp_gait.gaits.walk12 import walk12_model
-from nlp_gait.gaits.walk12.walk12_display import make_simulation_model, make_skeleton
+from nlp_gait.gaits.walk12.walk12_display import make_skeleton
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps_at
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -106,7 +106,6 @@ def walk12(
         display=Display(
             motion=partial(compute_steps_at, robot=robot, intervals=intervals, zmp=zmp),
             skeleton=partial(make_skeleton, robot),
-            simulation_model=make_simulation_model(robot, zmp),
         ),
         rows_over_time=(
             RowsOverTime(assemble=at_phases, times=lambda values: (0.0, values["step_time_s"]), means=means),

@@ -74,11 +74,21 @@ def compute_steps(
 
 
 def compute_steps_at(
-    at: NumericPoint, robot: walk12_model.PointMassBiped, *, intervals: int, zmp: walk12_model.Zmp, steps: int = 2
+    at: NumericPoint, robot: walk12_model.PointMassBiped, *, intervals: int, zmp: walk12_model.Zmp
 ) -> Signals:
     """Compute time histories at a point of the problem, see ``compute_steps``."""
-    settings = {name: float(at[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")}
-    return compute_steps(robot, at.x.full().ravel(), **settings, steps=steps, intervals=intervals, zmp=zmp)
+    step_time_s, turn_rad, reach_margin_rad = (
+        float(at[name]) for name in ("step_time_s", "turn_rad", "reach_margin_rad")
+    )
+    return compute_steps(
+        robot,
+        at.x.full().ravel(),
+        step_time_s=step_time_s,
+        turn_rad=turn_rad,
+        reach_margin_rad=reach_margin_rad,
+        intervals=intervals,
+        zmp=zmp,
+    )
 
 
 def _arrange_joints(local: dict[str, Array], side: float, turn: float) -> dict[str, Array]:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from compare.judge import evaluate
 from compare.papers.claims import ClaimVerdict
-from compare.papers.walk12 import walk12_runs, walk12_walks
+from compare.papers.walk12 import walk12_runs
 from compare.papers.walk12.walk12_paper import CHANGES, F1MAX, PAPER, SHARES, TABLE_3, TABLE_4
 from compare.papers.walk12.walk12_reproduction import REPRODUCTION
 from compare.study.record import read_record
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.simulation import measurements, mjcf, simulate
 from tests.compare.papers.finished import Finished, check_report, recompute, reproduce
 from tests.compare.papers.walk12_readings import (
     compute_corner_slopes,
@@ -34,27 +32,13 @@ def evaluate_only(problem: GaitProblem, x0: Sequence[float]) -> SimpleNamespace:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Finished]:
-    """The least of the quick reproduction: one start, one step in the engine, few of the paper's time steps.
+    """The least of the quick reproduction: one start, one run.
 
     With the paper's integration step our optimum is evaluated, not solved again.
     """
-    simulate_walks, walked = walk12_runs.simulate_walks, list[dict[str, Any]]()
-
-    def simulate_once(gait: tuple[float, str, Sequence[float]], starts: int) -> list[dict[str, Any]]:
-        walked[:] = walked or simulate_walks(gait, starts)
-        return [{**walk, "weight": gait[0], "by": gait[1]} for walk in walked]
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(walk12_runs, "simulate_walks", simulate_once)
         patch.setattr(walk12_runs, "solve", evaluate_only)
         patch.setitem(vars(REPRODUCTION), "quick", replace(REPRODUCTION.quick, starts=1, runs=1))
-        for drives in [name for name in walk12_walks.DRIVES if name not in ("ours", walk12_walks.HELD)]:
-            patch.delitem(walk12_walks.DRIVES, drives)
-        patch.setattr(walk12_walks, "WALKED_STEPS", 1)
-        patch.setattr(walk12_walks, "STEP_TIMES_S", (1.0,))
-        patch.setattr(simulate, "SETTLE_TIME", 0.0)
-        for module in (mjcf, measurements, simulate):
-            patch.setattr(module, "TIME_STEP", 0.002)
         drawn = ("tradeoff", "fig08", "fig12-13")
         yield reproduce("walk12", tmp_path_factory.mktemp("walk12"), coarse=True, drawn=drawn)
 
@@ -67,7 +51,7 @@ def test_the_report_contains_every_table_and_figure(finished: Finished) -> None:
     check_report(
         finished,
         "tradeoff fig08 fig09 fig10 fig12-13 fig14-15 fig16-17 circle",
-        "claims differences table3-paper table3-model table4 gaits readings quadrature walks second-optima walk-straight "
+        "claims differences table3-paper table3-model table4 gaits readings quadrature second-optima walk-straight "
         "walk-circle",
     )
 

@@ -17,7 +17,6 @@ from compare.papers.walk12.walk12_runs import CORNER_M, compute_f1, load_walk12
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.kernel.compiled import compile_objective
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.walk12.walk12_display import SOLE_SHARE, SPHERE_RADIUS
 from nlp_gait.gaits.walk12.walk12_model import (
     GRAVITY,
     PointMassBiped,
@@ -40,8 +39,7 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
 
     "ground": heights of the masses from the ground, with an ankle at the height L of the foot's mass above it; "g": 9.8 m/s^2;
     "foot": the foot's mass stays at the height L above its ankle; "rods": (13) with M of uniform rods for thighs and shanks,
-    a tenth of the actuators' mass in all; "spheres": with M of the spheres that are the legs' masses in the engine. "rods_mm" and
-    "spheres_mm" are the greatest shifts of the ZMP by these moments [mm].
+    a tenth of the actuators' mass in all. "rods_mm" is the greatest shift of the ZMP by these moments [mm].
     """
     robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
     m, up = np.array(list_masses(robot)).ravel(), robot.foot_com_height_m
@@ -56,31 +54,22 @@ def compute_f1_variants(x: tuple[float, ...]) -> dict[str, float]:
     P_foot, A_foot = P.copy(), A.copy()
     P_foot[:, :, [0]], A_foot[:, :, [0]] = np.array([[0.0], [0.0], [up]]), 0.0
     P_foot[:, :, [6]], A_foot[:, :, [6]] = ankle + np.array([[0.0], [0.0], [up]]), ankle_a
-    still, turning = np.zeros_like(ankle), {name: np.zeros((len(phases), 3)) for name in ("rods", "spheres")}
-    thigh, shank = (
-        robot.hip_mass_kg / 3 + robot.knee_mass_kg / 2,
-        robot.knee_mass_kg / 2 + (1 - 2 * SOLE_SHARE) * robot.foot_mass_kg,
-    )
+    still, turning = np.zeros_like(ankle), np.zeros((len(phases), 3))
     feet = ((still, still), (ankle, ankle_a))
     for (foot, foot_a), knee, hip in zip(feet, (1, 5), (2, 4), strict=True):
-        for mass, rod, rod_a in (
-            (shank, P[:, :, [knee]] - foot, A[:, :, [knee]] - foot_a),
-            (thigh, P[:, :, [hip]] - P[:, :, [knee]], A[:, :, [hip]] - A[:, :, [knee]]),
+        for rod, rod_a in (
+            (P[:, :, [knee]] - foot, A[:, :, [knee]] - foot_a),
+            (P[:, :, [hip]] - P[:, :, [knee]], A[:, :, [hip]] - A[:, :, [knee]]),
         ):
             spin = np.cross(rod[:, :, 0], rod_a[:, :, 0])  # l^2 u x u''
-            turning["rods"] += ROD_SHARE / 4 * m.sum() / 12 * spin
-            turning["spheres"] += 0.4 * mass * SPHERE_RADIUS**2 * spin / (rod[:, :, 0] ** 2).sum(axis=1, keepdims=True)
-    moments = {name: f1(P, A, moments=spin[:, [1, 0]] * [-1.0, 1.0]) for name, spin in turning.items()}
-    shifts = {name: 1e3 * np.hypot(*spin[:, :2].T).max() / (GRAVITY * m.sum()) for name, spin in turning.items()}
+            turning += ROD_SHARE / 4 * m.sum() / 12 * spin
     return {
         "ours": f1(P, A),
         "ground": f1(P, A, base=up),
         "g": f1(P, A, g=9.8),
         "foot": f1(P_foot, A_foot),
-        "rods": moments["rods"],
-        "spheres": moments["spheres"],
-        "rods_mm": shifts["rods"],
-        "spheres_mm": shifts["spheres"],
+        "rods": f1(P, A, moments=turning[:, [1, 0]] * [-1.0, 1.0]),
+        "rods_mm": 1e3 * np.hypot(*turning[:, :2].T).max() / (GRAVITY * m.sum()),
     }
 
 
