@@ -105,3 +105,49 @@ def test_bounds_whose_squares_are_no_numbers_are_refused(bound: float) -> None:
 def test_numpys_whole_numbers_are_whole_numbers() -> None:
     found = solve(PROBLEM, starts=np.int64(1), seed=np.int32(3))  # type: ignore[arg-type]
     assert found.seed == 3 and type(found.seed) is int and found.x == solve(PROBLEM, starts=1, seed=3).x
+
+
+class Plugin:
+    """Objective and algorithm of which one answer is another value."""
+
+    name = "plug-in"
+
+    def __init__(self, wrong: str, value: Any) -> None:
+        self._wrong, self._value = wrong, value
+        self.names = self._answer("names", PROBLEM.names)
+        self.lower, self.upper = self._answer("lower", PROBLEM.lower), self._answer("upper", PROBLEM.upper)
+        self.population = self._answer("population", 5)
+
+    def __call__(self, points: Any) -> Any:
+        f, violation = OBJECTIVE(points)
+        return self._answer("answer", (self._answer("f", f), self._answer("violation", violation)))
+
+    def start(self, start: Any) -> Any:
+        self._points = start.initial
+        return self._answer("start", self)
+
+    def ask(self) -> Any:
+        return self._answer("ask", self._points)
+
+    def tell(self, points: Any, f: Any, violation: Any, rule: Any) -> Any:
+        return self._answer("tell", None)
+
+    def stop(self) -> Any:
+        return self._answer("stop", ())
+
+    def _answer(self, place: str, right: Any) -> Any:
+        return self._value if place == self._wrong else right
+
+
+OF_OBJECTIVE = ("names", "lower", "upper", "answer", "f", "violation")
+
+
+@pytest.mark.parametrize("place", [*OF_OBJECTIVE, "population", "start", "ask", "tell", "stop"])
+def test_an_answer_of_user_code_is_taken_or_refused_in_one_sentence(place: str) -> None:
+    for value in WRONG:
+        plugin = Plugin(place, value)
+        given = (plugin, PSO) if place in OF_OBJECTIVE else (OBJECTIVE, plugin)
+        try:
+            search.minimize(*given, evaluations=20)  # type: ignore[arg-type]
+        except (GaitError, search.SearchError) as error:
+            assert str(error) and "\n" not in str(error)
