@@ -18,7 +18,7 @@ from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.proofs.affine import AffineForms, AffineFunction
-from nlp_gait.proofs.boxes import halve
+from nlp_gait.proofs.boxes import Numbers, halve
 
 BOXES = 64  # parts of the box, at most
 COST_SHARE = 0.05  # a part is split while its cost may exceed what was found by this share of the range found
@@ -146,7 +146,7 @@ class _Parts(NamedTuple):
     upper: Array  # (P, 1 + r)
 
 
-def _search(problem: GaitProblem, box: Array, rows: Array) -> tuple[list[_Point], _Parts | None]:
+def _search(problem: GaitProblem, box: Array, rows: Numbers) -> tuple[list[_Point], _Parts | None]:
     """Evaluate points of the box, and enclose its parts; None without a compiler, or for an operation without enclosure."""
     model, points = build_exact_model(problem), list[_Point]()
     scales = model.row_scales[rows]

@@ -17,7 +17,7 @@ from compare.cli.exchange import import_results, verify
 from compare.cli.export import animate, export, export_objective, export_solver
 from compare.cli.list import list_problems
 from compare.cli.old_names import Commands
-from compare.cli.questions.optima import capabilities, certainty, prices, robust, sweep, variants
+from compare.cli.questions.optima import certainty, prices, robust, sweep, variants
 from compare.cli.questions.pareto import pareto
 from compare.cli.report import report, reproduce
 from compare.cli.simulate import simulate
@@ -26,7 +26,7 @@ from compare.cli.solve import plan, solve
 PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, plan),
     "Comparison": (compare, import_results, report, reproduce, bench, verify),
-    "Questions": (sweep, prices, pareto, certainty, variants, robust, capabilities),
+    "Questions": (sweep, prices, pareto, certainty, variants, robust),
     "Show and share": (simulate, animate, export, export_objective, export_solver),
 }
 

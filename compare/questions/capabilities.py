@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from compare.analysis.units import choose_natural_step, join_words, with_unit
 from compare.questions.question import Answer, Question, Work, make_record_table, make_table
@@ -17,20 +17,6 @@ from nlp_gait.gaits.humanoid.body import make_humanoid
 from nlp_gait.gaits.humanoid.turning import find_sharpest_turn
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
-
-class RaisedQuantity(NamedTuple):
-    """A quantity to be maximised: an index or a variable of a walking cycle."""
-
-    words: str
-    quantity: str
-    unit: str
-
-
-GOALS = (
-    RaisedQuantity("highest speed", "speed_m_s", "m/s"),
-    RaisedQuantity("longest step", "step_length_m", "m"),
-    RaisedQuantity("highest lift of a foot", "swing_height_m", "m"),
-)
 FACTOR, MOST_ROUNDS = 2.0, 6  # by which our bounds are moved in each round, and the number of rounds
 SHOWN = 4  # limits in a sentence
 FREE = 1e-4  # share of the value: a limit whose natural step changes it by less does not stop the robot
@@ -63,10 +49,10 @@ class Capability:
     """How far one quantity goes."""
 
     words: str
-    quantity: str
+    quantity: str  #: index or variable of a walking cycle
     unit: str
-    rounds: tuple[Round, ...]  #: the first one within all bounds; empty if no gait was found
-    end: str  #: why there are no more rounds
+    rounds: tuple[Round, ...] = ()  #: the first one within all bounds; empty if no gait was found
+    end: str = ""  #: why there are no more rounds
 
     @property
     def within(self) -> Round | None:
@@ -77,6 +63,13 @@ class Capability:
     def beyond(self) -> Round | None:
         """With our bounds moved; None if they do not stop the robot."""
         return self.rounds[-1] if len(self.rounds) > 1 else None
+
+
+GOALS = (
+    Capability(words="highest speed", quantity="speed_m_s", unit="m/s"),
+    Capability(words="longest step", quantity="step_length_m", unit="m"),
+    Capability(words="highest lift of a foot", quantity="swing_height_m", unit="m"),
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,7 +140,7 @@ class Capabilities(Question[tuple[Capability, ...]]):
 
 
 def raise_quantity(
-    problem: GaitProblem, goal: RaisedQuantity, x: Mapping[str, float], solver: Solver, work: Work
+    problem: GaitProblem, goal: Capability, x: Mapping[str, float], solver: Solver, work: Work
 ) -> Capability:
     """Maximise a quantity from a feasible gait x; while our bounds stop it, move them outwards and continue."""
     raised = maximise(problem, goal)
@@ -161,7 +154,7 @@ def raise_quantity(
             break
         x, stops = solution.x, list_stops(solution)
         rounds.append(Round(value=solution.objective, stops=stops, moved=dict(moved), x=x))
-        change = {name: value for stop in stops if stop.ours for name, value in [move_bound(raised, stop)]}
+        change = dict(move_bound(stop) for stop in stops if stop.ours)
         if not change:
             end = "none of our bounds stops it"
             break
@@ -169,10 +162,10 @@ def raise_quantity(
         raised = raised.with_values(**change)
     else:
         end = f"our bounds still stop it after {MOST_ROUNDS} rounds"
-    return Capability(words=goal.words, quantity=goal.quantity, unit=goal.unit, rounds=tuple(rounds), end=end)
+    return replace(goal, rounds=tuple(rounds), end=end)
 
 
-def maximise(problem: GaitProblem, goal: RaisedQuantity) -> GaitProblem:
+def maximise(problem: GaitProblem, goal: Capability) -> GaitProblem:
     """Return the problem that maximises a quantity under the same constraints."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
@@ -185,13 +178,12 @@ def maximise(problem: GaitProblem, goal: RaisedQuantity) -> GaitProblem:
 
 def list_stops(solution: Solution) -> tuple[StoppingLimit, ...]:
     """Return the limits that stop a maximum, the one whose natural step gains most first."""
-    stops = [make_stop(active) for active in solution.active_constraints]
+    stops = [_make_stop(active) for active in solution.active_constraints]
     effective = (stop for stop in stops if abs(stop.gain) > FREE * abs(solution.objective))
     return tuple(sorted(effective, key=lambda stop: -abs(stop.gain)))
 
 
-def make_stop(active: ActiveConstraint) -> StoppingLimit:
-    """Return an active constraint as a stop."""
+def _make_stop(active: ActiveConstraint) -> StoppingLimit:
     variable = active.name.removeprefix("bounds[").removesuffix("]") if active.name.startswith("bounds[") else ""
     is_goal = any(variable == goal.quantity for goal in GOALS)
     return StoppingLimit(
@@ -206,7 +198,7 @@ def make_stop(active: ActiveConstraint) -> StoppingLimit:
     )
 
 
-def move_bound(problem: GaitProblem, stop: StoppingLimit) -> tuple[str, float]:
+def move_bound(stop: StoppingLimit) -> tuple[str, float]:
     """Return the parameter of one of our bounds and its value further out; times stay positive."""
     variable = stop.name.removeprefix("bounds[").removesuffix("]")
     outwards = (stop.side == "upper") == (stop.bound > 0.0)

@@ -11,7 +11,6 @@ import typer
 
 from compare.cli.command import command
 from compare.cli.options import (
-    AnyCycle,
     AnyProblem,
     AsJson,
     Code,
@@ -232,7 +231,15 @@ def robust(
 @command
 def sweep(
     *,
-    over: Annotated[list[str], typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")],
+    over: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")
+    ] = None,
+    capabilities: Annotated[
+        bool,
+        typer.Option(
+            "--capabilities", help="Of a walking cycle instead: its highest speed, longest step, highest lift."
+        ),
+    ] = False,
     algorithm: Annotated[str, typer.Option(help="ipopt, or a search algorithm.")] = "ipopt",
     starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts where no neighbour helps.")] = 5,
     evaluations: Evaluations = 10_000,
@@ -250,40 +257,27 @@ def sweep(
 
     With speeds as an axis the objective of a walking cycle is its power. Simulations are open loop.
 
+    With `--capabilities` each quantity comes with the limits that stop it. Bounds on times and velocities that are this
+    package's, not the robot's, are named, and moved where they stop the robot. The sharpest turn is reported, too.
+
     Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
     `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10 --engine`,
-    `nlp-gait sweep humanoid-cycle --robot my.urdf --over speed_m_s=0.02,0.05`
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --over speed_m_s=0.02,0.05`,
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --intervals 5 --capabilities`
     """
+    from compare.questions.capabilities import Capabilities
     from compare.questions.sweep import Sweep, parse_axis
 
-    axes, effort = [parse_axis(text) for text in over], {"starts": starts, "evaluations": evaluations, "seed": seed}
+    if capabilities == bool(over):
+        raise InputError("a sweep takes either --over NAME=LOW:HIGH:COUNT or --capabilities")
+    if capabilities:
+        output.answer(Capabilities(problem=problem.load(), starts=starts, seed=seed))
+        return
+    axes, effort = (
+        [parse_axis(text) for text in over or ()],
+        {"starts": starts, "evaluations": evaluations, "seed": seed},
+    )
     if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
         problem = replace(problem, option=["objective=power", *(problem.option or ())])
     effort["steps"] = steps if engine else 0
     output.answer(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort))
-
-
-@command
-def capabilities(
-    *,
-    starts: Annotated[
-        int,
-        typer.Option(
-            min=1, max=100000, help="Random starts for the cheapest cycle, from which each quantity is raised."
-        ),
-    ] = 3,
-    seed: Seed = 0,
-    problem: AnyCycle,
-    output: Output,
-) -> None:
-    """Report the highest walking speed, the longest step and the highest lift of a foot, each with the limits that stop it.
-
-    For robots that can turn, also the sharpest turn of a step.
-
-    Bounds on times and velocities that are this package's, not the robot's, are named, and moved where they stop the robot.
-
-    Examples: `nlp-gait capabilities`, `nlp-gait capabilities humanoid-cycle --robot my.urdf --intervals 5`
-    """
-    from compare.questions.capabilities import Capabilities
-
-    output.answer(Capabilities(problem=problem.make_spec(problem.name).load(), starts=starts, seed=seed))
