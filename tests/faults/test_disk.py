@@ -37,14 +37,6 @@ def test_a_folder_is_open_as_the_user_has_it(tmp_path: Path) -> None:
     assert (tmp_path / "new").stat().st_mode & 0o777 == 0o750
 
 
-def test_a_new_name_is_flushed_with_its_folder(tmp_path: Path, flushed: list[Path]) -> None:
-    (tmp_path / "to").mkdir()
-    (tmp_path / "one").write_text("new")
-    (tmp_path / "to" / "two").write_text("old")
-    disk.rename(tmp_path / "one", tmp_path / "to" / "two")
-    assert (tmp_path / "to" / "two").read_text() == "new" and flushed == [tmp_path / "to"]
-
-
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.EPERM, errno.EIO])
 def test_only_folders_may_be_left_to_the_file_system(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
