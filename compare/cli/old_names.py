@@ -20,6 +20,7 @@ REPLACEMENTS = {
     "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
     "motions": "variants compares richer motions",
     "motors": "variants compares motors",
+    "pareto --objectives": "pareto --against NAME trades power against one mean margin or the speed",
     "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
     "walk": "sweep --engine simulates the cheapest cycle at each speed",
 }

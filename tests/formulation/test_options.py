@@ -37,8 +37,6 @@ OTHER: dict[str, Any] = {
     "duration_s": 3.0,
     "instance": "walk12-w100",
     "tracking_limit": False,
-    "sole_off_s": 0.6,
-    "toe_off_s": 1.5,
     "step": "first",
 }
 

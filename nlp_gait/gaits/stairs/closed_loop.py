@@ -13,7 +13,7 @@ from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.leg_network import ONLINE, solve_legs_by_network
 from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_posture, compute_stair_height
-from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic import quantised
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import Contact, Equations, Ground, QuantisedState, solve_definite
@@ -22,7 +22,6 @@ InverseKinematics = Literal["closed-form", "network"]
 Rates = Literal["exact", "differences"]
 Coordinates = Literal["joint", "printed"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
-EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 CONTACTS = ("T", "S", "A", "S'", "T'", "A'")  # points that may touch the ground, all but the base
 N = len(biped.LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import inf
-from typing import Literal
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
-from nlp_gait.errors import InputError, check_count
+from nlp_gait.errors import check_count
 from nlp_gait.formulation import Array, Display, GaitProblem, Grid, Signals, SolverHints, maker
 from nlp_gait.formulation.assembly import Assembly, Constraint, NumericPoint, Objective, Point, make_parameters
 from nlp_gait.formulation.blocks import Block, Layout
@@ -22,12 +21,10 @@ from nlp_gait.gaits.stairs.planar_biped import JOINTS, MOVING, StanceLoads
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan, compute_posture, compute_stair_height
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
-Ends = Literal["rest", "moving"]
 EDGE_WIDTH = 0.012  # of the sigmoid that replaces an edge of the stair [m]
 AXES = ("x", "z")
 RATE_LIMIT, ACCELERATION_LIMIT = 12.0, 80.0  # [rad/s], [rad/s^2]
 FORCE_LIMITS = ((-600.0, 600.0), (0.0, 900.0))  # of the ground on a point of the rear foot, along x and z [N]
-STEP_TIME = 3.5  # t3, for which the times of the rear foot are given (Table III) [s]
 # A start point: noise on the link angles [rad], and the rear foot's share of the load [N].
 NOISE, TOE_LOAD, SOLE_LOAD = 0.02, 250.0, 100.0
 # A plan whose legs reach on common stairs; neither optimal nor balanced.
@@ -63,29 +60,25 @@ PARAMETERS = (
 
 
 @maker
-def stairs_ideal(
-    *, ends: Ends = "rest", sole_off_s: float = 0.5, toe_off_s: float = 1.4, intervals: int = 70
-) -> GaitProblem:
-    """Return the trajectory optimisation of one step.
+def stairs_ideal(*, intervals: int = 70) -> GaitProblem:
+    """Return the trajectory optimisation of one step, which starts and ends at rest on flat feet.
 
     States are angles and rates of the seven links that move while the stance foot stands flat; controls are their
     accelerations and the ground's forces on sole and toe of the rear foot.
 
     Args:
-        ends: rest, both ends at rest on flat feet; moving, any rates at the ends and a landing on the toe, as in a planned step.
-        sole_off_s: time at which the rear sole lifts, in a step of 3.5 s; in others in proportion.
-        toe_off_s: time at which the rear toe lifts.
         intervals: equal parts of the step, at least 10.
 
     Source:
         Robot, stair and phases of Bhardwaj et al.; the formulation is this package's own.
     """
     intervals = check_count("intervals", intervals, at_least=10)
-    if not 0 < sole_off_s < toe_off_s < STEP_TIME:
-        raise InputError(f"times must satisfy 0 < sole_off_s < toe_off_s < {STEP_TIME}, got {sole_off_s}, {toe_off_s}")
-    sole_off, toe_off = (max(1, round(time / STEP_TIME * intervals)) for time in (sole_off_s, toe_off_s))
-    step = IdealStep(intervals=intervals, sole_off=sole_off, toe_off=toe_off, ends=ends)
-    model = make_simulation_model(step.simulate, repeats=ends == "rest")
+    sole_off, toe_off, _, step_time = (
+        stair.PAPER_TIMES
+    )  # when the rear sole and toe lift, in a step of other time in proportion
+    lifts = [max(1, round(time / step_time * intervals)) for time in (sole_off, toe_off)]
+    step = IdealStep(intervals=intervals, sole_off=lifts[0], toe_off=lifts[1])
+    model = make_simulation_model(step.simulate, repeats=True)
     return GaitProblem(
         name="stairs-ideal",
         title="Stairs, full trajectory optimisation: least effort",
@@ -106,7 +99,6 @@ class IdealStep:
     intervals: int  # N, equal parts of the step
     sole_off: int  # number of intervals with load on the rear sole
     toe_off: int  # number of intervals with load on the rear toe: the double support
-    ends: Ends
 
     @cached_property
     def layout(self) -> Layout:
@@ -237,24 +229,22 @@ class IdealStep:
         return ca.Function("places", [q, size], ca.cse([toe, sole, ankle, hip, ca.vertcat(*heights)]))
 
     def _motion(self, x: Mapping[str, MX], step: MX) -> tuple[Constraint, ...]:
-        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends if required, and a still torso."""
+        """Return rows of the quantised dynamics (eqs. 44, 45), rest at both ends, and a still torso."""
         n = self.intervals
         q, v, a = x["angle"], x["rate"], x["acceleration"]
         rates = v[:, 1:] - v[:, :n] - a * step  # (eq. 44)
         angles = q[:, 1:] - q[:, :n] - v[:, :n] * step - 0.5 * a * step**2  # (eq. 45)
         steps = range(1, n + 1)
         torso = v[MOVING.index("UH"), 1:n]
-        rest = _make_equal_rows("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0)
-        still = _make_equal_rows("torso_starts_still", v[MOVING.index("UH"), 0], ("UH",), (0,), "rad/s", 1.0)
         return (
             _make_equal_rows("rate_continuity", rates, MOVING, steps, "rad/s", 1.0),
             _make_equal_rows("angle_continuity", angles, MOVING, steps, "rad", 0.1),
-            rest if self.ends == "rest" else still,
+            _make_equal_rows("rest", v[:, [0, n]], MOVING, (0, n), "rad/s", 1.0),
             _make_equal_rows("torso_still", torso, ("UH",), range(1, n), "rad/s", 1.0),
         )
 
     def _feet(self, x: Mapping[str, MX], point: Point) -> tuple[Constraint, ...]:
-        """Return rows of the swing foot's positions and of its height above the stair; one that moves lands on its toe."""
+        """Return rows of the swing foot's positions and of its height above the stair."""
         n, lift = self.intervals, self.toe_off
         size = ca.vertcat(*stair.read_stair(point))
         q = x["angle"]
@@ -262,10 +252,6 @@ class IdealStep:
         flat = q[[MOVING.index("AS"), MOVING.index("ST")], :]
         toe = swing_toe[:, 1 : lift + 1] - ca.repmat(ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - size, 1, lift)
         ends = ca.horzcat(ankle[:, 0] + size, ankle[:, n] - size)
-        flat_at = [0, n]
-        if self.ends == "moving":
-            ends[:, 1] = swing_toe[:, n] - ca.vertcat(biped.load_toe_foot_biped().foot_m, 0) - size
-            flat_at = [0]
         advance = hip[:, n] - hip[:, 0] - size
         in_support, in_swing = range(lift), range(lift + 1, n + 1)
 
@@ -277,7 +263,7 @@ class IdealStep:
             _make_equal_rows(
                 "toe_flat", flat[1, 1 : self.sole_off + 1], ("ST",), range(1, self.sole_off + 1), "rad", 0.1
             ),
-            _make_equal_rows("foot_flat", flat[:, flat_at], ("AS", "ST"), tuple(flat_at), "rad", 0.1),
+            _make_equal_rows("foot_flat", flat[:, [0, n]], ("AS", "ST"), (0, n), "rad", 0.1),
             _make_equal_rows("ankle_on_step", ends, AXES, (0, n), "m", 0.01),
             _make_equal_rows("hip_advance", advance, AXES, (n,), "m", 0.01),
             above("clearance_in_support", heights[1:, :lift], ("sole", "ankle"), in_support),

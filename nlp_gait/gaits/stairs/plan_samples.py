@@ -12,11 +12,10 @@ from nlp_gait.formulation import Array, Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs import planned_motion as planned
 from nlp_gait.gaits.stairs.planned_motion import PHASES, Posture, Stair, StairPlan, StepKind
-from nlp_gait.gaits.stairs.stair import GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 
-EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 # Checks of the swing foot against the stair per interval; none while the toe leaves or meets the ground.
 CLEARANCE_DENSITY = 4
 GROUND_SHARE = 0.1

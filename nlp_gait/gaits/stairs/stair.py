@@ -13,6 +13,7 @@ from nlp_gait.gaits.stairs.planar_biped import JOINT_RATES, JOINTS, MOVING, load
 from nlp_gait.gaits.stairs.planned_motion import Stair, StairPlan
 
 PAPER_TIMES = (0.5, 1.4, 2.2, 3.5)  # t1, t2, t_bc, t3 [s], Table III
+EDGE_WIDTH = 0.003  # of the sigmoid that replaces an edge of the stair [m]
 SETBACK = 0.06  # distance of an edge behind the ankle that stands on the step [m]
 
 # Stairs of Table IV by case: double tread ("stair length") [m], rise over run.
