@@ -126,3 +126,10 @@ def test_the_check_finds_what_it_looks_for() -> None:
     assert find_participles(code) == ["1: understood", "3: _tied"]
     code = "def hip(): ...\ndef locate_hip(): ...\ndef _hip(): ...\n@maker\ndef walk12(): ...\n"
     assert find_nouns(code) == ["1: hip"]
+
+
+def test_no_archive_may_hold_objects() -> None:
+    """All else that makes code from data is refused by ruff."""
+    for package in ("compare", "metaheuristics", "nlp_gait"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert "allow_pickle=True" not in path.read_text(encoding="utf-8"), path

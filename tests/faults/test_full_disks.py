@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import resource
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,9 +11,7 @@ import pytest
 
 from compare.study.record import read_record
 from tests.compare.cli.calls import nlp_gait
-from tests.faults.processes import ROOT, in_own_mounts
-
-FULL = Path("/dev/full")
+from tests.faults.processes import in_own_mounts
 
 
 @contextmanager
@@ -74,18 +70,3 @@ def test_what_was_computed_is_printed_though_it_cannot_be_written(
     assert last.startswith("nlp-gait: cannot write ") and "File too large" in last
     assert all("continuing without storing results" in line for line in kept) and len(kept) <= 1
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv" and path.name != "store"] == []
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
-def test_output_that_cannot_be_written_is_reported() -> None:
-    with FULL.open("w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "nlp_gait", "evaluate", "walk12", "--x", "0.1,0.1,0.01,0.01", "--json"],
-            cwd=ROOT,
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            timeout=60,
-        )
-    assert (done.returncode, done.stderr) == (1, "nlp-gait: cannot write the output: No space left on device\n")

@@ -115,28 +115,30 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("solver", "owner", "method", "calls", "effort", "said"),
+    [
+        ("ipopt", IterationWatch, "eval", 60, "--starts 1", ", not all of them solved in both directions"),
+        ("pso", CompiledObjective, "__call__", 30, "--algorithm pso --evaluations 500", ""),
+    ],
+    ids=["ipopt", "pso"],
+)
 def test_sweep_writes_the_points_that_it_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
+    solver: str,
+    owner: type,
+    method: str,
+    calls: int,
+    effort: str,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    coarse_pictures: None,
 ) -> None:
-    press_after(monkeypatch, IterationWatch, "eval", 60)
-    over = ["--over", "step_length_m=0.05:0.12:30", "--starts", "1"]
-    done = run("sweep", "walk12", *over, "--out", str(tmp_path))
-    table = (tmp_path / "walk12-sweep-step_length_m-ipopt.csv").read_text().splitlines()
+    press_after(monkeypatch, owner, method, calls)
+    done = run("sweep", "walk12", "--over", "step_length_m=0.05:0.12:30", *effort.split(), "--out", str(tmp_path))
+    table = (tmp_path / f"walk12-sweep-step_length_m-{solver}.csv").read_text().splitlines()
     assert 2 < len(table) < 31
-    assert f"after {len(table) - 1} of 30 points, not all of them solved in both directions" in done.stderr
-    assert done.stderr.endswith(f"the results are in {tmp_path}; rerun the command to continue\n")
-
-
-@pytest.mark.slow
-def test_sweep_by_a_search_writes_the_points_that_it_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coarse_pictures: None
-) -> None:
-    press_after(monkeypatch, CompiledObjective, "__call__", 30)
-    over = ["--over", "step_length_m=0.05:0.12:30", "--algorithm", "pso", "--evaluations", "500"]
-    done = run("sweep", "walk12", *over, "--out", str(tmp_path))
-    table = (tmp_path / "walk12-sweep-step_length_m-pso.csv").read_text().splitlines()
-    assert len(table) == 3
-    assert f"after 2 of 30 points; the results are in {tmp_path}; rerun the command to continue\n" in done.stderr
+    assert f"after {len(table) - 1} of 30 points{said}; the results are in {tmp_path}; rerun" in done.stderr
 
 
 def test_a_path_carries_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,41 +212,6 @@ def test_a_compiler_that_is_busy_ends_too(tmp_path: Path) -> None:
     assert process.returncode == 130 and messages.startswith("nlp-gait: interrupted after 0 of 1 runs; ")
     state = subprocess.run(["ps", "-o", "stat=", "-p", marker.read_text().strip()], capture_output=True, text=True)
     assert state.stdout.strip()[:1] in ("", "Z")  # a Z has ended, but is not yet reaped
-
-
-def a_gait(folder: Path) -> Path:
-    """A result in the middle of the bounds."""
-    problem = nlp_gait.load("walk12")
-    path = folder / "gait.json"
-    x = problem.by_name((problem.lower + problem.upper) / 2)
-    path.write_text(json.dumps({"problem": "walk12", "x": x}))
-    return path
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("calls", "ending"), [(1, "png"), (7, "gif")])
-def test_animate_while_a_picture_is_drawn(
-    calls: int, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Within Matplotlib's compiled code an exception of the handler would become "Invalid affine transformation matrix".
-    from matplotlib.backends.backend_agg import RendererAgg
-
-    def pressed_inside(self: Any, *arguments: Any, path: Any = RendererAgg.draw_path) -> None:
-        nonlocal drawn
-        drawn += 1
-        if drawn == calls:
-            try:
-                signal.raise_signal(signal.SIGINT)
-            except KeyboardInterrupt:
-                raise ValueError("Invalid affine transformation matrix") from None
-        path(self, *arguments)
-
-    drawn = 0
-    monkeypatch.setattr(RendererAgg, "draw_path", pressed_inside)
-    gait = a_gait(tmp_path)
-    done = run("animate", str(gait), "--out", str(tmp_path / f"film.{ending}"))
-    assert done.stderr == "nlp-gait: interrupted; nothing was written\n" and drawn >= calls
-    assert list(tmp_path.iterdir()) == [gait]
 
 
 @pytest.mark.slow
