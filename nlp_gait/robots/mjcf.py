@@ -17,7 +17,7 @@ import numpy as np
 
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
-from nlp_gait.robots.limits import check_counts, read_in_child
+from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import FootShapes, list_box_points, list_cylinder_points
 from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
 from nlp_gait.robots.tree import Array, Mass, combine_masses
@@ -94,10 +94,7 @@ def read_foot_geoms(path: str, link: str) -> FootShapes:
 def list_dependencies(path: str) -> list[str]:
     """Return all files that an MJCF file includes or names; raises as ``read_mjcf``."""
     _compile(path)  # a file that MuJoCo accepts
-    find = getattr(import_module("mujoco"), "mju_getXMLDependencies", None)
-    if find is None:
-        raise MissingExtraError("listing the files of an MJCF robot needs a newer MuJoCo: pip install -U mujoco")
-    return [str(file) for file in find(path)]
+    return [str(file) for file in import_module("mujoco").mju_getXMLDependencies(path)]
 
 
 def _compile(path: str) -> Any:
@@ -133,10 +130,10 @@ def _read(place: str, path: str) -> Any:
 def _compile_binary(mujoco: Any, path: str) -> bytes:
     """Return MuJoCo's warnings and the files read as a line of JSON, and the model in binary form; for a child process."""
     warnings: list[str] = []
-    files = [str(file) for file in check_counts(Path(path))]
     mujoco.set_mju_user_warning(warnings.append)
     try:
         model = mujoco.MjModel.from_xml_path(path)
+        files = [str(file) for file in mujoco.mju_getXMLDependencies(path)]
         data = np.empty(mujoco.mj_sizeModel(model), np.uint8)
         mujoco.mj_saveModel(model, None, data)
     except MemoryError:

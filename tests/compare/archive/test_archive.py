@@ -164,8 +164,6 @@ def test_meshes_and_extended_files_travel_with_a_urdf(tmp_path: Path) -> None:
 def test_included_files_and_meshes_travel_with_an_mjcf(tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco")
     pytest.importorskip("urdf_parser_py")
-    if not hasattr(mujoco, "mju_getXMLDependencies"):
-        pytest.skip("this MuJoCo does not list the files of a model")
     home = tmp_path / "home"
     (home / "meshes").mkdir(parents=True)
     (home / "meshes" / "sole.obj").write_text(TETRAHEDRON)
