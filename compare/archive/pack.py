@@ -10,7 +10,6 @@ from dataclasses import asdict
 from importlib.metadata import distributions, version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from compare.analysis.tuning import FILE as TUNING
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
@@ -27,7 +26,7 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.loading import find_robot_file, list_robot_files
 from nlp_gait.user_code import Kind, hash_source, is_user_code, list_source_files, resolve_code
 
-README, LOCK, CRATE = "README.md", "requirements.txt", "ro-crate-metadata.json"
+README, LOCK = "README.md", "requirements.txt"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
 PARTS = (FILE, TUNING, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # time of all entries, so that equal studies give equal archives
@@ -55,7 +54,6 @@ def pack_study(folder: Path, records: Sequence[RunRecord], out: Path) -> Path:
     manifest = read_manifest(folder)
     content[LOCK] = "".join(f"{line}\n" for line in _list_packages()).encode()
     content[README] = _make_readme(records, manifest, content).encode()
-    content[CRATE] = _to_bytes(_make_crate(records, content))
     write_archive(out, content, robots)
     return out
 
@@ -70,7 +68,7 @@ def write_archive(out: Path, content: dict[str, bytes], robots: Mapping[str, str
         robots=robots,
         files={name: hashlib.sha256(data).hexdigest() for name, data in content.items()},
     )
-    content[MANIFEST] = _to_bytes(asdict(found))
+    content[MANIFEST] = (json.dumps(asdict(found), indent=1, sort_keys=True) + "\n").encode()
     with replace_file(out) as temporary:
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, data in sorted(content.items()):
@@ -78,10 +76,6 @@ def write_archive(out: Path, content: dict[str, bytes], robots: Mapping[str, str
                 entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
                 archive.writestr(entry, data)
         _check_archive(Path(temporary), robots)
-
-
-def _to_bytes(data: Any) -> bytes:
-    return (json.dumps(data, indent=1, sort_keys=True) + "\n").encode()
 
 
 def _collect_robot(text: str, content: dict[str, bytes]) -> str:
@@ -140,11 +134,6 @@ def _list_packages() -> list[str]:
     return sorted((f"{name}=={number}" for name, number in names.items()), key=str.lower)
 
 
-def _describe(records: Sequence[RunRecord]) -> str:
-    problems, solvers = (sorted({getattr(r, key) for r in records}) for key in ("problem", "solver"))
-    return f"{len(records)} runs of {', '.join(solvers)} on {', '.join(problems)}"
-
-
 def _make_readme(records: Sequence[RunRecord], manifest: Manifest, content: Iterable[str]) -> str:
     commands = "\n".join(f"    {session.command}" for session in manifest.sessions) or "    (not recorded)"
     code = (
@@ -152,18 +141,7 @@ def _make_readme(records: Sequence[RunRecord], manifest: Manifest, content: Iter
         if any(name.startswith("code/") for name in content)
         else ""
     )
-    template = _read_template("readme.md")
-    return template.format(title=_describe(records), version=version("nlp-gait"), commands=commands, code=code)
-
-
-def _make_crate(records: Sequence[RunRecord], content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the metadata of an RO-Crate 1.1 (https://w3id.org/ro/crate/1.1): a root data set and its files."""
-    crate: dict[str, Any] = json.loads(_read_template("ro-crate.json"))
-    parts = [{"@id": name} for name in sorted(content)]
-    crate["@graph"][1] |= {"description": _describe(records), "datePublished": format_now()[:10], "hasPart": parts}
-    crate["@graph"] += [{**p, "@type": "File", "contentSize": str(len(content[p["@id"]]))} for p in parts]
-    return crate
-
-
-def _read_template(name: str) -> str:
-    return files("compare.archive").joinpath(name).read_text(encoding="utf-8")
+    template = files("compare.archive").joinpath("readme.md").read_text(encoding="utf-8")
+    problems, solvers = (sorted({getattr(r, key) for r in records}) for key in ("problem", "solver"))
+    title = f"{len(records)} runs of {', '.join(solvers)} on {', '.join(problems)}"
+    return template.format(title=title, version=version("nlp-gait"), commands=commands, code=code)

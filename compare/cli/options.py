@@ -56,8 +56,8 @@ class StoredGait:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CycleOptions:
-    """Options and values of a walking cycle."""
+class ProblemOptions:
+    """Options and values of any problem."""
 
     robot: Annotated[
         str | None,
@@ -81,6 +81,9 @@ class CycleOptions:
     fix: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a variable at a value; repeatable.")
     ] = None
+    derivatives: Annotated[
+        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
+    ] = None
 
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
@@ -90,24 +93,6 @@ class CycleOptions:
         named = replace(named.with_options(**options), values=parse_values(self.values, "--set"))
         fixed = named.load().fix(**parse_values(self.fix, "--fix"))
         return replace(named, values=dict(fixed.values))
-
-
-@dataclass(frozen=True, kw_only=True)
-class AnyCycle(CycleOptions):
-    """A walking cycle, by default NAO's."""
-
-    name: Annotated[
-        str, typer.Argument(metavar="[PROBLEM]", help="nao-cycle, or humanoid-cycle with --robot FILE.")
-    ] = "nao-cycle"
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProblemOptions(CycleOptions):
-    """Options and values of any problem."""
-
-    derivatives: Annotated[
-        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
-    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

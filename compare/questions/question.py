@@ -130,11 +130,6 @@ def make_table(caption: str, items: Iterable[T], columns: Mapping[str, Callable[
     return make_text_table(tuple(columns), [[cell(item) for cell in columns.values()] for item in items], caption)
 
 
-def make_csv_table(name: str, header: Sequence[str], rows: Sequence[Sequence[Value]]) -> Table:
-    """Return a table that is written to a CSV file with all digits, and rounded in the report."""
-    return Table(name=name, columns=dict.fromkeys(header, ".6g"), rows=rows, caption=f"As in {name}.csv, rounded")
-
-
 def make_record_table(name: str, records: Iterable[Any], leave_out: Sequence[str] = ()) -> Table:
     """Return a table that is written to a CSV file with all digits, with a row for each data class or mapping.
 
