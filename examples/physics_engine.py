@@ -3,7 +3,7 @@ A gait in the physics engine
 ============================
 
 The optimum of the model, simulated open loop in MuJoCo with NAO's drives: does the robot fall, where is the centre of
-pressure, and how much power do the drives need? Needs the extra `sim`; `nlp-gait simulate` makes films, too.
+pressure, and how much power do the drives need? Needs the extra `sim`; `nlp-gait simulate` writes pages and films, too.
 """
 
 import matplotlib.pyplot as plt

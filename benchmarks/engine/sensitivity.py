@@ -10,7 +10,6 @@ from benchmarks.engine.gaits import PAPER, optimal_cycles, optimum, phase_gaits
 from benchmarks.engine.markdown import cells, header
 from nlp_gait.simulation import measurements, mjcf
 from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.film import recording
 from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import DIRECTIONS, measure_robustness, simulate_plan
@@ -29,12 +28,12 @@ VARIANTS = {
 def engine_step(step_s: float) -> Iterator[None]:
     """Another time step for all that simulates."""
     before = mjcf.TIME_STEP
-    for module in (mjcf, recording, measurements):
+    for module in (mjcf, measurements):
         module.TIME_STEP = step_s
     try:
         yield
     finally:
-        for module in (mjcf, recording, measurements):
+        for module in (mjcf, measurements):
             module.TIME_STEP = before
 
 

@@ -113,7 +113,6 @@ def compare(
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
     from compare.report import FurtherFiles, write_report
-    from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.engine import load_mujoco
 
     if engine:
@@ -140,7 +139,7 @@ def compare(
     records = run_in_folder(settings, out, jobs, scheduler, tune, remedy)
     imported = read_imported_records(out, records)
     records += imported.records
-    gaits = simulate_best(out, records, Drive()) if engine else []
+    gaits = simulate_best(out, records) if engine else []
     written = write_report(
         out, records, read_manifest(out), excluded=imported.excluded, further=FurtherFiles(csv=as_csv)
     )

@@ -17,7 +17,7 @@ from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.set_points import PERIOD_MS
 from nlp_gait.export.solver import export_solver as write
 from nlp_gait.gaitbench import c_export
-from nlp_gait.simulation.film.video import check_frames, check_video_path, write_video
+from nlp_gait.simulation.video import check_frames, check_video_path, write_video
 
 SHEET = ".png"  # suffix of a contact sheet
 

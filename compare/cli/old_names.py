@@ -9,6 +9,8 @@ from typer.core import TyperGroup
 
 from compare.cli.endings import fail
 
+DRIVE_FILE = "its value belongs into the file of simulate --drive FILE.toml"
+FILM = "simulate --page FILE.html plays the simulation at any speed"
 # By "command", "command --option" or "--option" of any command.
 REPLACEMENTS = {
     "animate": "export --to gif (or mp4, html) draws a gait",
@@ -21,7 +23,19 @@ REPLACEMENTS = {
     "motions": "variants compares richer motions",
     "motors": "variants compares motors",
     "pareto --objectives": "pareto --against NAME trades power against one mean margin or the speed",
+    "report --drive": "simulate RESULT --drive simulates one gait with another drive",
     "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
+    "simulate --beside": FILM,
+    "simulate --fps": FILM,
+    "simulate --size": FILM,
+    "simulate --speed": FILM,
+    "simulate --feed-forward": DRIVE_FILE,
+    "simulate --feedback-delay-ms": DRIVE_FILE,
+    "simulate --feedback-noise": DRIVE_FILE,
+    "simulate --feedback-seed": DRIVE_FILE,
+    "simulate --interpolation": DRIVE_FILE,
+    "simulate --period-ms": DRIVE_FILE,
+    "simulate --push-at-s": "simulate --push X,Y,S has the time of the push",
     "walk": "sweep --engine simulates the cheapest cycle at each speed",
 }
 

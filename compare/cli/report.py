@@ -17,7 +17,6 @@ from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, report_interrupts
 from compare.cli.options import AsCsv, AsJson, Code, name_all
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
-from compare.cli.simulate import DriveOptions
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
 from compare.study.evidence import read_evidence
@@ -28,7 +27,6 @@ from nlp_gait.errors import InputError
 
 if TYPE_CHECKING:
     from compare.study.simulations import SimulatedGait
-    from nlp_gait.simulation.drive import Drive
 
 
 ENGINE_TABLE = (
@@ -66,7 +64,6 @@ def report(
         bool, typer.Option("--logs", help="Also write the runs as logs for iohinspector, into the folder logs.")
     ] = False,
     code: Code = None,
-    drive_options: DriveOptions,
     as_csv: AsCsv = False,
     as_json: AsJson = False,
     watch: Annotated[
@@ -83,12 +80,10 @@ def report(
     `--watch` the report follows a running study until Ctrl-C.
 
     Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
-    `nlp-gait report results --engine`, `nlp-gait report results --engine --drive held`
+    `nlp-gait report results --engine`
     """
     from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
 
-    if not engine and drive_options != DriveOptions():
-        raise InputError("the drive applies to simulated gaits: add --engine")
     if style is not None and not pdf:
         raise InputError("the style applies to the figures of --pdf: add --pdf, or omit --style")
     for flag, weight in (("--gradient-weight", gradient_weight), ("--hessian-weight", hessian_weight)):
@@ -101,7 +96,7 @@ def report(
         watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
-    simulated = simulate_best(folder, records, drive_options.make()) if engine else []
+    simulated = simulate_best(folder, records) if engine else []
     further = FurtherFiles(csv=as_csv, parquet=parquet, latex=latex, pdf=pdf, style=style)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     if logs:
@@ -153,10 +148,11 @@ def reproduce(
     print_written(out / "report.md")
 
 
-def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> list[SimulatedGait]:
+def simulate_best(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
     """Simulate every solver's best gait, unless stored; raises InputError if none of the problems can be simulated."""
     from compare.analysis.simulated_gaits import select_best_gaits
     from compare.study.simulations import simulate_records
+    from nlp_gait.simulation.drive import Drive
 
     gaits = select_best_gaits(compare_problems(records))
     remedy = f"continue with `nlp-gait report --engine {folder}`"
@@ -164,7 +160,7 @@ def simulate_best(folder: Path, records: Sequence[RunRecord], drive: Drive) -> l
         report_interrupts(f"interrupted while simulating; finished simulations are stored; {remedy}"),
         show_progress("gaits", len(gaits)) as advance,
     ):
-        simulated = simulate_records(folder, gaits, drive, advance)
+        simulated = simulate_records(folder, gaits, Drive(), advance)
     if gaits and not simulated:
         names = ", ".join(dict.fromkeys(record.problem for record in gaits))
         raise InputError(f"no gait of {names} can be simulated in the engine; omit --engine")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from compare.analysis.units import format_millimetres, with_unit
@@ -19,64 +20,51 @@ from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, show_progress, stdout
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.files import make_writable_folder, replace_nan, write_json, write_text
-from nlp_gait.formulation.result import load_result
-from nlp_gait.simulation.film.video import Frame, check_frames, check_video_path, write_video
+from nlp_gait.simulation.video import Frame, check_frames, check_video_path, write_video
 
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
-    from nlp_gait.simulation.film.recording import Simulator
     from nlp_gait.simulation.measurements import Measurements, Walk
     from nlp_gait.simulation.plan import Plan
+    from nlp_gait.simulation.replay import Recording
     from nlp_gait.simulation.simulate import Conditions, Robustness, Simulation
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveOptions:
-    """The drive of the simulated robot, by name, and its settings."""
+    """The drive of the simulated robot."""
 
     drive: Annotated[
         str,
         typer.Option(
-            help="feed-forward: set-points every 10 ms, linear between them, planned velocity and "
-            "torque fed forward. held: each held for 40 ms, nothing fed forward."
+            metavar="NAME|FILE.toml",
+            help="feed-forward: set-points every 10 ms, linear between them, planned velocity and torque fed forward. held: "
+            "each held for 40 ms, nothing fed forward. Or a file with settings of drive and feedback.",
         ),
     ] = "feed-forward"
-    period_ms: Annotated[float | None, typer.Option(help="Time between set-points (default: the drive's).")] = None
-    interpolation: Annotated[str | None, typer.Option(help="Between set-points: linear or held.")] = None
-    feed_forward: Annotated[str | None, typer.Option(help="torque (and velocity), velocity, or none.")] = None
     torque_limits: Annotated[
         str | None,
         typer.Option(
-            help="urdf (default), stall or continuous: published limits differ; joints without motor"
-            " data have the limit of the robot file."
+            help="urdf, stall or continuous: published limits differ; joints without motor data have the file's."
         ),
     ] = None
     feedback: Annotated[
-        str,
+        str | None,
         typer.Option(help="none, in open loop; torso-spring: balance by measured place and attitude of the torso."),
-    ] = "none"
-    feedback_delay_ms: Annotated[
-        float | None, typer.Option(help="From measuring to acting (default: the feedback's).")
     ] = None
-    feedback_noise: Annotated[float, typer.Option(help="Factor on the noise of its sensors; 0 for none.")] = 1.0
-    feedback_seed: Annotated[int, typer.Option(min=0, help="Of this noise: same seed, same walk.")] = 0
 
     def make(self) -> Drive:
         """Return the drive; raises UnknownNameError, and InputError for a setting that is not allowed."""
-        from nlp_gait.simulation.drive import DRIVES, FEEDBACKS
+        from nlp_gait.simulation.drive import FEEDBACKS, load_drive
 
-        for kind, name, known in (("drive", self.drive, DRIVES), ("feedback", self.feedback, FEEDBACKS)):
-            if name not in known:
-                raise unknown(kind, name, known)
-        feedback = FEEDBACKS[self.feedback]
-        if feedback is not None:
-            delay_s = feedback.delay_s if self.feedback_delay_ms is None else self.feedback_delay_ms / 1000.0
-            feedback = replace(feedback.with_noise(self.feedback_noise), delay_s=delay_s, seed=self.feedback_seed)
-        period_s = None if self.period_ms is None else self.period_ms / 1000.0
-        names = ("interpolation", "feed_forward", "torque_limits")
-        settings = {"period_s": period_s, **{name: getattr(self, name) for name in names}}
-        settings = {name: value for name, value in settings.items() if value is not None}
-        return replace(DRIVES[self.drive], feedback=feedback, **settings)
+        drive = load_drive(self.drive)
+        if self.torque_limits is not None:
+            drive = replace(drive, torque_limits=self.torque_limits)
+        if self.feedback is None:
+            return drive
+        if self.feedback not in FEEDBACKS:
+            raise unknown("feedback", self.feedback, FEEDBACKS)
+        return replace(drive, feedback=FEEDBACKS[self.feedback])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,50 +83,37 @@ class ConditionOptions:
     stiffness_factor: Annotated[
         float, typer.Option(help="True stiffness of the joints over what their drive assumes.")
     ] = 1.0
-    push: Annotated[str, typer.Option(metavar="X,Y", help="Impulse on the torso, forward and to the left [N s].")] = (
-        "0,0"
-    )
-    push_at_s: Annotated[
-        float | None, typer.Option(min=0.0, help="When it begins (default: in the middle of the motion).")
+    push: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y[,S]",
+            help="Impulse on the torso, forward and to the left [N s], and its begin [s] (default: in the middle).",
+        ),
     ] = None
 
     def make(self) -> Conditions:
         """Return the conditions; raises InputError for a value that is not allowed."""
         from nlp_gait.simulation.simulate import Conditions, Push
 
-        slope, impulse = (
-            _parse_pair(text, flag) for text, flag in ((self.slope_deg, "--slope-deg"), (self.push, "--push"))
-        )
+        slope_x, slope_y = _parse_numbers(self.slope_deg, "--slope-deg", "X,Y", (2,))
+        push = None
+        if self.push is not None:
+            x, y, *start_s = _parse_numbers(self.push, "--push", "X,Y or X,Y,S", (2, 3))
+            push = Push(impulse_Ns=(x, y), start_s=start_s[0] if start_s else None)
         conditions = Conditions(
             mass_factor=self.mass_factor,
             stiffness_factor=self.stiffness_factor,
-            slope_rad=(math.radians(slope[0]), math.radians(slope[1])),
-            push=Push(impulse_Ns=impulse, start_s=self.push_at_s) if any(impulse) else None,
+            slope_rad=(math.radians(slope_x), math.radians(slope_y)),
+            push=push,
         )
         return conditions if self.friction is None else replace(conditions, friction=self.friction)
 
 
-@dataclass(frozen=True, kw_only=True)
-class FilmOptions:
-    """A film of a simulated gait, and how it is made."""
-
-    video: Annotated[
-        Path | None, typer.Option(help="Film it to this .gif or .mp4 file, from the side, the front and above."), OUTPUT
-    ] = None
-    beside: Annotated[
-        Path | None,
-        typer.Option(metavar="OTHER.json", help="Simulate this gait as well, next to the other in the film."),
-    ] = None
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Of the film [pixels].")] = "1280x720"
-    speed: Annotated[float, typer.Option(min=0.05, max=20.0, help="Speed of the film; 0.25 is slow motion.")] = 1.0
-    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames a second of the film.")] = 25.0
-
-
-def _parse_pair(text: str, flag: str) -> tuple[float, float]:
+def _parse_numbers(text: str, flag: str, form: str, counts: tuple[int, ...]) -> list[float]:
     parts = text.split(",")
-    if len(parts) != 2:
-        raise InputError(f"{flag} takes two numbers X,Y, got {text!r}")
-    return parse_number("X", parts[0], flag), parse_number("Y", parts[1], flag)
+    if len(parts) not in counts:
+        raise InputError(f"{flag} takes {form}, got {text!r}")
+    return [parse_number(name, part, flag) for name, part in zip("XYS", parts, strict=False)]
 
 
 @command
@@ -146,67 +121,78 @@ def simulate(
     stored: StoredGait,
     *,
     steps: Annotated[int | None, typer.Option(help="Simulate this many steps of a gait that repeats.")] = None,
-    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for report, time histories, model and figure."), OUTPUT
     ] = None,
+    page: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Page that plays the simulation in 3-D."), OUTPUT
+    ] = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(help="Film it to this .gif or .mp4 file; needs OpenGL, and MP4 imageio-ffmpeg."),
+        OUTPUT,
+    ] = None,
+    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
-    film: FilmOptions,
     robustness: Annotated[
         bool, typer.Option("--robustness", help="Also sweep pushes, slopes, friction and mass (minutes).")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a gait in MuJoCo, open loop or with feedback, and compare it with the model's predictions.
+    """Simulate a gait in MuJoCo (extra `sim`), open loop or with feedback, and compare it with the model's predictions.
 
-    Needs the extra `sim`, and imageio-ffmpeg for MP4. Examples, after `nlp-gait solve nao-ssp --out best.json`:
-    `nlp-gait simulate best.json --video walk.mp4`,
-    `nlp-gait simulate best.json --beside other.json --video both.gif --speed 0.25`
+    Examples, after `nlp-gait solve nao-ssp --out best.json`: `nlp-gait simulate best.json --page walk.html`,
+    `nlp-gait simulate best.json --push 0.5,0 --feedback torso-spring`, `nlp-gait simulate best.json --drive slow.toml` with
+
+        period_s = 0.02               # feed_forward = "torque", interpolation = "linear", torque_limits = "urdf"
+
+        [feedback]                    # leave it out for open loop
+        delay_s = 0.02
     """
     from compare.drawing.robot_figures import plot_simulation
+    from compare.report.interactive import animate_simulation
     from nlp_gait.export.formats import write_npz
     from nlp_gait.simulation.engine import load_mujoco
-    from nlp_gait.simulation.film.film import parse_picture_size
-    from nlp_gait.simulation.film.recording import show_in_window
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.replay import FRAMES_PER_S, make_skeleton, record_states, show_in_window
     from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, simulate_plan
 
-    load_mujoco(pictures=film.video is not None)
-    if viewer and film.video is not None:
-        fail("--viewer and --video exclude each other; write the film in a second run")
-    if film.beside is not None and film.video is None:
-        fail("--beside adds a second gait to a film; name the film with --video FILE.mp4 or FILE.gif")
-    size = parse_picture_size(film.size)
-    target = None if film.video is None else check_output_file(check_video_path(film.video))
+    load_mujoco(pictures=video is not None)
+    if viewer and (page or video):
+        fail("--viewer excludes --page and --video; write these in a second run")
+    film = None if video is None else check_output_file(check_video_path(video))
+    target = None if page is None else check_output_file(page)
     folder = None if out is None else make_writable_folder(out)
-    drive, conditions = drive_options.make(), world.make()
-    gaits = [(stored.result, stored.load())]
-    gaits += [] if film.beside is None else [(film.beside, load_result(film.beside))]
-    plans = [make_plan(gait, steps) for _, gait in gaits]
-    if film.video is not None:
-        for each in plans:
-            check_frames((each.duration_s + SETTLE_TIME) / film.speed, film.frames_per_s)
-    plan, players = plans[0], [partial(simulate_plan, plan, conditions, drive, sole) for plan in plans]
-    if target is not None:
-        titles = [f"{path.name}: {gait.problem.title}" for path, gait in gaits]
-        traces = _write_film(film, target, size, list(zip(titles, plans, players, strict=True)))
+    drive, conditions, result = drive_options.make(), world.make(), stored.load()
+    plan = make_plan(result, steps)
+    if film is not None:
+        check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
+    player = partial(simulate_plan, plan, conditions, drive, sole)
+    written = []
+    if film is None and target is None:
+        trace = show_in_window(player) if viewer else player()
     else:
-        traces = [show_in_window(players[0]) if viewer else players[0]()]
-    measured = [_measure(plan, trace, drive) for plan, trace in zip(plans, traces, strict=True)]
+        recording = record_states(plan, player)
+        trace = recording.simulation
+        if target is not None:
+            power = np.abs(trace.torque * trace.qd).sum(axis=1)[recording.steps]
+            animate_simulation(make_skeleton(recording, sole, result.problem.title), power).write(target)
+            written.append(target)
+        if film is not None:
+            _write_film(recording, film, FRAMES_PER_S)
+            written.append(film)
+    report, walk = _measure(plan, trace, drive)
     survival = None
-    data = {"schema": 1, **_encode_walk(*measured[0])}
-    if film.beside is not None:
-        data["beside"] = _encode_walk(*measured[1])
-    written = [] if target is None else [target]
+    data = {"schema": 1, **_encode_walk(report, walk)}
     if folder is not None:
         written += [folder / name for name in ("report.json", "model.xml", "simulation.npz")]
         write_json(folder / "report.json", replace_nan(data))
         write_text(folder / "model.xml", make_plan_model(plan, drive, sole, conditions.friction))
-        write_npz(folder / "simulation.npz", traces[0].signals(plan.joints))
-        written += plot_simulation(plan, traces[0], drive, folder / "simulation")
+        write_npz(folder / "simulation.npz", trace.signals(plan.joints))
+        written += plot_simulation(plan, trace, drive, folder / "simulation")
     if robustness:
         lost = "nothing was written; name a folder with --out"
         where = lost if folder is None else f"the simulation is stored in {folder}"
@@ -217,35 +203,23 @@ def simulate(
             write_json(folder / "report.json", replace_nan(data))
     if as_json:
         print_json(data)
-    else:
-        for i, ((path, _), (report, walk)) in enumerate(zip(gaits, measured, strict=True)):
-            if len(gaits) > 1:
-                stdout.print(f"{path}:")
-            _print(report, survival if i == 0 else None)
-            if walk is not None:
-                _print_course(walk, open_loop=drive.feedback is None)
-        print_written(*written)
+        return
+    _print(report, survival)
+    if walk is not None:
+        _print_course(walk, open_loop=drive.feedback is None)
+    print_written(*written)
 
 
-def _write_film(
-    film: FilmOptions, target: Path, size: tuple[int, int], gaits: Sequence[tuple[str, Plan, Simulator]]
-) -> list[Simulation]:
-    from nlp_gait.simulation.film.film import draw_pictures
-    from nlp_gait.simulation.film.recording import record_film
+def _write_film(recording: Recording, target: Path, frames_per_s: float) -> None:
+    from nlp_gait.simulation.replay import draw_pictures
 
-    interval_s = film.speed / film.frames_per_s
-    pace = "slow motion" if film.speed < 1.0 else "fast"
-    note = "" if film.speed == 1.0 else f"{pace}: {film.speed:g} x real time"
-    recordings = [record_film(title, plan, player, interval_s) for title, plan, player in gaits]
-
-    def with_progress() -> Iterator[Frame]:
-        with show_progress("frames", max(len(recording.t) for recording in recordings)) as advance:
-            for picture in draw_pictures(recordings, size, note):
+    def show_pictures() -> Iterator[Frame]:
+        with show_progress("frames", len(recording.states)) as advance:
+            for picture in draw_pictures(recording):
                 yield picture
                 advance("")
 
-    write_video(target, with_progress(), film.frames_per_s)
-    return [recording.simulation for recording in recordings]
+    write_video(target, show_pictures(), frames_per_s)
 
 
 def _measure(plan: Plan, trace: Simulation, drive: Drive) -> tuple[Measurements, Walk | None]:

@@ -13,7 +13,7 @@ from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Skeleton, Sole
 from nlp_gait.interrupts import delay_interrupts
-from nlp_gait.simulation.film.video import Frame
+from nlp_gait.simulation.video import Frame
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -18,8 +18,9 @@ from compare.report.writing import render_page
 from nlp_gait.errors import InputError
 from nlp_gait.files import write_text
 from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.formulation.display import Skeleton
 
-MOST_FRAMES = 61  # of a gait; the page interpolates between them
+MOST_FRAMES, MOST_SIMULATED = 61, 601  # of a gait; the page interpolates between them
 SIGNIFICANT_DIGITS = 5
 CAPTION = "Left blue, right orange; the support polygon green, the zero-moment point pink, the centre of mass in ink."
 
@@ -36,11 +37,13 @@ def describe_runs(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def describe_gaits(gaits: Mapping[str, GaitCurves]) -> dict[str, Any] | None:
+def describe_gaits(gaits: Mapping[str, GaitCurves], most_frames: int = MOST_FRAMES) -> dict[str, Any] | None:
     """Return the skeletons of gaits over time in millimetres and milliseconds, with power and margin; None without any."""
     looks = assign_looks(list(gaits))
     shown = [
-        _describe_gait(name, gait, looks[name].colour) for name, gait in gaits.items() if gait.skeleton is not None
+        _describe_gait(name, gait, looks[name].colour, most_frames)
+        for name, gait in gaits.items()
+        if gait.skeleton is not None
     ]
     return {"kind": "gaits", "gaits": shown} if shown else None
 
@@ -63,10 +66,10 @@ def _describe_curve(curve: Curve) -> dict[str, Any]:
     return {name: _round(values[improves]) for name, values in kept.items()}
 
 
-def _describe_gait(name: str, gait: GaitCurves, colour: str) -> dict[str, Any]:
+def _describe_gait(name: str, gait: GaitCurves, colour: str, most_frames: int) -> dict[str, Any]:
     skeleton = gait.skeleton
     assert skeleton is not None
-    frames = np.unique(np.linspace(0, len(gait.t) - 1, MOST_FRAMES).round().astype(int))
+    frames = np.unique(np.linspace(0, len(gait.t) - 1, most_frames).round().astype(int))
     points = {"com": skeleton.com, "zmp": skeleton.zmp}
     curves = {"power": gait.power, "margin": gait.margin}
     return {
@@ -114,10 +117,21 @@ class GaitPage:
 
 def animate_gait(problem: GaitProblem, x: Array | Mapping[str, float], name: str) -> GaitPage:
     """Return the page of a gait, a point x of a problem, under the name of its solver; InputError if it cannot be drawn."""
-    gaits = {name: prepare_gait(Result(problem=problem, x=problem.check_x(x)))}
-    data = describe_gaits(gaits)
+    return _make_page(problem.title, name, prepare_gait(Result(problem=problem, x=problem.check_x(x))))
+
+
+def animate_simulation(skeleton: Skeleton, power_W: Array) -> GaitPage:
+    """Return the page of a simulation with the mechanical power (T,) of its drives."""
+    margin = 1000.0 * skeleton.margin()
+    return _make_page(
+        skeleton.title, "engine", GaitCurves(skeleton=skeleton, t=skeleton.t, power=power_W, margin=margin)
+    )
+
+
+def _make_page(title: str, name: str, gait: GaitCurves) -> GaitPage:
+    data = describe_gaits({name: gait}, MOST_SIMULATED)
     if data is None:
-        raise InputError(f"problem {problem.name!r} has no skeleton to draw")
-    drawing = plot_gaits(gaits)
+        raise InputError(f"{title}: this problem has no skeleton to draw")
+    drawing = plot_gaits({name: gait})
     figure = Figure(name="gait", caption=CAPTION, drawing=drawing, data=data)
-    return GaitPage(render_page(Document(title=problem.title, parts=[figure]), [render_svg(drawing)]))
+    return GaitPage(render_page(Document(title=title, parts=[figure]), [render_svg(drawing)]))

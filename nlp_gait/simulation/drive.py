@@ -1,13 +1,17 @@
 """Position drives of the simulated robot: stiffness, torque limits, set-points, and feed-forward."""
 
 import math
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from nlp_gait.errors import InputError
+from nlp_gait.decoding import decode
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.files import read_text
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Joint
 from nlp_gait.simulation.engine import check_period
@@ -103,7 +107,24 @@ def find_stall_torque(joint: Joint) -> float:
     return joint.torque_limit_Nm if joint.motor is None else joint.motor.stall_torque_Nm
 
 
+def load_drive(name: str) -> Drive:
+    """Return the drive of a name in ``DRIVES``, or of a TOML file.
+
+    The file has fields of ``Drive``, and those of ``Feedback`` in a table ``[feedback]``.
+
+    Raises UnknownNameError, or InputError for a file or setting that is not allowed.
+    """
+    if not name.endswith(".toml"):
+        if name not in DRIVES:
+            raise unknown("drive", name, DRIVES)
+        return DRIVES[name]
+    text = read_text(Path(name), "drive")
+    try:
+        return decode(Drive, tomllib.loads(text))
+    except ValueError as error:
+        raise InputError(f"drive {name!r}: {error}") from error
+
+
 # By name: as NAO's own controller, and set-points held for 40 ms, the sampling of the paper's gaits.
 DRIVES = {"feed-forward": Drive(), "held": Drive(period_s=0.04, interpolation="held", feed_forward="none")}
-# Feedbacks by name; every drive has none by default.
 FEEDBACKS = {"none": None, "torso-spring": Feedback()}

@@ -27,7 +27,6 @@ LAST_TREAD, STAIR_HALF_WIDTH = 2.0, 0.25  # [m]
 
 LEFT, RIGHT, TRUNK = "0.00 0.45 0.70 1", "0.84 0.37 0.00 1", "0.80 0.81 0.84 1"  # blue and orange of Okabe and Ito
 SIDE_COLOURS = {"left": LEFT, "right": RIGHT}
-LIMBS = "1"  # group of the geometries that a view from above hides; soles and floor are in group 0
 # Joints of a root in the sagittal plane, in the order of the engine's coordinates.
 PLANAR_JOINTS = {"root x": ("slide", "1 0 0"), "root z": ("slide", "0 0 1"), "root pitch": ("hinge", "0 1 0")}
 
@@ -36,9 +35,7 @@ Shapes = Mapping[str, Sequence[Shape]]
 
 def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction: float = FRICTION) -> str:
     """Return the model of a plan's robot with position drives on its ground; only solid shapes can touch that."""
-    robot = plan.robot
-    welded = [joint for joint in plan.full_robot.joints if joint not in robot.joints]
-    shapes = make_shapes(plan.full_robot, sole, welded)
+    robot, shapes = plan.robot, make_plan_shapes(plan, sole)
     root = Xml.fromstring(files("nlp_gait.simulation").joinpath("world.xml").read_text(encoding="utf-8"))
     _, option, default, _, assets, world, actuators = root
     root.set("model", robot.name)
@@ -70,6 +67,12 @@ def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction:
         actuator.attrib |= {"kp": _format_numbers(drive.stiffness(joint)), "kv": _format_numbers(drive.damping(joint))}
     Xml.indent(root)
     return Xml.tostring(root, encoding="unicode") + "\n"
+
+
+def make_plan_shapes(plan: Plan, sole: str) -> dict[str, list[Shape]]:
+    """Return the shapes of a plan's robot by link; those of welded joints are parts of the parents."""
+    welded = [joint for joint in plan.full_robot.joints if joint not in plan.robot.joints]
+    return make_shapes(plan.full_robot, sole, welded)
 
 
 def _add_stairs(world: Xml.Element, ground: Sequence[Tread]) -> None:
@@ -140,11 +143,18 @@ def _format_numbers(*values: float) -> str:
 
 def _paint(bodies: Mapping[str, Xml.Element], robot: Robot) -> None:
     """Colour the shapes of the legs by their side, all others grey."""
-    above = {link: {link, *(joint.child for joint in robot.path_to_root(link))} for link in bodies}
+    sides = find_sides(robot)
     for link, body in bodies.items():
-        # A leg is between the root and a foot, or beyond the foot.
-        sides = [side for side, foot in robot.feet.items() if link in above[foot.link] or foot.link in above[link]]
         for geom in body.findall("geom"):
-            geom.set("rgba", SIDE_COLOURS[sides[0]] if len(sides) == 1 else TRUNK)
-            if geom.get("type") != "mesh":
-                geom.set("group", LIMBS)
+            geom.set("rgba", SIDE_COLOURS[sides[link]] if link in sides else TRUNK)
+
+
+def find_sides(robot: Robot) -> dict[str, str]:
+    """Return the side of each link of a leg, between the root and a foot or beyond the foot."""
+    above = {link: {link, *(joint.child for joint in robot.path_to_root(link))} for link in robot.links}
+    sides = {}
+    for link in robot.links:
+        found = [side for side, foot in robot.feet.items() if link in above[foot.link] or foot.link in above[link]]
+        if len(found) == 1:
+            sides[link] = found[0]
+    return sides

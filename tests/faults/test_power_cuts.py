@@ -168,7 +168,7 @@ ALLOWED = {
     "nlp_gait/files.py",
     "nlp_gait/backends/kernel/library_cache.py",  # in its workshop; what is kept goes through nlp_gait.files
     "nlp_gait/export/formats.py",
-    "nlp_gait/simulation/film/video.py",
+    "nlp_gait/simulation/video.py",
     "compare/archive/unpack.py",  # into a temporary folder
     "compare/bench/baseline.py",
     "compare/drawing/animation.py",

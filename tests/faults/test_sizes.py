@@ -17,9 +17,9 @@ from nlp_gait.formulation.registry import LARGEST_COUNT
 from nlp_gait.formulation.result import LONGEST_S, SHORTEST_S, load_result, sample_signals
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.feedback import Feedback
-from nlp_gait.simulation.film.video import MOST_FRAMES, check_frames
 from nlp_gait.simulation.plan import LONGEST_S as LONGEST_PLAYED_S
 from nlp_gait.simulation.plan import MOST_STEPS, make_plan
+from nlp_gait.simulation.video import MOST_FRAMES, check_frames
 
 
 def test_a_sweep_is_as_large_as_its_grid() -> None:

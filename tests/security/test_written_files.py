@@ -17,7 +17,7 @@ from nlp_gait.errors import OutputError
 from nlp_gait.export.formats import write_npz
 from nlp_gait.files import format_csv, replace_file, write_text
 from nlp_gait.formulation import Signals
-from nlp_gait.simulation.film.video import write_video
+from nlp_gait.simulation.video import write_video
 
 
 def test_a_link_is_replaced_not_followed(tmp_path: Path) -> None:

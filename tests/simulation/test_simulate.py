@@ -159,10 +159,10 @@ def test_robustness_finds_the_first_fall(simulated, monkeypatch):
 def test_without_a_display_the_viewer_is_refused_in_one_sentence(simulated, monkeypatch):
     glfw = pytest.importorskip("glfw")
     from nlp_gait.errors import OutputError
-    from nlp_gait.simulation.film.recording import show_in_window
+    from nlp_gait.simulation.replay import show_in_window
 
     monkeypatch.setattr(glfw, "init", lambda: False)
-    with pytest.raises(OutputError, match="no display; use --video"):
+    with pytest.raises(OutputError, match="no display; use --page"):
         show_in_window(partial(simulate_plan, simulated("dsp optimum")[0]))
 
 

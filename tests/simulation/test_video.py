@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from nlp_gait.errors import InputError, MissingExtraError, OutputError
-from nlp_gait.simulation.film.video import check_video_path, write_video
+from nlp_gait.simulation.video import check_video_path, write_video
 
 
 def frames(count=4):

@@ -38,7 +38,7 @@ def check_frames(duration_s: float, frames_per_s: float) -> None:
     if count > MOST_FRAMES:
         raise InputError(
             f"a film takes at most {MOST_FRAMES} frames, got {duration_s:g} s at {frames_per_s:g} frames a second = {count}; "
-            "raise --speed or lower --fps"
+            "show fewer steps"
         )
 
 

@@ -1,1 +1,0 @@
-"""The simulated robot as films, and in MuJoCo's own window."""
