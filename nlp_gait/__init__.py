@@ -13,10 +13,10 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from nlp_gait.backends.functions.compiled_function import CompiledFunction as CompiledFunction
-    from nlp_gait.backends.functions.compiled_function import compile_function as compile_function
     from nlp_gait.backends.kernel.compiled import CompiledObjective as CompiledObjective
     from nlp_gait.backends.kernel.compiled import compile_objective as compile_objective
+    from nlp_gait.backends.kernel.compiled_function import CompiledFunction as CompiledFunction
+    from nlp_gait.backends.kernel.compiled_function import compile_function as compile_function
     from nlp_gait.backends.plan_walk import WalkPlan as WalkPlan
     from nlp_gait.backends.plan_walk import plan_walk as plan_walk
     from nlp_gait.backends.solve import solve as solve
@@ -34,7 +34,7 @@ _PUBLIC = {
     "nlp_gait.formulation": "GaitProblem list_problems load",
     "nlp_gait.formulation.solution": "Solution",
     "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
-    "nlp_gait.backends.functions.compiled_function": "CompiledFunction compile_function",
+    "nlp_gait.backends.kernel.compiled_function": "CompiledFunction compile_function",
     "nlp_gait.backends.plan_walk": "WalkPlan plan_walk",
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",

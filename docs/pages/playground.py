@@ -20,7 +20,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from docs.pages.markdown import page, write_all
 from docs.pages.webassembly import REMEDY, compile_module, has_compiler
-from nlp_gait.backends.functions.compiled_function import make_kernel, write_rows_source
+from nlp_gait.backends.kernel.compiled_function import make_kernel
+from nlp_gait.backends.kernel.kernel_source import write_rows_source
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench import load
 from nlp_gait.gaitbench.c_export import export_objective, make_prefix

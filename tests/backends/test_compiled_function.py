@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nlp_gait
-from nlp_gait.backends.functions import compiled_function
+from nlp_gait.backends.kernel import compiled_function
 from nlp_gait.backends.kernel.compiler import native_lanes
 from nlp_gait.errors import GaitError, InputError, UnknownNameError
 from nlp_gait.formulation import Array

@@ -33,7 +33,7 @@ FAULTS = {
     "writes rubbish": (TAKE_OUTPUT + "head -c 5000 /dev/urandom > $2", "cannot be loaded"),
     "writes an empty file": (TAKE_OUTPUT + ": > $2", "cannot be loaded"),
     "talks rubbish and fails": ("head -c 300 /dev/urandom >&2; exit 2", "failed with exit status 2"),
-    "leaves functions out": ('{real} -Dnlp_gait_evaluate=something_else "$@"', "cannot be loaded"),
+    "leaves functions out": ('{real} -Dnlp_gait_evaluate_rows=something_else "$@"', "cannot be loaded"),
     "computes wrong": (
         "for a; do case $a in *.cpp) sed -i 's/w2 = 1[.];/w2 = 2.;/' $a;; esac; done; {real} \"$@\"",
         "computes other values than the virtual machine",

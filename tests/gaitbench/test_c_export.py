@@ -44,7 +44,13 @@ def test_files_stand_alone(built: tuple[str, Path]) -> None:
     prefix = make_prefix(id)
     assert {f"{prefix}.cpp", f"{prefix}.h", "main.c", "build.sh", f"{prefix}_mex.cpp"} <= set(os.listdir(folder))
     included = [line for line in (folder / f"{prefix}.cpp").read_text().splitlines() if line.startswith("#include")]
-    assert {line.split()[1] for line in included} <= {"<math.h>", "<stdlib.h>", "<string.h>", f'"{prefix}.h"'}
+    assert {line.split()[1] for line in included} <= {
+        "<math.h>",
+        "<stdlib.h>",
+        "<string.h>",
+        "<utility>",
+        f'"{prefix}.h"',
+    }
     header = (folder / f"{prefix}.h").read_text()
     instance = gaitbench.load(id)
     assert "@" not in header

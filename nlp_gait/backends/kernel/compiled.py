@@ -8,7 +8,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, Compiler, find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, build_kernel, write_kernel_source
+from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, build_kernel, write_rows_source
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
@@ -31,24 +31,46 @@ _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
 BLOCKS = (64, 16, 4, 1)
 
 
-class NativeKernel:
-    """Evaluates a kernel in a compiled library; safe to call from several threads at once."""
+class NativeRows:
+    """Evaluates the rows of a batch in a compiled library; safe to call from several threads at once."""
 
-    backend: Literal["compiled"] = "compiled"
-
-    def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
+    def __init__(self, source: str, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
         """Build the library for 1, 2, 4 or 8 lanes, or load it from the cache; raises CompilerError.
 
         With ``scalar_functions``, sines and the like take one lane after the other, so that no bit depends on the lane count.
         """
         more = ("-DNO_VECTOR_LIBM",) if scalar_functions else ()
         flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *more)
-        loaded, self.library = load_library(write_kernel_source(kernel.function), compiler, flags, SYMBOLS)
-        self._evaluate = loaded.nlp_gait_evaluate
-        self._evaluate.argtypes = [_POINTER, _INTEGER, *[_POINTER] * 8]
-        loaded.nlp_gait_workspace_bytes.restype = _INTEGER
-        self._workspace_bytes = int(loaded.nlp_gait_workspace_bytes())
+        loaded, self.library = load_library(source, compiler, flags, SYMBOLS)
+        self._evaluate = loaded.nlp_gait_evaluate_rows
+        self._evaluate.argtypes = [_POINTER, _POINTER, _POINTER, _INTEGER, _POINTER]
+        loaded.nlp_gait_rows_memory.restype = _INTEGER
+        self._memory_size = int(loaded.nlp_gait_rows_memory())
         self._local = threading.local()
+
+    def __call__(self, inputs: Sequence[Array], shared: bytes, outputs: Sequence[Array | None], rows: int) -> None:
+        """Fill the outputs that are not None; all arrays contiguous, aligned doubles; 1 in ``shared``: one row for all."""
+        local = self._local
+        if not hasattr(local, "address"):  # scratch memory of the calling thread
+            local.memory = np.empty(-(-self._memory_size // 8))
+            local.inputs, local.outputs = (_POINTER * len(inputs))(), (_POINTER * len(outputs))()
+            local.address = get_address(local.memory)
+        local.inputs[:] = [get_address(array) for array in inputs]
+        local.outputs[:] = [None if array is None else get_address(array) for array in outputs]
+        if self._evaluate(local.inputs, shared, local.outputs, rows, local.address):
+            raise RuntimeError("the compiled kernel reported a failure")
+
+
+class NativeKernel:
+    """Evaluates a problem's kernel in a compiled library; safe to call from several threads at once."""
+
+    backend: Literal["compiled"] = "compiled"
+
+    def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
+        """Build or load the library; arguments and errors as ``NativeRows``."""
+        source = write_rows_source(kernel.function, objective=True)
+        self._rows = NativeRows(source, compiler, lanes, scalar_functions=scalar_functions)
+        self.library = self._rows.library
         self._weights = kernel.weights
         self.lanes = lanes
         self.description = f"compiled by {compiler.summary}, {lanes} candidates at a time"
@@ -57,12 +79,7 @@ class NativeKernel:
         self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
     ) -> None:
         """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n); all arrays contiguous, aligned doubles."""
-        if not hasattr(self._local, "memory"):  # scratch memory of the calling thread
-            self._local.memory = np.empty(-(-self._workspace_bytes // 8))
-        arrays = (p, lower, upper, self._weights, f, violation, g, self._local.memory)
-        addresses = (None if array is None else get_address(array) for array in arrays)
-        if self._evaluate(get_address(X), len(X), *addresses):
-            raise RuntimeError("the compiled kernel reported a failure")
+        self._rows((X, p, lower, upper, self._weights), b"\0\1\1\1\1", (f, g, violation), len(X))
 
 
 def get_address(array: Array) -> int:

@@ -1,4 +1,4 @@
-"""C++ source of a problem's kernel: CasADi's generated code over a vector type, and a loop over candidates."""
+"""A problem's kernel, and C++ source: CasADi's generated code over a vector type, and a loop over the rows of a batch."""
 
 import re
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from nlp_gait.backends.kernel.compiler import read_native_source
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
 
-SYMBOLS = ("nlp_gait_lanes", "nlp_gait_workspace_bytes", "nlp_gait_evaluate")
+SYMBOLS = ("nlp_gait_rows_memory", "nlp_gait_evaluate_rows")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,17 +44,33 @@ def _build(problem: GaitProblem) -> Kernel:
     return Kernel(function=function, bounds=bounds, weights=1.0 / model.row_scales, model=model)
 
 
-def write_kernel_source(function: ca.Function) -> str:
-    """Return the C++ source of a kernel (x, p) to (cost, g); the lane count is the macro LANES."""
-    numbers, batch = (read_native_source("nlp_gait.backends.kernel", name) for name in ("lanes.hpp", "batch.hpp"))
-    sizes = {"VARIABLES": function.size1_in(0), "PARAMETERS": function.size1_in(1), "ROWS": function.size1_out(1)}
-    macros = (f"#define {name} {size}" for name, size in sizes.items())
-    return "\n".join([numbers, generate_lane_code(function), *macros, batch])
+def write_rows_source(function: ca.Function, *, objective: bool = False) -> str:
+    """Return the C++ source of a function named ``kernel`` with dense results; the lane count is the macro LANES.
+
+    With ``objective``, the function is (x, p) to (cost, g), and the code also computes the violation, see ``rows.hpp``.
+    """
+    inputs = [str(function.numel_in(i)) for i in range(function.n_in())]
+    outputs = [str(function.numel_out(i)) for i in range(function.n_out())] + ["1"] * objective
+    parts = [
+        "#include <utility>",
+        read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
+        _generate_lane_code(function),
+        *["#define OBJECTIVE"] * objective,
+        f"enum {{ INPUTS = {len(inputs)}, OUTPUTS = {len(outputs)} }};",
+        f"static const long long input_size[] = {{{', '.join(inputs)}}};",
+        f"static const long long output_size[] = {{{', '.join(outputs)}}};",
+        read_native_source("nlp_gait.backends.kernel", "rows.hpp"),
+    ]
+    return "\n".join(parts)
 
 
-def generate_lane_code(function: ca.Function) -> str:
-    """Return CasADi's C code of a function named ``kernel``, over the numbers of lanes.hpp."""
+def _generate_lane_code(function: ca.Function) -> str:
+    """Return CasADi's C code of a function, over the numbers of lanes.hpp."""
     generator = ca.CodeGenerator("kernel", {"casadi_real": "Lanes"})
     generator.add(function)
-    code = re.sub(r"\((\w+)\?(\w+):0\)", r"if_else_zero(\1,\2)", generator.dump())
+    entry = r"(\(\*\w+\+\+\)|\w+(?:\[i\])?)"  # of a vector, in a loop
+    code = re.sub(rf"\({entry}\?{entry}:0\)", r"if_else_zero(\1,\2)", generator.dump())
+    if function.is_a("SXFunction"):  # no argument or result is left out
+        code = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", code))
+    code = code.replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)")
     return f"#define __STDC_VERSION__ 199901L  // so that the generated code calls fmin, fmax and fabs of lanes.hpp\n{code}"

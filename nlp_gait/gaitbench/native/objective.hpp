@@ -4,12 +4,14 @@
 extern "C" EXPORT int FUNCTION(const double* X, long long points, double* f, double* violation, double* G) {
   const long long block = 64;  // points whose rows are held at once
   double* g = G ? (double*)malloc((size_t)(block * ROWS) * sizeof(double)) : 0;
-  char* memory = (char*)malloc((size_t)nlp_gait_workspace_bytes());
+  char* memory = (char*)malloc((size_t)nlp_gait_rows_memory());
   int failed = !memory || (G && !g);
   for (long long first = 0; first < points && !failed; first += block) {
     const long long count = points - first < block ? points - first : block;
-    failed = nlp_gait_evaluate(X + first * VARIABLES, count, instance_parameters, instance_lower, instance_upper,
-                               instance_weights, f + first, violation + first, g, memory);
+    const double* inputs[] = {X + first * VARIABLES, instance_parameters, instance_lower, instance_upper, instance_weights};
+    const char shared[] = {0, 1, 1, 1, 1};
+    double* outputs[] = {f + first, g, violation + first};
+    failed = nlp_gait_evaluate_rows(inputs, shared, outputs, count, memory);
     if (!G || failed) continue;
     for (long long k = 0; k < count; ++k)
       for (int i = 0; i < SIDES; ++i) {

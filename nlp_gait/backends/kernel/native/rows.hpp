@@ -1,6 +1,8 @@
 // Evaluates the generated `kernel` at the rows of a batch, LANES at a time.
 //
-// Expects INPUTS and OUTPUTS as macros, and the sizes of all inputs and outputs in `input_size` and `output_size`.
+// Expects INPUTS and OUTPUTS, and the sizes of all inputs and outputs in `input_size` and `output_size`. With OBJECTIVE the kernel
+// is (x, p) -> (cost, g), three more inputs (lower, upper and weight of g) are read as they are, and the last output is the
+// violation that follows from g; it and the cost are infinite where x is not finite.
 
 #if defined(__clang__)
 #define UNROLL _Pragma("unroll")
@@ -90,14 +92,28 @@ static casadi_int work_size(int which) {
   return sizes[which];
 }
 
+#ifdef OBJECTIVE
+static void add_violation(const double* const* inputs, const Lanes* x, Lanes** res) {
+  const double *lower = inputs[INPUTS], *upper = inputs[INPUTS + 1], *weight = inputs[INPUTS + 2];
+  Lanes nothing = 0.0;  // stays zero where all of x is finite
+  for (long long j = 0; j < input_size[0]; ++j) nothing += 0.0 * x[j];
+  const Lanes* g = res[1];
+  Lanes sum = 0.0;
+  for (long long j = 0; j < output_size[1]; ++j) sum += fmax(fmax(lower[j] - g[j], g[j] - upper[j]), 0.0) * weight[j];
+  const Mask bad = nothing.v != Lanes(0.0).v;
+  *res[0] = select(bad, INFINITY, *res[0]);
+  *res[2] = select(bad, INFINITY, sum);
+}
+#endif
+
 // Bytes of memory that each thread brings; it need not be aligned.
 extern "C" EXPORT long long nlp_gait_rows_memory(void) {
   const Sizes sizes = add_sizes();
   return sizeof(Lanes) * (1 + sizes.inputs + sizes.outputs + work_size(3)) + work_size(2) * sizeof(casadi_int) +
-         (work_size(0) + work_size(1)) * sizeof(void*);
+         (work_size(0) + work_size(1) + OUTPUTS) * sizeof(void*);
 }
 
-// Input i is (rows, input_size[i]), or (input_size[i]) for all rows if shared[i]; output i is (rows, output_size[i]).
+// Input i is (rows, input_size[i]), or (input_size[i]) for all rows if shared[i]; output i is (rows, output_size[i]), or null.
 extern "C" EXPORT int nlp_gait_evaluate_rows(const double* const* inputs, const char* shared, double* const* outputs,
                                              long long rows, char* memory) {
   const Sizes sizes = add_sizes();
@@ -123,7 +139,12 @@ extern "C" EXPORT int nlp_gait_evaluate_rows(const double* const* inputs, const 
     Lanes* result = out;
     for (int k = 0; k < OUTPUTS; result += output_size[k++]) res[k] = result;
     if (kernel(arg, res, integers, scratch, 0)) return 1;
-    for (int k = 0; k < OUTPUTS; ++k) scatter(res[k], output_size[k], count, outputs[k] + first * output_size[k]);
+#ifdef OBJECTIVE
+    res[2] = result - 1;
+    add_violation(inputs, in, res);
+#endif
+    for (int k = 0; k < OUTPUTS; ++k)
+      if (outputs[k]) scatter(res[k], output_size[k], count, outputs[k] + first * output_size[k]);
   }
   return 0;
 }

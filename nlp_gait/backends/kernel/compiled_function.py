@@ -1,9 +1,6 @@
 """CasADi functions compiled to SIMD code, CasADi's C over lanes, that evaluates batches of rows with threads."""
 
-import ctypes
 import math
-import re
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from random import Random
@@ -12,16 +9,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nlp_gait.backends.kernel.compiled import CHECK_POINTS, RowThreads, check_agreement, check_parallelism, get_address
-from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_flags, read_native_source
-from nlp_gait.backends.kernel.kernel_source import generate_lane_code
-from nlp_gait.backends.kernel.library_cache import load_library
+from nlp_gait.backends.kernel.compiled import CHECK_POINTS, NativeRows, RowThreads, check_agreement, check_parallelism
+from nlp_gait.backends.kernel.compiler import find_compiler
+from nlp_gait.backends.kernel.kernel_source import write_rows_source
 from nlp_gait.errors import InputError, format_value, unknown
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import to_floats
 
-SYMBOLS = ("nlp_gait_rows_memory", "nlp_gait_evaluate_rows")
 NAMES: dict[int, str] = {value: name for name, value in vars(ca).items() if name.startswith("OP_")}
 _SCALAR = (
     "ASSIGN ADD SUB MUL DIV NEG EXP LOG POW CONSTPOW SQRT SQ TWICE SIN COS TAN ASIN ACOS ATAN LT LE EQ NE NOT AND OR FLOOR CEIL "
@@ -103,27 +98,6 @@ def _find_unsupported(function: ca.Function) -> Iterator[str]:
             yield f"the function {part.name()} ({kind})"
 
 
-def write_rows_source(kernel: ca.Function) -> str:
-    """Return the C++ source of a kernel from ``make_kernel``; the lane count is the macro LANES."""
-    inputs = [str(kernel.numel_in(i)) for i in range(kernel.n_in())]
-    outputs = [str(kernel.numel_out(i)) for i in range(kernel.n_out())]
-    entry = r"(\(\*\w+\+\+\)|\w+(?:\[i\])?)"  # of a vector, in a loop
-    code = re.sub(rf"\({entry}\?{entry}:0\)", r"if_else_zero(\1,\2)", generate_lane_code(kernel))
-    if kernel.is_a("SXFunction"):  # no argument or result is left out
-        code = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", re.sub(r"if \(res\[\d+\]!=0\) ", "", code))
-    parts = [
-        "#include <utility>",
-        read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
-        read_native_source("nlp_gait.backends.functions", "operations.hpp"),
-        code.replace("x<0 ? -1 : x>0 ? 1 : x", "sign_of(x)"),
-        f"enum {{ INPUTS = {len(inputs)}, OUTPUTS = {len(outputs)} }};",
-        f"static const long long input_size[] = {{{', '.join(inputs)}}};",
-        f"static const long long output_size[] = {{{', '.join(outputs)}}};",
-        read_native_source("nlp_gait.backends.functions", "rows.hpp"),
-    ]
-    return "\n".join(parts)
-
-
 class CompiledFunction:
     """A CasADi function as native code, for many rows at once.
 
@@ -133,8 +107,7 @@ class CompiledFunction:
     def __init__(self, function: ca.Function, kernel: ca.Function, threads: int, lanes: int) -> None:
         """Use ``compile_function`` instead; ``kernel`` is the function that is compiled."""
         compiler = find_compiler()
-        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}")
-        library, self.library = load_library(write_rows_source(kernel), compiler, flags, SYMBOLS)
+        self._native = NativeRows(write_rows_source(kernel), compiler, lanes)
         self.function = function  #: CasADi's
         self.argument_names = tuple(function.name_in())
         self.result_names = tuple(function.name_out())
@@ -142,10 +115,6 @@ class CompiledFunction:
         self.argument_shapes = [_find_row_shape(function.size_in(i)) for i in range(function.n_in())]
         self.result_shapes = [_find_row_shape(function.size_out(i)) for i in range(function.n_out())]
         self.description = f"compiled by {compiler.summary}, {lanes} rows at a time"  #: in words
-        self._native = library.nlp_gait_evaluate_rows
-        library.nlp_gait_rows_memory.restype = ctypes.c_longlong
-        self._memory_size = int(library.nlp_gait_rows_memory())
-        self._local = threading.local()
         self._parallelism = threads, lanes
         self._threads = RowThreads(threads)
 
@@ -205,16 +174,9 @@ class CompiledFunction:
         return np.require(array, requirements=("C", "A")), array.ndim == len(shape)
 
     def _evaluate(self, pieces: Sequence[tuple[Array, bool]], results: Sequence[Array], cut: slice) -> None:
-        if not hasattr(self._local, "memory"):  # scratch memory of the calling thread
-            self._local.memory = np.empty(-(-self._memory_size // 8))
-            self._local.address = ctypes.c_void_p(get_address(self._local.memory))
-        inputs = [get_address(values if shared else values[cut]) for values, shared in pieces]
-        outputs = [get_address(result[cut]) for result in results]
-        given, made = ((ctypes.c_void_p * len(each))(*each) for each in (inputs, outputs))
-        is_shared = bytes(shared for _, shared in pieces)
-        rows = ctypes.c_longlong(cut.stop - cut.start)
-        if self._native(given, is_shared, made, rows, self._local.address):
-            raise RuntimeError(f"{self.function.name()} reported a failure")
+        inputs = [values if shared else values[cut] for values, shared in pieces]
+        outputs = [result[cut] for result in results]
+        self._native(inputs, bytes(shared for _, shared in pieces), outputs, cut.stop - cut.start)
 
 
 def compile_function(
@@ -252,7 +214,7 @@ def _compile(function: ca.Function, threads: int, lanes: int) -> CompiledFunctio
         for point in zip(*points, strict=True)
     ]
     flat = [np.concatenate([ca.vec(ca.densify(value)).full().ravel() for value in values]) for values in expected]
-    check_agreement(np.concatenate(results, axis=1), np.array(flat), compiled.library)
+    check_agreement(np.concatenate(results, axis=1), np.array(flat), compiled._native.library)
     return compiled
 
 

@@ -1,1 +1,0 @@
-"""Any CasADi function as native code that evaluates batches of rows."""
