@@ -22,7 +22,6 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from compare.cli.endings import end_interrupted, fail, say_error
-from compare.cli.outputs import register_written
 from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError
 from nlp_gait.files import protect_inputs
@@ -31,12 +30,13 @@ from nlp_gait.interrupts import raise_interrupts
 R = TypeVar("R")
 
 PLAIN = "nlp-gait-plain"  # error handler for characters that an output cannot encode
-OUTPUT = "output"  # in the annotation of a parameter that names what the command writes
+# In the annotation of a parameter that names the folder, or the file, that the command writes.
+OUTPUT, OUTPUT_FILE = "output", "output file"
 FORCE = inspect.Parameter(
     "force",
     inspect.Parameter.KEYWORD_ONLY,
     default=False,
-    annotation=Annotated[bool, typer.Option("--force", help="Replace inputs and files of other programs, too.")],
+    annotation=Annotated[bool, typer.Option("--force", help="Replace files that exist.")],
 )
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -54,8 +54,7 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
                 protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-                with register_written():
-                    result = function(**given)
+                result = function(**given)
                 sys.stdout.flush()  # report a failed write here, not at the interpreter's exit
             return result
         except (GaitError, SearchError) as error:
@@ -67,8 +66,8 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
             raise typer.Exit(1) from None
 
     options = list(_list_options(function))
-    outputs = {option.name for option in options if _is_output(option)}
-    if outputs:
+    outputs = {option.name for option in options if _get_marks(option) & {OUTPUT, OUTPUT_FILE}}
+    if any(OUTPUT_FILE in _get_marks(option) for option in options):
         options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
@@ -96,8 +95,8 @@ def _list_options(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:
             yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
 
 
-def _is_output(option: inspect.Parameter) -> bool:
-    return OUTPUT in getattr(option.annotation, "__metadata__", ())
+def _get_marks(option: inspect.Parameter) -> set[object]:
+    return {mark for mark in getattr(option.annotation, "__metadata__", ()) if isinstance(mark, str)}
 
 
 def run_app(app: Callable[[], object]) -> None:

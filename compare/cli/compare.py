@@ -14,7 +14,7 @@ from compare.analysis.units import with_unit
 from compare.analysis.verdict import describe_best_known
 from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, end_interrupted, fail, report_interrupts, say_error
-from compare.cli.options import RESULTS, AsCsv, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
+from compare.cli.options import RESULTS, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
 from compare.cli.printing import (
     describe_command,
     print_result,
@@ -24,7 +24,6 @@ from compare.cli.printing import (
     stderr,
     stdout,
 )
-from compare.cli.report import encode_simulations, print_simulations, simulate_best
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, check_study, run_study
@@ -95,10 +94,6 @@ def compare(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
     ] = None,
-    engine: Annotated[
-        bool, typer.Option("--engine", help="Also simulate every solver's best gait in MuJoCo (extra sim).")
-    ] = False,
-    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
@@ -106,17 +101,13 @@ def compare(
     Every finished run is stored: the same command, or `--resume`, continues an interrupted study. More runs, solvers, problems
     or a larger budget in the same folder extend it; runs whose algorithm, problem or robot was edited are recomputed. Your own
     problems and algorithms are named as `FILE.py:NAME`, and a program in any language as `cmd:COMMAND`.
-    With `--engine` the report includes every solver's best gait in a physics engine, and whether it confirms the model.
 
     Examples: `nlp-gait compare`, `nlp-gait compare nao-ssp --algorithms pso,ga,cma,slsqp --runs 31 --polish --out study`,
     `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
-    from compare.report import FurtherFiles, write_report
-    from nlp_gait.simulation.engine import load_mujoco
+    from compare.report import write_report
 
-    if engine:
-        load_mujoco()  # if it is missing, say so before the work
     if config is not None or resume:
         _reject_study_options(context, "--config" if config is not None else "--resume")
     name_all(code)
@@ -131,25 +122,19 @@ def compare(
         specs = [options.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
         solvers = choose_solvers(algorithms, starts, searches)
         settings = searches.make_study(specs, solvers, max(starts, 1))
-    if engine and not any(problem.load().display.simulation_model for problem in settings.problems):
-        raise InputError(f"no gait of {', '.join(p.title for p in settings.problems)} can be simulated; omit --engine")
     if stderr.is_terminal:
         say(f"watch it: nlp-gait report {out} --watch")
     remedy = f"continue with `nlp-gait compare --resume --out {out}`"
     records = run_in_folder(settings, out, jobs, scheduler, tune, remedy)
     imported = read_imported_records(out, records)
     records += imported.records
-    gaits = simulate_best(out, records) if engine else []
-    written = write_report(
-        out, records, read_manifest(out), excluded=imported.excluded, further=FurtherFiles(csv=as_csv)
-    )
+    written = write_report(out, records, read_manifest(out), excluded=imported.excluded)
     runs = [_encode_run(record) for record in records]
-    data = {"problems": summarise_problems(records), "runs": runs, **encode_simulations(gaits)} if as_json else {}
+    data = {"problems": summarise_problems(records), "runs": runs} if as_json else {}
 
     def tables() -> None:
         print_runs(records)
         print_summaries(records)
-        print_simulations(gaits)
 
     print_result(as_json, data, written, tables)
     end_if_excluded(imported.sentences)

@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compare.analysis.units import make_heading, with_unit
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.endings import fail
-from compare.cli.options import AnyProblem, AsJson, parse_values, parse_x
+from compare.cli.options import AnyProblem, AsJson, parse_number, parse_options, parse_pairs, parse_x
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_result, print_rows, print_table, print_written, stdout
 from compare.judge import Evaluation
 from compare.judge import evaluate as judge
 from compare.rounding import evaluate_rounded
 from compare.study.import_runs import FINALS, read_points
-from nlp_gait.errors import InputError
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import format_csv, write_text
 from nlp_gait.formulation import GaitProblem
@@ -59,9 +58,9 @@ def evaluate(
     claimed: Annotated[
         str | None, typer.Option(metavar="VALUE", help="With --rounded: the objective as printed; can a point have it?")
     ] = None,
-    signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file."), OUTPUT] = None,
+    signals: Annotated[Path | None, typer.Option(help="Write time histories to this .npz file."), OUTPUT_FILE] = None,
     table: Annotated[
-        Path | None, typer.Option("--csv", help="Write the judged points to this CSV file."), OUTPUT
+        Path | None, typer.Option("--csv", help="Write the judged points to this CSV file."), OUTPUT_FILE
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -135,19 +134,18 @@ def _evaluate_rounded(problem: GaitProblem, x: str, claimed: str | None, as_json
 
 def _read_motion(problem: AnyProblem, motion: Path, touch_down_s: float | None) -> RecordedGait:
     """Read a gait from joint angles, with changed limits; InputError for a file without a gait, or an option without effect."""
-    options = {"--option": problem.option, "--fix": problem.fix, "--derivatives": problem.derivatives}
-    for flag, value in options.items():
-        if value:
-            raise InputError(f"{flag} has no effect on a given motion; leave it out")
-    robot = problem.robot or "nao-v5"
-    gait: RecordedGait = resolve(RECORDED_GAITS, problem.name or next(iter(RECORDED_GAITS)))(
+    robot, values = problem.robot or "nao-v5", dict(parse_pairs(problem.values, "--set"))
+    intervals = values.pop("intervals", None)
+    name = problem.name or next(iter(RECORDED_GAITS))
+    gait: RecordedGait = resolve(RECORDED_GAITS, name)(
         read_joint_angles(motion, load_robot(robot)),
         robot=robot,
         gait=problem.name,
         touch_down_s=touch_down_s,
-        **({} if problem.intervals is None else {"intervals": problem.intervals}),
+        **({} if intervals is None else parse_options(name, [("intervals", intervals)])),
     )
-    return replace(gait, problem=gait.problem.with_values(**parse_values(problem.values, "--set")))
+    numbers = {key: parse_number(key, text, "--set") for key, text in values.items()}
+    return replace(gait, problem=gait.problem.with_values(**numbers))
 
 
 def _evaluate_motion(gait: RecordedGait, engine: bool, signals: Path | None, as_json: bool) -> None:

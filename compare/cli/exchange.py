@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from compare.analysis.comparison import label_editions
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.compare import print_summaries, summarise_problems
 from compare.cli.endings import end_if_excluded, fail
-from compare.cli.options import RESULTS, AsCsv, AsJson, Code, NamedProblem, name_all
+from compare.cli.options import RESULTS, AsJson, Code, NamedProblem, name_all
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_result, show_progress, stdout
 from compare.study.evidence import read_evidence
@@ -52,14 +52,13 @@ def import_results(
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of a new or existing study."), OUTPUT] = RESULTS,
-    as_csv: AsCsv = False,
     as_json: AsJson = False,
 ) -> None:
     """Import results of other programs into a study, judged and reported like all others.
 
     Example: `nlp-gait import nao-ssp finals.csv --history histories.csv --as "GA (MATLAB)" --out study`
     """
-    from compare.report import FurtherFiles, write_report
+    from compare.report import write_report
 
     spec = problem.spec()
     records = import_runs(spec, finals, label, history, evaluations)
@@ -67,7 +66,10 @@ def import_results(
     evidence = read_evidence(out)
     everything = label_editions(evidence.records)
     report = write_report(
-        out, everything, read_manifest(out), excluded=evidence.excluded, further=FurtherFiles(csv=as_csv)
+        out,
+        everything,
+        read_manifest(out),
+        excluded=evidence.excluded,
     )
     written = [*kept, *report]
     shown = [record for record in everything if record.problem == spec.title]
@@ -82,7 +84,7 @@ def verify(
     pack: Annotated[
         Path | None,
         typer.Option(metavar="FILE.zip", help="Check the records of the folder, and pack the study for others."),
-        OUTPUT,
+        OUTPUT_FILE,
     ] = None,
     rerun: Annotated[
         str,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.endings import report_interrupts
 from compare.cli.options import AsJson, NamedProblem, StoredGait
 from compare.cli.outputs import check_output_file
@@ -27,7 +27,7 @@ def export(
     stored: StoredGait,
     format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf, mujoco-keyframes, naoqi or ros.")],
     out: Annotated[
-        Path | None, typer.Option(help="File; by default next to the result, with the format's suffix."), OUTPUT
+        Path | None, typer.Option(help="File; by default next to the result, with the format's suffix."), OUTPUT_FILE
     ] = None,
     period_ms: Annotated[int, typer.Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
 ) -> None:
@@ -95,7 +95,7 @@ def animate(
         typer.Option(
             help="A .gif or .mp4, a .png contact sheet, or an .html page; by default a GIF next to the result."
         ),
-        OUTPUT,
+        OUTPUT_FILE,
     ] = None,
     frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames per second.")] = 12.5,
     speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,

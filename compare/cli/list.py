@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.options import AsJson
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, stdout
@@ -43,7 +43,7 @@ def list_problems(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG."), OUTPUT
+        Path | None, typer.Option(help="With --robot: figure of the robot and its soles, as PNG and SVG."), OUTPUT_FILE
     ] = None,
     cite: Annotated[
         bool,

@@ -37,6 +37,23 @@ REPLACEMENTS = {
     "simulate --period-ms": DRIVE_FILE,
     "simulate --push-at-s": "simulate --push X,Y,S has the time of the push",
     "walk": "sweep --engine simulates the cheapest cycle at each speed",
+    "--derivatives": "give --set derivatives=finite-difference",
+    "--fix": "--set NAME=VALUE fixes a variable",
+    "--intervals": "give --set intervals=N",
+    "--option": "--set NAME=VALUE sets options, too",
+    "certainty --paths": "compare.questions and nlp_gait.proofs take it in Python",
+    "certainty --tolerance": "compare.questions and nlp_gait.proofs take it in Python",
+    "compare --csv": "report DIR --csv writes CSV files of a study",
+    "compare --engine": "report DIR --engine simulates the best gaits of a study",
+    "compare --penalty-weight": "give --handling penalty=WEIGHT",
+    "compare --stagnation": "a study file has it, see --config",
+    "compare --target": "a study file has it, see --config",
+    "import --csv": "report DIR --csv writes CSV files of a study",
+    "report --gradient-weight": "give --weights GRADIENT,HESSIAN",
+    "report --hessian-weight": "give --weights GRADIENT,HESSIAN",
+    "report --parquet": "--csv writes runs.csv, which pandas converts",
+    "report --style": "compare.report.FurtherFiles takes it in Python",
+    "robust --samples": "compare.questions takes it in Python",
 }
 
 

@@ -33,8 +33,14 @@ Code = Annotated[
         help="Your code that the file refers to; it runs only if named here; repeatable.",
     ),
 ]
-# Options of problems with their own flag.
-FLAGS = ("robot", "intervals", "derivatives")
+ProblemName = Annotated[
+    str,
+    typer.Argument(
+        metavar="PROBLEM",
+        help="For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or "
+        "gb2:ssp:3; or your own, FILE.py:NAME.",
+    ),
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +63,7 @@ class StoredGait:
 
 @dataclass(frozen=True, kw_only=True)
 class ProblemOptions:
-    """Options and values of any problem."""
+    """Robot, options and values of a problem."""
 
     robot: Annotated[
         str | None,
@@ -66,47 +72,35 @@ class ProblemOptions:
             "(.json, .urdf, .xml of MuJoCo), or PACKAGE:NAME of an installed package."
         ),
     ] = None
-    intervals: Annotated[
-        int | None, typer.Option(help="Equal intervals of the motion (default: see `nlp-gait list PROBLEM`).")
-    ] = None
-    option: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Any other option of the problem; repeatable.")
-    ] = None
     values: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="NAME=VALUE", help="Parameter, or a variable's bound as NAME.lower=VALUE; repeatable."
+            "--set",
+            metavar="NAME=VALUE",
+            help="Option or parameter, see `nlp-gait list PROBLEM`; a variable, which is then fixed; or a bound, "
+            "NAME.lower=VALUE; repeatable.",
         ),
-    ] = None
-    fix: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Fix a variable at a value; repeatable.")
-    ] = None
-    derivatives: Annotated[
-        str | None, typer.Option(help="Of nao-ssp and nao-dsp: analytic (default) or finite-difference.")
     ] = None
 
     def make_spec(self, name: str) -> ProblemSpec:
-        """Return the problem of that name with these options; raises UnknownNameError, and InputError for bad values."""
-        named = ProblemSpec(name=name)
-        options: dict[str, Any] = {k: value for k, value in vars(self).items() if k in FLAGS and value is not None}
-        options |= parse_options(named.address, parse_pairs(self.option, "--option"))
-        named = replace(named.with_options(**options), values=parse_values(self.values, "--set"))
-        fixed = named.load().fix(**parse_values(self.fix, "--fix"))
-        return replace(named, values=dict(fixed.values))
+        """Return the problem of that name with these values; raises UnknownNameError, and InputError for bad values."""
+        spec, given = ProblemSpec(name=name), dict(parse_pairs(self.values, "--set"))
+        known = inspect.signature(find_maker(spec.address)).parameters
+        options = parse_options(spec.address, [(key, text) for key, text in given.items() if key in known])
+        if self.robot is not None:
+            options["robot"] = self.robot
+        spec = spec.with_options(**options)
+        problem = spec.load()
+        numbers = {key: parse_number(key, text, "--set") for key, text in given.items() if key not in known}
+        fixed = {key: numbers.pop(key) for key in problem.names if key in numbers}
+        return replace(spec, values=dict(problem.with_values(**numbers).fix(**fixed).values))
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedProblem(ProblemOptions):
     """A problem by name, with its options and values."""
 
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="PROBLEM",
-            help="For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or "
-            "gb2:ssp:3; or your own, FILE.py:NAME.",
-        ),
-    ]
+    name: ProblemName
 
     def spec(self) -> ProblemSpec:
         """Return the problem as plain data; raises as ``make_spec``."""
@@ -137,14 +131,7 @@ class AnyProblem(ProblemOptions):
 class NaoPhase(NamedProblem):
     """A problem, by default nao-ssp."""
 
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="PROBLEM",
-            help="For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or "
-            "gb2:ssp:3; or your own, FILE.py:NAME.",
-        ),
-    ] = "nao-ssp"
+    name: ProblemName = "nao-ssp"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,17 +142,11 @@ class SearchOptions:
     seed: Seed = 0
     evaluations: Evaluations = 10_000
     handling: Annotated[
-        str, typer.Option(help="Constraints in searches: deb (feasibility rules), penalty or epsilon.")
+        str,
+        typer.Option(
+            help="Constraints in searches: deb (feasibility rules), epsilon, or penalty=WEIGHT [objective/violation]."
+        ),
     ] = "deb"
-    penalty_weight: Annotated[
-        float | None, typer.Option(help="Objective units per unit of violation, for --handling penalty.")
-    ] = None
-    target: Annotated[float | None, typer.Option(help="End a search at a feasible objective at least this good.")] = (
-        None
-    )
-    stagnation: Annotated[
-        int | None, typer.Option(min=1, help="End a search after this many generations without progress.")
-    ] = None
     time_limit: Annotated[float | None, typer.Option(help="End a run after this many seconds.")] = None
     polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each search's result, as another solver.")] = (
         False
@@ -174,22 +155,18 @@ class SearchOptions:
     def make_study(
         self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20
     ) -> StudySettings:
-        """Return the study of problems by solvers; InputError unless a penalty and its weight are given together."""
-        if (self.handling == "penalty") != (self.penalty_weight is not None):
-            raise InputError("--handling penalty and --penalty-weight go together; no weight suits every problem")
-        weight = {} if self.penalty_weight is None else {"weight": self.penalty_weight}
+        """Return the study of problems by solvers; InputError unless a penalty has a weight."""
+        name, _, weight = self.handling.partition("=")
+        if (name == "penalty") != bool(weight):
+            raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
+        settings = {"weight": parse_number("the weight", weight, "--handling")} if weight else {}
         return StudySettings(
             problems=tuple(problems),
             solvers=tuple(solvers),
             runs=self.runs,
             starts=starts,
-            handling=Handling(name=self.handling, settings=weight),
-            stop=Stop(
-                evaluations=self.evaluations,
-                target=self.target,
-                stagnation=self.stagnation,
-                time_limit_s=self.time_limit,
-            ),
+            handling=Handling(name=name, settings=settings),
+            stop=Stop(evaluations=self.evaluations, time_limit_s=self.time_limit),
             seed=self.seed,
         )
 

@@ -15,7 +15,7 @@ from compare.analysis.record_statistics import Weighting
 from compare.analysis.solver_table import describe_unknown
 from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, report_interrupts
-from compare.cli.options import AsCsv, AsJson, Code, name_all
+from compare.cli.options import AsCsv, AsJson, Code, name_all, parse_number
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
@@ -39,11 +39,12 @@ ENGINE_TABLE = (
 def report(
     *,
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
-    gradient_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations counted for a first derivative (default n + 1).")
-    ] = None,
-    hessian_weight: Annotated[
-        float | None, typer.Option(min=0.0, help="Evaluations counted for a Hessian (default (n + 1)(n + 2)/2).")
+    weights: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GRADIENT,HESSIAN",
+            help="Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2).",
+        ),
     ] = None,
     engine: Annotated[
         bool, typer.Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored.")
@@ -53,12 +54,6 @@ def report(
     ] = False,
     pdf: Annotated[
         bool, typer.Option("--pdf", help="Also write figures for papers, one column wide, and their captions in LaTeX.")
-    ] = False,
-    style: Annotated[
-        Path | None, typer.Option(metavar="FILE.mplstyle", help="Matplotlib style file for the figures of --pdf.")
-    ] = None,
-    parquet: Annotated[
-        bool, typer.Option("--parquet", help="Also write all runs as runs.parquet (extra parquet).")
     ] = False,
     logs: Annotated[
         bool, typer.Option("--logs", help="Also write the runs as logs for iohinspector, into the folder logs.")
@@ -79,17 +74,12 @@ def report(
     With `--engine` the best gaits are simulated and stored, and the report says whether the engine confirms the model. With
     `--watch` the report follows a running study until Ctrl-C.
 
-    Examples: `nlp-gait report results`, `nlp-gait report results --gradient-weight 5`,
+    Examples: `nlp-gait report results`, `nlp-gait report results --weights 5,25`,
     `nlp-gait report results --engine`
     """
     from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
 
-    if style is not None and not pdf:
-        raise InputError("the style applies to the figures of --pdf: add --pdf, or omit --style")
-    for flag, weight in (("--gradient-weight", gradient_weight), ("--hessian-weight", hessian_weight)):
-        if weight is not None and not math.isfinite(weight):
-            raise InputError(f"{flag} must be a finite number, got {weight}")
-    weighting = Weighting(gradient=gradient_weight, jacobian=gradient_weight, hessian=hessian_weight)
+    weighting = _parse_weights(weights)
     name_all(code)
     if watch:
         say(f"open {folder / 'report.html'}; it follows the study in {folder} until Ctrl-C")
@@ -97,7 +87,7 @@ def report(
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
     simulated = simulate_best(folder, records) if engine else []
-    further = FurtherFiles(csv=as_csv, parquet=parquet, latex=latex, pdf=pdf, style=style)
+    further = FurtherFiles(csv=as_csv, latex=latex, pdf=pdf)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     if logs:
         comparisons = compare_problems(records)
@@ -108,6 +98,15 @@ def report(
     data = {**encode_simulations(simulated), "excluded": evidence.sentences}
     print_result(as_json, data, written, lambda: print_simulations(simulated))
     end_if_excluded(evidence.sentences)
+
+
+def _parse_weights(text: str | None) -> Weighting:
+    if text is None:
+        return Weighting()
+    values = [parse_number("a weight", part, "--weights") for part in text.split(",")]
+    if len(values) != 2 or not all(math.isfinite(value) and value >= 0.0 for value in values):
+        raise InputError(f"--weights takes two finite numbers >= 0, GRADIENT,HESSIAN, got {text!r}")
+    return Weighting(gradient=values[0], jacobian=values[0], hessian=values[1])
 
 
 @command

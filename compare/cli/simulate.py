@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from compare.analysis.units import format_millimetres, with_unit
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT, OUTPUT_FILE, command
 from compare.cli.endings import fail, report_interrupts
 from compare.cli.options import AsJson, StoredGait, parse_number
 from compare.cli.outputs import check_output_file
@@ -125,12 +125,12 @@ def simulate(
         Path | None, typer.Option(help="Folder for report, time histories, model and figure."), OUTPUT
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(metavar="FILE.html", help="Page that plays the simulation in 3-D."), OUTPUT
+        Path | None, typer.Option(metavar="FILE.html", help="Page that plays the simulation in 3-D."), OUTPUT_FILE
     ] = None,
     video: Annotated[
         Path | None,
         typer.Option(help="Film it to this .gif or .mp4 file; needs OpenGL, and MP4 imageio-ffmpeg."),
-        OUTPUT,
+        OUTPUT_FILE,
     ] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",

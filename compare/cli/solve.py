@@ -9,7 +9,7 @@ import typer
 import nlp_gait
 from compare.analysis.best_known import describe_value
 from compare.analysis.units import with_unit
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.endings import end_interrupted, fail, run_until_interrupted
 from compare.cli.options import (
     AsJson,
@@ -47,12 +47,12 @@ def solve(
         typer.Option(help="Linear solver of IPOPT, for example ma57 if its library is installed (default: mumps)."),
     ] = None,
     jobs: Jobs = None,
-    out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file."), OUTPUT] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the solution to this JSON file."), OUTPUT_FILE] = None,
     as_json: AsJson = False,
 ) -> None:
     """Solve a problem with an NLP solver from several random starts; the exact functions judge the best.
 
-    Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --fix swing_height_m=0.024`
+    Examples: `nlp-gait solve nao-ssp --starts 20 --seed 0`, `nlp-gait solve nao-ssp --set swing_height_m=0.024`
     """
     target = None if out is None else check_output_file(out)
     loaded = problem.spec().load()
@@ -171,7 +171,7 @@ def plan(
         ),
     ] = None,
     starts: Annotated[int, typer.Option(min=1, max=100, help="Most start points, until one converges.")] = 3,
-    out: Annotated[Path | None, typer.Option(help="Write the plan to this JSON file."), OUTPUT] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the plan to this JSON file."), OUTPUT_FILE] = None,
     as_json: AsJson = False,
 ) -> None:
     """Plan a whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.

@@ -255,7 +255,7 @@ def _options(problem: GaitProblem) -> str:
         hint = hints.get(name)
         choices = ", ".join(f"`{choice}`" for choice in get_args(hint)) if get_origin(hint) is not None else ""
         rows.append((code(name), code(str(parameter.default)), choices, literal(words.get(name, ""))))
-    text = "Options of the problem: `--option NAME=VALUE`, or keywords of `nlp_gait.load`."
+    text = "Options of the problem: `--set NAME=VALUE`, or keywords of `nlp_gait.load`."
     return page("## Options", text, table(("option", "default", "one of", "what"), rows)).strip()
 
 

@@ -362,13 +362,11 @@ class GaitProblem:
             if name in self.options:
                 raise UnknownNameError(
                     f"{name!r} is an option of {self.name}, not a parameter: another value is another problem; "
-                    f"load it with --option {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
+                    f"load it with --set {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
                 )
             if name in self.with_other_options:
                 other = self.with_other_options[name]
-                raise UnknownNameError(
-                    f"{name!r} is no parameter of {self.name} with these options; add --option {other}"
-                )
+                raise UnknownNameError(f"{name!r} is no parameter of {self.name} with these options; add --set {other}")
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 
 

@@ -15,9 +15,9 @@ SEEDS = Path(__file__).with_name("seeds")
 WALK = {"step_length_m": 0.1, "frontal_shift_m": 0.1, "foot_lift_m": 0.02, "bending_height_m": 0.01}
 KEPT = (
     ("report", "9" * 400),
-    ("report", "absent", "--gradient-weight", "nan"),
+    ("report", "absent", "--weights", "nan,1"),
     ("compare", "nao-dsp", "--runs", "1000000000000", "--evaluations", "60"),
-    ("solve", "nao-ssp", "--intervals", "1000000000"),
+    ("solve", "nao-ssp", "--set", "intervals=1000000000"),
     ("evaluate", "nao-dsp", "--x", "1", "--set", "self=1"),
     ("sweep", "walk12", "--over", "lambda=0:1:1000000000"),
     ("export", "pipe.json", "--format", "csv"),
@@ -33,7 +33,6 @@ KEPT = (
     ("simulate", "walk.json", "--push", "0,0,-1,2"),
     ("variants", "--starts", "1000000000"),
     ("prices", "walk12", "--starts", "1000000000"),
-    ("robust", "--samples", "1000000000"),
     ("pareto", "nao-ssp", "--points", "1000000000"),
     ("certainty", "walk12", "--starts", "1000000000"),
 )

@@ -44,7 +44,6 @@ def certainty(
     evaluations: Annotated[
         int, typer.Option(min=0, max=1000000000000, help="Budget of one long CMA-ES with restarts; 0 for none.")
     ] = 1_000_000,
-    tolerance: Annotated[float, typer.Option(help="Relative gap at which the proof may end.")] = 1e-6,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Of the proof [s], for at most four variables and NAO's phases; 0 for none.")
     ] = 1800.0,
@@ -54,7 +53,6 @@ def certainty(
         Path | None,
         typer.Option(help="Certificate to check instead: look for a better point, then repeat paths of its proof."),
     ] = None,
-    paths: Annotated[int, typer.Option(min=1, max=100000, help="Paths of a proof to check.")] = 200,
     complete: Annotated[
         bool, typer.Option("--complete", help="With --check: also repeat the whole proof; rerun to continue.")
     ] = False,
@@ -71,24 +69,24 @@ def certainty(
         if problem != AnyProblem():
             raise InputError("--check takes the problem and its options from the certificate; leave them out")
         name_all(code)
-        _check(check, paths, seed, out if complete else None, as_json)
+        _check(check, seed, out if complete else None, as_json)
         return
     if complete:
         raise InputError("--complete repeats the proof of a certificate; name its file by --check FILE")
     from compare.questions.certainty import Certainty
 
-    limits = {"tolerance": tolerance, "time_limit_s": time_limit}
-    question = Certainty(problem=problem.spec().load(), starts=starts, evaluations=evaluations, **limits, seed=seed)
+    loaded = problem.spec().load()
+    question = Certainty(problem=loaded, starts=starts, evaluations=evaluations, time_limit_s=time_limit, seed=seed)
     Output(out=out, as_json=as_json).answer(question)
 
 
-def _check(path: Path, paths: int, seed: int, repeat_in: Path | None, as_json: bool) -> None:
+def _check(path: Path, seed: int, repeat_in: Path | None, as_json: bool) -> None:
     from compare.questions.certainty import search_point
     from nlp_gait.proofs.certificate import check_certificate, load_certified_problem, read_certificate, repeat_proof
 
     file = read_certificate(path)
     proof, points = file.certificate, {"a search": search_point(load_certified_problem(file), seed)}
-    found, repeated = check_certificate(file, points=points, paths=paths, seed=seed), None
+    found, repeated = check_certificate(file, points=points, seed=seed), None
     if repeat_in is not None:
         make_writable_folder(repeat_in)
         with show_progress("boxes", None) as advance:
@@ -209,9 +207,6 @@ def robust(
     ] = 2.0,
     starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts of the nominal problem.")] = 10,
     seed: Seed = 0,
-    samples: Annotated[
-        int, typer.Option(min=0, max=100000, help="Random corners on which each result is evaluated.")
-    ] = 20,
     simulate: Annotated[
         bool, typer.Option(help="Simulate both gaits in MuJoCo on the worst robots (extra sim).")
     ] = True,
@@ -224,7 +219,7 @@ def robust(
     """
     from compare.questions.robust.robust import Robust
 
-    effort = {"starts": starts, "seed": seed, "samples": samples}
+    effort = {"starts": starts, "seed": seed}
     output.answer(Robust(problem=problem.load(), mass=mass, sole=sole, simulate=simulate, **effort))
 
 
@@ -263,7 +258,7 @@ def sweep(
     Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
     `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10 --engine`,
     `nlp-gait sweep humanoid-cycle --robot my.urdf --over speed_m_s=0.02,0.05`,
-    `nlp-gait sweep humanoid-cycle --robot my.urdf --intervals 5 --capabilities`
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --set intervals=5 --capabilities`
     """
     from compare.questions.capabilities import Capabilities
     from compare.questions.sweep import Sweep, parse_axis
@@ -278,6 +273,6 @@ def sweep(
         {"starts": starts, "evaluations": evaluations, "seed": seed},
     )
     if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
-        problem = replace(problem, option=["objective=power", *(problem.option or ())])
+        problem = replace(problem, values=["objective=power", *(problem.values or ())])
     effort["steps"] = steps if engine else 0
     output.answer(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort))

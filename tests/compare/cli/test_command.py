@@ -14,7 +14,7 @@ from compare.cli.command import command
 from nlp_gait.errors import InputError
 
 RUN = CliRunner()
-SHARED = ("--robot", "--intervals", "--derivatives", "--option", "--set", "--fix")
+SHARED = ("--robot", "--set")
 # Commands that build any problem.
 OF_A_PROBLEM = (
     "evaluate",
@@ -76,7 +76,7 @@ def test_a_group_refuses_as_a_command_does(arguments: list[str], status: int, wo
 
 
 @pytest.mark.parametrize("name", OF_A_PROBLEM)
-def test_every_command_that_builds_any_problem_takes_the_same_six_options(name: str) -> None:
+def test_every_command_that_builds_any_problem_takes_the_same_options(name: str) -> None:
     options = {parameter.opts[0]: parameter for parameter in typer.main.get_command(app).commands[name].params}  # type: ignore[attr-defined]
     known = {parameter.opts[0]: parameter for parameter in typer.main.get_command(app).commands["solve"].params}  # type: ignore[attr-defined]
     assert [options[option].help for option in SHARED] == [known[option].help for option in SHARED]

@@ -76,7 +76,7 @@ def save_one(figure, stem):
 
 
 def test_fixed_variable_and_parameter():
-    fixed = as_json("solve", "walk12", "--starts", "1", "--fix", "foot_lift_m=0.015", "--set", "lambda=0.3")
+    fixed = as_json("solve", "walk12", "--starts", "1", "--set", "foot_lift_m=0.015", "--set", "lambda=0.3")
     assert fixed["x"]["foot_lift_m"] == pytest.approx(0.015, abs=1e-12)
     assert fixed["parameters"]["lambda"] == 0.3
 
@@ -96,9 +96,9 @@ def test_same_seed_same_result_with_one_or_two_processes(tmp_path, undrawn_pages
     ("arguments", "words"),
     [
         (["evaluate", "nao-spp", "--x", "1"], ["unknown problem 'nao-spp'", "nao-ssp"]),
-        (["solve", "nao-ssp", "--fix", "swing_hight_m=0.02"], ["unknown variable", "swing_height_m"]),
+        (["solve", "nao-ssp", "--set", "swing_hight_m=0.02"], ["unknown parameter", "swing_height_m"]),
         (["solve", "nao-ssp", "--set", "torque_change_limit=0.02"], ["unknown parameter", "torque_change_limit_Nm"]),
-        (["sweep", "nao-ssp", "--over", "intervals=10:20:2"], ["is an option of nao-ssp", "--option intervals="]),
+        (["sweep", "nao-ssp", "--over", "intervals=10:20:2"], ["is an option of nao-ssp", "--set intervals="]),
         (["solve", "nao-ssp", "--robot", "nao-v7"], ["unknown robot 'nao-v7'", "nao-v"]),
         (["evaluate", "nao-ssp", "--x", "0.31,2"], ["must have 9 values"]),
         (["evaluate", "nao-ssp", "--x", "nan" + PSO_OF_THE_PAPER[4:]], ["hip_height_m must be finite", "nan"]),
@@ -109,11 +109,11 @@ def test_same_seed_same_result_with_one_or_two_processes(tmp_path, undrawn_pages
         (["evaluate", "nao-ssp", "--x", "a,b"], ["must be a number", "'a'"]),
         (["solve", "nao-ssp", "--set", "hip_height_m.lower=0.5"], ["inverted", "hip_height_m"]),
         (["solve", "nao-ssp", "--set", "LKneePitch_rad.lower=3"], ["inverted", "LKneePitch_rad"]),
-        (["solve", "nao-ssp", "--fix", "swing_height_m=0.5"], ["cannot be fixed at 0.5", "0.015, 0.03"]),
+        (["solve", "nao-ssp", "--set", "swing_height_m=0.5"], ["cannot be fixed at 0.5", "0.015, 0.03"]),
         (["solve", "nao-ssp", "--set", "torque_change_limit_Nm"], ["NAME=VALUE"]),
         (["compare", "nao-ssp", "--out", "/proc/nowhere"], ["cannot write", "--out"]),
-        (["solve", "nao-ssp", "--intervals", "0"], ["intervals must be a whole number >= 1", "got 0"]),
-        (["solve", "nao-ssp", "--derivatives", "numeric"], ["derivatives", "finite-difference"]),
+        (["solve", "nao-ssp", "--set", "intervals=0"], ["intervals must be a whole number >= 1", "got 0"]),
+        (["solve", "nao-ssp", "--set", "derivatives=numeric"], ["derivatives", "finite-difference"]),
     ],
 )
 def test_bad_input_is_one_sentence(arguments, words):
@@ -123,7 +123,7 @@ def test_bad_input_is_one_sentence(arguments, words):
 
 
 def test_a_process_that_refuses_ends_with_status_1_and_one_sentence():
-    done = process("solve", "nao-ssp", "--fix", "swing_hight_m=0.02")
+    done = process("solve", "nao-ssp", "--set", "swing_hight_m=0.02")
     assert done.returncode == 1 and done.stdout == ""
     assert is_one_sentence(done.stderr) and "swing_height_m" in done.stderr
 

@@ -150,5 +150,5 @@ def test_export_solver_writes_and_says_what(tmp_path: Path) -> None:
 def test_an_instance_is_a_problem_of_every_command(tmp_path: Path) -> None:
     """``evaluate`` and ``list`` know it by its option."""
     x = "0.13,0.05,0.02,0.02"
-    found = as_json("evaluate", "gaitbench", "--option", f"instance={ID}", "--x", x)
+    found = as_json("evaluate", "gaitbench", "--set", f"instance={ID}", "--x", x)
     assert found["options"] == {"instance": ID} and found["feasible"] in (True, False)

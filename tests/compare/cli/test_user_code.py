@@ -41,7 +41,7 @@ def edited(file: Path, old: str, new: str) -> None:
 
 def test_an_edit_of_their_file_recomputes_their_runs(mine: Path) -> None:
     names = "pso,my.py:Shrinking,my.py:annealing"
-    call = ["compare", "my.py:two_link", "--option", "intervals=10", "--algorithms", names]
+    call = ["compare", "my.py:two_link", "--set", "intervals=10", "--algorithms", names]
     call += ["--runs", "1", "--starts", "1", "--evaluations", "300"]
 
     def again() -> list[str]:
@@ -58,10 +58,10 @@ def test_an_edit_of_their_file_recomputes_their_runs(mine: Path) -> None:
 
 
 def test_every_command_takes_them(mine: Path) -> None:
-    best = as_json("solve", "my.py:two_link", "--starts", "3", "--out", "best.json", "--option", "intervals=10")
+    best = as_json("solve", "my.py:two_link", "--starts", "3", "--out", "best.json", "--set", "intervals=10")
     assert best["problem"] == "my.py:two_link" and best["claimed"] and best["feasible"]
     x = ",".join(map(repr, best["x"].values()))
-    verdict = as_json("evaluate", "my.py:two_link", "--option", "intervals=10", "--x", x)
+    verdict = as_json("evaluate", "my.py:two_link", "--set", "intervals=10", "--x", x)
     assert verdict["objective"]["value"] == pytest.approx(best["objective"])
     search = "compare my.py:two_link --algorithms my.py:annealing --starts 0 --runs 1 --evaluations 300 --jobs 1"
     found = as_json(*search.split())

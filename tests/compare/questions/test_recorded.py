@@ -65,7 +65,7 @@ def test_tighter_limits_are_named(gait: Path, monkeypatch: pytest.MonkeyPatch) -
             ["evaluate", "--x", "1,2"],
             "name the problem, for example nao-ssp; it may be left out only where a file names it",
         ),
-        (["evaluate", "--motion", "{gait}", "--fix", "a=1"], "--fix has no effect on a given motion"),
+        (["evaluate", "--motion", "{gait}", "--set", "a=1"], "unknown parameter of recorded-ssp 'a'"),
         (["evaluate", "nao-dsp", "--motion", "none.csv"], "cannot be read"),
     ],
 )

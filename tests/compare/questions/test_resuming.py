@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("undrawn_pictures")
 
 RUN = CliRunner()
 TIMES = ("time_s", "cpu_s", "run_time_s", "files")
-NAO = ("nao-ssp", "--intervals", "2", "--starts", "1")
+NAO = ("nao-ssp", "--set", "intervals=2", "--starts", "1")
 WHOLE = {
     "sweep": ("sweep", "walk12", "--over", "step_length_m=0.08,0.1", "--starts", "1"),
     "sweep by a search": (
@@ -43,7 +43,7 @@ WHOLE = {
 # Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
 BEGUN = {
     "pareto": (*PARETO, "--search", "none"),
-    "cycles": ("sweep", "nao-cycle", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--intervals", "2"),
+    "cycles": ("sweep", "nao-cycle", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--set", "intervals=2"),
 }
 
 

@@ -28,8 +28,6 @@ def test_the_command_finds_a_gait_for_every_sole(tmp_path: Path, monkeypatch: py
         "nao-ssp",
         "--starts",
         "1",
-        "--samples",
-        "2",
         "--no-simulate",
         "--out",
         str(tmp_path),

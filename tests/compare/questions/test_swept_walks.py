@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 # Fewer samples than those of ten intervals: the tests are about what is done with the gaits.
 OVER = "speed_m_s=0.04,0.045"
-COMMAND = ["sweep", "nao-cycle", "--over", OVER, "--starts", "1", "--intervals", "2"]
+COMMAND = ["sweep", "nao-cycle", "--over", OVER, "--starts", "1", "--set", "intervals=2"]
 
 
 @pytest.fixture(scope="module")

@@ -107,7 +107,7 @@ def test_the_command_reports_what_each_feature_of_the_motors_changes(tmp_path: P
 
 def test_values_of_an_option_of_any_problem(tmp_path: Path) -> None:
     answer = run(
-        "nao-dsp", "--over", "step_length_m=0.05,0.06", "--intervals", "2", "--starts", "1", "--out", str(tmp_path)
+        "nao-dsp", "--over", "step_length_m=0.05,0.06", "--set", "intervals=2", "--starts", "1", "--out", str(tmp_path)
     )
     short, long = answer["variants"]
     assert short["options"] == {"step_length_m": 0.05} and short["objective"] < long["objective"]

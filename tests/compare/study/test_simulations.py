@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
-from compare.study import simulations, task
+from compare.study import simulations
 from compare.study.record import RunRecord
 from compare.study.record_files import RECORDS
 from compare.study.simulations import load_simulations, simulate_records
@@ -122,23 +121,3 @@ def test_a_report_without_simulations_says_how_to_get_them(tmp_path: Path) -> No
     done = CliRunner().invoke(app, ["report", str(tmp_path)])
     assert done.exit_code == 0
     assert "`nlp-gait report DIR --engine`" in (tmp_path / "report.md").read_text()
-
-
-def test_compare_says_that_the_engine_is_missing_before_the_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path / "study")])
-    assert refused.exit_code == 1 and "pip install 'nlp-gait[sim]'" in refused.stderr
-    assert not (tmp_path / "study").exists()
-
-
-def test_compare_refuses_problems_that_cannot_be_simulated_before_the_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("mujoco")
-    loaded = task._load
-    monkeypatch.setattr(task, "_load", lambda *call: replace(loaded(*call), display=Display()))
-    refused = CliRunner().invoke(app, ["compare", "nao-dsp", "--engine", "--out", str(tmp_path)])
-    assert refused.exit_code == 1 and "no gait of nao-dsp can be simulated; omit --engine" in refused.stderr
-    assert not (tmp_path / "study.json").exists()

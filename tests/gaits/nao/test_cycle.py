@@ -222,9 +222,7 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
 
 
 def test_the_speed_without_its_option_is_one_sentence() -> None:
-    with pytest.raises(
-        UnknownNameError, match="'speed_m_s' is no parameter of nao-cycle .* add --option objective=power"
-    ):
+    with pytest.raises(UnknownNameError, match="'speed_m_s' is no parameter of nao-cycle .* add --set objective=power"):
         load("nao-cycle").with_values(speed_m_s=0.03)
 
 
