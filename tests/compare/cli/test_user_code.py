@@ -50,7 +50,7 @@ def test_an_edit_of_their_file_recomputes_their_runs(mine: Path) -> None:
 
     assert again() == [] and len(list(Path("study").glob("records/two_link/*.json"))) == 4
     edited(mine, "shrink: float = 0.95", "shrink: float = 0.90")
-    assert len(again()) == 4  # the file is also the problem's: every solver's runs
+    assert len(again()) == 2  # its searches: the problem in it has the same values
     edited(mine, "shrink: float = 0.90", "shrink: float = 0.95")
     assert again() == []
     labels = nlp_gait("report", "study").stdout and Path("study/report.md").read_text()
