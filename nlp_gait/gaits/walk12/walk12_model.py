@@ -7,27 +7,25 @@ Source:
     Goswami, Vadakkepat, Phung (2008), sections 3, 4 and 6 and the appendix.
 """
 
+import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.decoding import read_dataclass
-from nlp_gait.errors import RobotDataError
-from nlp_gait.robots.robot import check_numbers
+from nlp_gait.decoding import decode
 from nlp_gait.symbolic.balance import zmp_of_point_masses
 from nlp_gait.symbolic.kinematics import axis_rotation, knee_cosine, leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, map_motion, stack
 
 GRAVITY = 9.81  # [m/s^2]
-DEFAULT_FILE = resources.files("nlp_gait.gaits.walk12") / "point_mass_biped.json"
+FILE = resources.files("nlp_gait.gaits.walk12") / "point_mass_biped.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +53,6 @@ class PointMassBiped:
     foot_front_m: float  # Fx2, from the ankle to the front edge
     foot_width_m: float  # Fy; the ankle is in the middle
 
-    def __post_init__(self) -> None:
-        numbers = [field.name for field in fields(self) if field.name.endswith(("_kg", "_m"))]
-        check_numbers(f"robot {self.name!r}", self, positive=numbers)
-
     @property
     def leg_m(self) -> float:
         """Length of a stretched leg, d1 + d2."""
@@ -66,9 +60,9 @@ class PointMassBiped:
 
 
 @cache
-def load_point_mass_biped(path: str = "") -> PointMassBiped:
-    """Read a robot from a JSON file with the fields of ``PointMassBiped``, by default the paper's; raises RobotDataError."""
-    return read_dataclass(PointMassBiped, Path(path or str(DEFAULT_FILE)), "robot file", error=RobotDataError)
+def load_point_mass_biped() -> PointMassBiped:
+    """Return the paper's robot."""
+    return decode(PointMassBiped, json.loads(FILE.read_text(encoding="utf-8")))
 
 
 # Definition of the ZMP: (14) with exact forward kinematics; the same with the appendix's approximate positions, misprints
