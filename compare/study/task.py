@@ -117,7 +117,7 @@ class Stop:
     evaluations: int = 10_000  #: budget of a search and of SLSQP; other NLP solvers end by themselves
     target: float | None = None  #: feasible objective that ends a search, in the problem's sense
     stagnation: int | None = None  #: generations without improvement that end a search
-    time_limit_s: float | None = None  #: wall time [s]; not for solvers without a time limit (fatrop)
+    time_limit_s: float | None = None  #: wall time [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,8 +214,6 @@ class Task:
         """Return the NLP solver with settings and the limits that it respects; InputError for what it does not allow."""
         name = str(self.solver)
         known = list_settings(name)
-        if self.stop.time_limit_s is not None and "time_limit_s" not in known:
-            raise InputError(f"{name} cannot be stopped at a time limit; remove {name} or the limit")
         limits = {"evaluations": self.stop.evaluations, "time_limit_s": self.stop.time_limit_s}
         respected = {limit: value for limit, value in limits.items() if limit in known and value is not None}
         return make_solver(name, **{**respected, **self.settings})

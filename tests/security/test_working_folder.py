@@ -29,7 +29,7 @@ PROGRAM = (
 )
 CALLS = (
     tuple("compare walk12 --algorithms pso --starts 0 --runs 2 --evaluations 60 --jobs 2 --out ../out".split()),
-    ("solve", "walk12", "--starts", "1", "--solver", "sqpmethod"),
+    ("solve", "walk12", "--starts", "1", "--solver", "nlpsol"),
 )
 
 

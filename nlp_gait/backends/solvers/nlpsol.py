@@ -1,4 +1,4 @@
-"""Other NLP solvers of the CasADi wheel on the same lifted NLP as IPOPT."""
+"""Any other NLP solver that CasADi has, on the same lifted NLP as IPOPT."""
 
 import contextlib
 import ctypes
@@ -25,6 +25,10 @@ from nlp_gait.formulation.solution import Evaluations, Outcome
 from nlp_gait.interrupts import defer_interrupts, never
 
 PROBE_TIME_LIMIT_S = 60.0
+# An infeasible step of a plugin's own solver of quadratic programs is a status, not an error.
+OPTIONS: Mapping[str, Mapping[str, Any]] = {
+    "sqpmethod": {"qpsol_options": {"printLevel": "none", "error_on_fail": False}}
+}
 PROBE = """
 import sys
 import casadi as ca
@@ -53,31 +57,34 @@ def probe(name: str) -> str | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CasadiSolver(Solver):
-    """A solver of the wheel with its default settings, in IPOPT's stages of sigmoid width, each started from x alone."""
+class Nlpsol(Solver):
+    """Any plugin of CasADi's ``nlpsol`` with its defaults, in IPOPT's stages of sigmoid width, each started from x alone."""
 
-    quiet: ClassVar[Mapping[str, Any]]
-    time_limit_s: ClassVar[float | None] = None
+    name: ClassVar[str] = "nlpsol"
+
+    plugin: str = "sqpmethod"  #: its name in CasADi: sqpmethod, uno, fatrop, ...
+    #: limit of wall time for all stages [s], checked after each iteration (fatrop: after each stage); None for no limit
+    time_limit_s: float | None = None
 
     def check(self, problem: GaitProblem) -> None:
-        reason = probe(self.name)
+        reason = probe(self.plugin)
         if reason is not None:
-            raise InputError(f"NLP solver {self.name!r} does not run in this installation: {reason}")
+            raise InputError(f"nlpsol's plugin {self.plugin!r} does not run in this installation: {reason}")
 
     def to_dict(self) -> dict[str, Any]:
-        return {"kind": self.name}
+        return {"kind": self.name, "plugin": self.plugin}
 
     @lock_casadi
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        self.check(problem)
         model = build_nlp(problem)
-        solver, watch, create_s = problem.build_once(_build_solver, self)
+        solver, watch, create_s = problem.build_once(_build_solver, self.plugin)
         widths, bounds = model.widths, model.bounds(problem)
         primal = model.start(problem, x0, widths[0])
         iterations, evaluations = 0, Evaluations()
         stats: dict[str, Any] = {}
         started = time.perf_counter()
-        alone = stop is never and isinstance(self, WatchedSolver)
-        with defer_interrupts() if alone else contextlib.nullcontext(stop) as pressed:
+        with defer_interrupts() if stop is never else contextlib.nullcontext(stop) as pressed:
             watch.begin(pressed, math.inf if self.time_limit_s is None else started + self.time_limit_s)
             for width in widths:
                 try:
@@ -90,12 +97,12 @@ class CasadiSolver(Solver):
                 stats = solver.stats()
                 iterations += int(stats.get("iter_count") or 0)
                 evaluations += base.count_evaluations(stats)
-                if watch.reason:
+                if watch.reason or (width != widths[-1] and watch.eval(None) == [1]):
                     break
         if stop is never and (watch.reason == base.INTERRUPTED or pressed()):
             raise KeyboardInterrupt
         finite = bool(np.isfinite(primal).all())
-        status = base.REASONS.get(watch.reason, f"{self.name} returned {stats.get('return_status')!r}")
+        status = base.REASONS.get(watch.reason, f"{self.plugin} returned {stats.get('return_status')!r}")
         return base.judge_point(
             self.name,
             problem,
@@ -111,49 +118,14 @@ class CasadiSolver(Solver):
         )
 
 
-def _build_solver(problem: GaitProblem, settings: CasadiSolver) -> tuple[ca.Function, IterationWatch, float]:
+def _build_solver(problem: GaitProblem, plugin: str) -> tuple[ca.Function, IterationWatch, float]:
     """Return the solver of a problem's NLP, the watch of its iterations, and the time to build them [s]."""
-    settings.check(problem)
     started = time.perf_counter()
     nlp = build_nlp(problem).nlp
     watch = IterationWatch(nlp)
-    options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **settings.quiet}
+    options = {"print_time": False, "error_on_fail": False, "iteration_callback": watch, **OPTIONS.get(plugin, {})}
     with _silence_stdout():
-        return ca.nlpsol(settings.name, settings.name, nlp, options), watch, time.perf_counter() - started
-
-
-class Fatrop(CasadiSolver):
-    """FATROP, which cannot be ended between iterations."""
-
-    name: ClassVar[str] = "fatrop"
-    quiet: ClassVar[Mapping[str, Any]] = {"fatrop.print_level": 0}
-
-
-@dataclass(frozen=True, kw_only=True)
-class WatchedSolver(CasadiSolver):
-    """A solver that can be ended between iterations."""
-
-    #: limit of wall time for all stages, checked after each iteration [s]; None for no limit
-    time_limit_s: float | None = None  # type: ignore[misc]  # a setting here, a constant of other solvers
-
-
-class Sqpmethod(WatchedSolver):
-    """CasADi's sequential quadratic programming with qpOASES."""
-
-    name: ClassVar[str] = "sqpmethod"
-    quiet: ClassVar[Mapping[str, Any]] = {
-        "print_header": False,
-        "print_iteration": False,
-        "print_status": False,
-        "qpsol_options": {"printLevel": "none", "error_on_fail": False},
-    }
-
-
-class Uno(WatchedSolver):
-    """Uno with its default preset."""
-
-    name: ClassVar[str] = "uno"
-    quiet: ClassVar[Mapping[str, Any]] = {"uno.logger": "SILENT"}
+        return ca.nlpsol(plugin, plugin, nlp, options), watch, time.perf_counter() - started
 
 
 @contextlib.contextmanager

@@ -5,22 +5,20 @@ from dataclasses import fields
 from typing import Any
 
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.backends.solvers.nlpsol import Fatrop, Sqpmethod, Uno
+from nlp_gait.backends.solvers.nlpsol import Nlpsol
 from nlp_gait.backends.solvers.slsqp import Slsqp
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError, check_name, unknown
 from nlp_gait.files import convert_errors
 
-SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Fatrop, Sqpmethod, Uno)}
+SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptSettings, Slsqp, Nlpsol)}
 
 
 def make_solver(name: str, /, **settings: Any) -> Solver:
     """Make an NLP solver by its name, with settings that differ from the defaults; raises UnknownNameError and InputError."""
     known = list_settings(name)
     for setting in settings:
-        if not known:
-            raise InputError(f"{name} has no settings, got {setting!r}")
         if setting not in known:
             raise unknown(f"setting of {name}", setting, known)
     with convert_errors(f"setting of {name}", InputError):

@@ -55,7 +55,7 @@ def test_other_nlp_solvers_reach_the_same_optimum(name: str) -> None:
     reason = nlpsol.probe(name)
     if reason is not None:
         pytest.skip(f"{name} does not run here: {reason}")
-    record = run_task(Task(problem=SSP, solver=name))
+    record = run_task(Task(problem=SSP, solver="nlpsol", settings={"plugin": name}))
     assert record.claimed
     assert record.verdict.objective == pytest.approx(OPTIMUM, rel=1e-5)
     assert record.verdict.violation < 1e-5  # fatrop relaxes bounds by more than the judge's 1e-6, and is told so
@@ -70,7 +70,7 @@ def test_an_error_of_another_nlp_solver_ends_the_start_in_a_sentence(monkeypatch
 
     monkeypatch.setattr(nlpsol, "_build_solver", lambda *given: (fail, IterationWatch(build_nlp(given[0]).nlp), 0.0))
     problem = ProblemSpec(name="walk12", values={"lambda": 0.51}).load()
-    outcome = nlpsol.Uno().run(problem, (problem.lower + problem.upper) / 2)
+    outcome = nlpsol.Nlpsol(plugin="uno").run(problem, (problem.lower + problem.upper) / 2)
     assert not outcome.claimed and outcome.status == "uno returned 'An exception was raised in the solver.'"
 
 
@@ -78,7 +78,7 @@ def test_an_error_of_another_nlp_solver_ends_the_start_in_a_sentence(monkeypatch
 def test_other_nlp_solvers_print_nothing() -> None:
     program = (
         "from compare.study.run_task import run_task; from compare.study.task import ProblemSpec, Task\n"
-        "run_task(Task(problem=ProblemSpec(name='walk12'), solver='sqpmethod'))"
+        "run_task(Task(problem=ProblemSpec(name='walk12'), solver='nlpsol'))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=Path(__file__).parents[3], capture_output=True, text=True, timeout=120
@@ -92,7 +92,7 @@ def test_a_solver_that_crashes_while_probed_is_a_reason(monkeypatch: pytest.Monk
     try:
         assert nlpsol.probe("fatrop") == "it exits with status -9"
         with pytest.raises(InputError, match="'fatrop' does not run in this installation"):
-            make_solver("fatrop").run(nlp_gait.load("nao-ssp", intervals=5), np.zeros(9))
+            make_solver("nlpsol", plugin="fatrop").run(nlp_gait.load("nao-ssp", intervals=5), np.zeros(9))
     finally:
         nlpsol.probe.cache_clear()
     with pytest.raises(UnknownNameError, match="unknown NLP solver 'snop'"):
