@@ -14,7 +14,7 @@ from compare.cli.command import run_app
 from compare.cli.compare import compare
 from compare.cli.evaluate import evaluate
 from compare.cli.exchange import import_results, verify
-from compare.cli.export import animate, export, export_objective, export_solver
+from compare.cli.export import export
 from compare.cli.list import list_problems
 from compare.cli.old_names import Commands
 from compare.cli.questions.optima import certainty, prices, robust, sweep, variants
@@ -27,7 +27,7 @@ PANELS = {
     "Problems, optima and searches": (list_problems, evaluate, solve, plan),
     "Comparison": (compare, import_results, report, reproduce, bench, verify),
     "Questions": (sweep, prices, pareto, certainty, variants, robust),
-    "Show and share": (simulate, animate, export, export_objective, export_solver),
+    "Show and share": (simulate, export),
 }
 
 app = typer.Typer(
@@ -59,8 +59,6 @@ def take_common_options(
 NAMES = {
     list_problems: "list",
     import_results: "import",
-    export_objective: "export-objective",
-    export_solver: "export-solver",
 }
 for panel, functions in PANELS.items():
     for function in functions:

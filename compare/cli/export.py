@@ -1,131 +1,150 @@
-"""``nlp-gait animate``, ``export``, ``export-objective`` and ``export-solver``."""
+"""``nlp-gait export``."""
 
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
-from compare.cli.command import OUTPUT, OUTPUT_FILE, command
+from compare.cli.command import OUTPUT_FILE, command
 from compare.cli.endings import report_interrupts
-from compare.cli.options import AsJson, NamedProblem, StoredGait
+from compare.cli.options import AsJson, Code, ProblemOptions, name_all
 from compare.cli.outputs import check_output_file
-from compare.cli.printing import print_result, print_written
+from compare.cli.printing import print_result
 from compare.study.references import find_reference
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import identify_problem
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.export.formats import FORMATS, write_as
 from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.set_points import PERIOD_MS
-from nlp_gait.export.solver import export_solver as write
-from nlp_gait.gaitbench import c_export
+from nlp_gait.export.solver import export_solver
+from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.formulation.result import load_result
+from nlp_gait.gaitbench.c_export import export_objective
 from nlp_gait.simulation.video import check_frames, check_video_path, write_video
 
-SHEET = ".png"  # suffix of a contact sheet
+FRAMES_PER_S = 12.5
+
+
+class GaitKind(NamedTuple):
+    """A kind of file for a gait: its usual ending, and the function that writes it, with the time between rows [ms]."""
+
+    ending: str
+    write: Callable[[Path, Result, int], None]
 
 
 @command
 def export(
-    stored: StoredGait,
-    format_: Annotated[str, typer.Option("--format", help="webots, csv, json, mjcf, mujoco-keyframes, naoqi or ros.")],
-    out: Annotated[
-        Path | None, typer.Option(help="File; by default next to the result, with the format's suffix."), OUTPUT_FILE
-    ] = None,
-    period_ms: Annotated[int, typer.Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
-) -> None:
-    """Write a gait in a format of other tools.
-
-    Example: `nlp-gait export best.json --format webots` after `nlp-gait solve nao-ssp --out best.json`
-    """
-    from nlp_gait.export.formats import FORMATS, write_as
-
-    loaded = stored.load()
-    target = check_output_file(out or stored.result.with_name(stored.result.stem + FORMATS.get(format_, "")))
-    write_as(format_, target, loaded, period_ms)
-    print_written(target)
-
-
-@command
-def export_objective(
-    instance: Annotated[
-        str, typer.Argument(metavar="INSTANCE", help="Of GaitBench, for example ssp-v5 or gb2:ssp:3, or a problem.")
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="RESULT.json|PROBLEM",
+            help="A gait from `solve --out` or `plan --out`; for objective, solver and nl a problem or an instance of GaitBench.",
+        ),
     ],
-    to: Annotated[Path, typer.Option("--to", help="Folder for the files."), OUTPUT],
-    as_json: AsJson = False,
-) -> None:
-    """Write an instance of GaitBench as plain C++ with a C header, for C, MATLAB, Octave and Julia.
-
-    The files need only libc and libm: source, header, build script, an example in C, and callers for the others.
-
-    Example: `nlp-gait export-objective ssp-v5 --to DIR`, then `sh DIR/build.sh && DIR/main < /dev/null`
-    """
-    written = c_export.export_objective(gaitbench.load(instance), to)
-    print_result(as_json, {"instance": instance}, written, lambda: None)
-
-
-@command
-def export_solver(
-    to: Annotated[Path, typer.Option("--to", help="Folder for the files."), OUTPUT],
     *,
-    problem: NamedProblem,
-    nl: Annotated[
-        bool,
-        typer.Option("--nl", help="Write an .nl file for AMPL's solvers instead, with names and best known value."),
-    ] = False,
-    as_json: AsJson = False,
-) -> None:
-    """Write a problem's NLP with first and second derivatives as plain C++ with a C header, for a solver on board.
-
-    The files need only libc and libm: source, header (order of variables, sparsity, bounds), build script, an example in C.
-
-    Examples: `nlp-gait export-solver nao-ssp --to DIR`, then `sh DIR/build.sh && DIR/main`,
-    `nlp-gait export-solver nao-ssp --to DIR --nl`
-    """
-    loaded = problem.spec().load()
-    if nl:
-        written = export_nl(loaded, to, find_reference(identify_problem(loaded)).to_json())
-    else:
-        written = write(loaded, to)
-    print_result(as_json, {"problem": loaded.address}, written, lambda: None)
-
-
-@command
-def animate(
-    stored: StoredGait,
+    to: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND",
+            help="Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif, mp4 or html. Of a problem: objective "
+            "(C++), solver (NLP with derivatives in C++) or nl (for AMPL's solvers).",
+        ),
+    ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="A .gif or .mp4, a .png contact sheet, or an .html page; by default a GIF next to the result."
-        ),
+        typer.Option(help="File, by default next to the result; for objective, solver and nl a folder."),
         OUTPUT_FILE,
     ] = None,
-    frames_per_s: Annotated[float, typer.Option("--fps", min=0.1, max=50.0, help="Frames per second.")] = 12.5,
-    speed: Annotated[float, typer.Option(min=0.01, max=100.0, help="Speed of the film; 1 is real time.")] = 1.0,
-    poses: Annotated[int, typer.Option(min=2, max=20, help="Poses of a contact sheet.")] = 6,
+    period_ms: Annotated[int, typer.Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="For solver and nl: option of the problem; repeatable."),
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="For solver and nl: parameter or bound; repeatable."),
+    ] = None,
+    code: Code = None,
+    as_json: AsJson = False,
 ) -> None:
-    """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass.
+    """Write a gait for other tools or as a film, or a problem for other solvers.
 
-    An .html file is a page that plays the gait in 3-D, with power and balance margin.
+    C++ needs only libc and libm, and has a C header, a build script, an example in C, and for `objective` callers for MATLAB,
+    Octave and Julia.
 
-    Examples: `nlp-gait animate best.json --out walk.gif` after `nlp-gait solve nao-ssp --out best.json`,
-    `nlp-gait animate best.json --out walk.html`
+    Examples: `nlp-gait export best.json --to webots` after `nlp-gait solve nao-ssp --out best.json`,
+    `nlp-gait export best.json --to html`, `nlp-gait export ssp-v5 --to objective --out DIR`,
+    `nlp-gait export nao-ssp --to solver --out DIR`, then `sh DIR/build.sh && DIR/main`
     """
-    from compare.drawing.animation import draw_frames, write_contact_sheet
-    from compare.drawing.gait_figure import make_skeleton
+    if to not in (*GAITS, *PROBLEMS):
+        raise unknown("kind", to, [*GAITS, *PROBLEMS])
+    name_all(code)
+    changes = ProblemOptions(option=option, values=values)
+    if to in PROBLEMS:
+        if out is None:
+            raise InputError(f"--to {to} writes several files; name their folder by --out DIR")
+        written: Sequence[Path] = PROBLEMS[to](source, changes, out)
+    else:
+        if changes != ProblemOptions():
+            raise InputError(
+                f"--to {to} writes a stored gait with its own options and values; leave out --option and --set"
+            )
+        result, path = load_result(Path(source)), Path(source)
+        target = check_output_file(out or path.with_name(path.stem + GAITS[to].ending))
+        with report_interrupts():
+            GAITS[to].write(target, result, period_ms)
+        written = [target]
+    print_result(as_json, {"source": source, "kind": to}, written, lambda: None)
+
+
+def _write_page(path: Path, result: Result, period_ms: int) -> None:
     from compare.report.interactive import animate_gait
 
-    loaded = stored.load()
-    target = check_output_file(stored.result.with_suffix(".gif") if out is None else out)
-    if target.suffix.lower() == ".html":
-        animate_gait(loaded.problem, loaded.x, loaded.problem.name).write(target)
-        print_written(target)
-        return
-    if target.suffix.lower() != SHEET:
-        check_video_path(target)
-    skeleton = make_skeleton(loaded, frames_per_s / speed)
-    with report_interrupts():
-        if target.suffix.lower() == SHEET:
-            write_contact_sheet(skeleton, target, poses)
-        else:
-            duration_s = float(skeleton.t[-1] - skeleton.t[0]) / speed
-            check_frames(duration_s, frames_per_s)
-            write_video(target, draw_frames(skeleton), (len(skeleton.t) - 1) / duration_s)
-    print_written(target)
+    animate_gait(result.problem, result.x, result.problem.name).write(path)
+
+
+def _write_film(path: Path, result: Result, period_ms: int) -> None:
+    """Draw a gait as a stick figure with support polygon, zero-moment point and centre of mass."""
+    from compare.drawing.animation import draw_frames
+    from compare.drawing.gait_figure import make_skeleton
+
+    check_video_path(path)
+    skeleton = make_skeleton(result, FRAMES_PER_S)
+    duration_s = float(skeleton.t[-1] - skeleton.t[0])
+    check_frames(duration_s, FRAMES_PER_S)
+    write_video(path, draw_frames(skeleton), (len(skeleton.t) - 1) / duration_s)
+
+
+def _write_objective(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
+    if changes != ProblemOptions():
+        raise InputError("--to objective writes an instance as it is; leave out --option and --set")
+    return export_objective(gaitbench.load(source), folder)
+
+
+def _write_solver(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
+    return export_solver(_load_problem(source, changes), folder)
+
+
+def _write_nl(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
+    problem = _load_problem(source, changes)
+    return export_nl(problem, folder, find_reference(identify_problem(problem)).to_json())
+
+
+def _load_problem(source: str, changes: ProblemOptions) -> GaitProblem:
+    return changes.make_spec(source).load()
+
+
+GAITS: Mapping[str, GaitKind] = {
+    **{name: GaitKind(ending, partial(write_as, name)) for name, ending in FORMATS.items()},
+    "gif": GaitKind(".gif", _write_film),
+    "mp4": GaitKind(".mp4", _write_film),
+    "html": GaitKind(".html", _write_page),
+}
+PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path], Sequence[Path]]] = {
+    "objective": _write_objective,
+    "solver": _write_solver,
+    "nl": _write_nl,
+}

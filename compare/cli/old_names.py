@@ -17,6 +17,7 @@ REPLACEMENTS = {
     "archive": "verify FOLDER --pack FILE.zip packs a study",
     "capabilities": "sweep --capabilities reports what a robot can do",
     "cite": "list --cite [NAME] prints BibTeX",
+    "export --format": "export --to KIND names the kind of the file",
     "export-objective": "export --to objective writes an instance of GaitBench in C++",
     "export-solver": "export --to solver writes a problem with its derivatives in C++",
     "logs": "report FOLDER --logs writes the runs as logs for iohinspector",

@@ -177,7 +177,7 @@ def plan(
     """Plan a whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 
     Examples: `nlp-gait plan --robot nao-v5 --steps 10 --speed 0.05 --out walk.json`, then `nlp-gait simulate walk.json` and
-    `nlp-gait export walk.json --format csv --period-ms 1`
+    `nlp-gait export walk.json --to csv --period-ms 1`
     """
     target = None if out is None else check_output_file(out)
     found = nlp_gait.plan_walk(

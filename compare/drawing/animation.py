@@ -1,15 +1,13 @@
-"""Stick figures: a gait in 3D, from the side, the front and above, as frames of a video or as a contact sheet."""
+"""Stick figures: a gait in 3D, from the side, the front and above, as frames of a video, or some poses as a figure."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from compare.drawing.figures import make_figure, use_style
-from nlp_gait.files import replace_file
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Skeleton, Sole
 from nlp_gait.interrupts import delay_interrupts
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 COLOURS = {LEFT: "#0072B2", RIGHT: "#D55E00", TRUNK: "#404040"}
 GROUND, SUPPORT, COM, ZMP = "#909090", "#009E73", "#000000", "#CC79A7"
 MARGIN = 0.04  # [m] around everything that moves
-FRAME_DPI, SHEET_DPI = 120, 150
+FRAME_DPI = 120
 # Views by name: the coordinates across and up.
 VIEWS = {"side": (0, 2), "front": (1, 2), "above": (0, 1)}
 # Size of a frame [inch]; positions of the 3-D view, the other views and the upper left corner of the legend.
@@ -50,14 +48,6 @@ def draw_frames(skeleton: Skeleton) -> Iterator[Frame]:
                 _draw_frame(figure, skeleton, k)
                 canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
-
-
-def write_contact_sheet(skeleton: Skeleton, path: Path, poses: int = 6) -> None:
-    """Write some instants as one PNG, one row per view; raises OutputError."""
-    times_s = np.linspace(skeleton.t[0], skeleton.t[-1], poses).tolist()
-    with use_style(), replace_file(path) as file, delay_interrupts():
-        figure = plot_poses(skeleton, times_s, ["side"] if skeleton.planar else list(VIEWS))
-        figure.savefig(file, format="png", dpi=SHEET_DPI)
 
 
 def plot_poses(skeleton: Skeleton, times_s: Sequence[float], views: Sequence[str]) -> Figure:

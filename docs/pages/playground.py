@@ -86,8 +86,8 @@ def introduce(instance: Instance, *, left_out: bool) -> str:
         "PSO, GA and ACO race in the page, with the optimum as the mark to beat. Nothing is installed, nothing is sent.",
         f"This build is without the playground: {REMEDY}." if left_out else link,
         f"The page is one file. It contains instance `{ID}` of [GaitBench](../../gaitbench.md) as WebAssembly, from the C++ "
-        f"that `nlp-gait export-objective {ID} --to DIR` writes: {len(instance.row_names)} constraints and the objective, which "
-        "equal those of Python to nine digits (`tests/docs/test_playground.py`). The gait, the zero-moment point and the power "
+        f"that `nlp-gait export {ID} --to objective --out DIR` writes: {len(instance.row_names)} constraints and the objective, "
+        "which equal those of Python to nine digits (`tests/docs/test_playground.py`). The gait, the ZMP and the power "
         "that are drawn come from the same symbolic model and are computed in the page, too. The searches have the settings of "
         "[those of the package](../algorithms.md).",
     )

@@ -41,7 +41,7 @@ KEYS = ("variables", "lifted", "constraints", "equations", "jacobian", "hessian"
 SIZES_INTRODUCTION = """## Sizes of the NLPs
 
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
-measured by `python -m docs.nlp_sizes`. `nlp-gait export-solver PROBLEM --to DIR --nl` writes one as an `.nl` file,
+measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to nl --out DIR` writes one as an `.nl` file,
 [for solver developers](../../gaitbench.md#nlps-for-solver-developers)."""
 PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 

@@ -1,5 +1,5 @@
 "use strict";
-// The problem as WebAssembly: the C++ that `nlp-gait export-objective` writes, and the gait of the same symbolic model.
+// The problem as WebAssembly: the C++ that `nlp-gait export --to objective` writes, and the gait of the same symbolic model.
 const MOST_POINTS = 256; // evaluated in one call
 const DOUBLE = 8, POINTER = 4; // bytes
 

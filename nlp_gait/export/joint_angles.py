@@ -12,7 +12,7 @@ from nlp_gait.export.webots import read_motion
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.robots import Robot
 
-# ``LKneePitch``, ``LKneePitch_deg``, ``LKneePitch [deg]``, and ``q_LKneePitch_rad`` of `export --format csv`.
+# ``LKneePitch``, ``LKneePitch_deg``, ``LKneePitch [deg]``, and ``q_LKneePitch_rad`` of `export --to csv`.
 COLUMN = re.compile(r"(?P<name>\w+?)(?:_(?P<suffix>rad|deg)| ?\[(?P<unit>[^\]]*)\])?")
 TIMES = ("t", "time", "time_s")
 FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
@@ -22,7 +22,7 @@ def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
     """Read angles over time of a robot's joints from a ``.motion`` file of Webots or CSV; raises InputError, UnknownNameError.
 
     CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch_deg``; other columns
-    of ``nlp-gait export --format csv`` are ignored.
+    of ``nlp-gait export --to csv`` are ignored.
     """
     if path.suffix == ".motion":
         points = read_motion(path, robot.joints)

@@ -111,7 +111,7 @@ def _write_expressions(tape: list[Instruction], n: int) -> tuple[list[str], dict
         elif each.operation == ca.OP_CONST:
             texts[k] = f"n{each.constant!r}"
         elif each.operation not in OPERATIONS:
-            raise InputError(f"an .nl file cannot express operation {each.operation} of CasADi; leave out --nl")
+            raise InputError(f"an .nl file cannot express operation {each.operation} of CasADi")
         else:
             texts[k] = OPERATIONS[each.operation].format(*arguments)
             if uses[k] > 1:

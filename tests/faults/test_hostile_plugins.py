@@ -181,8 +181,8 @@ def test_naming_is_what_runs_code(tmp_path: Path) -> None:
     result = tmp_path / "best.json"
     x = dict(zip(walk.names, ((walk.lower + walk.upper) / 2).tolist(), strict=True))  # type: ignore[attr-defined]
     result.write_text(json.dumps({"problem": "other/never_named.py:leg", "x": x}))
-    refused = nlp_gait("export", result, "--format", "csv", status=1).stderr
+    refused = nlp_gait("export", result, "--to", "csv", status=1).stderr
     assert "runs only if you name it: add --code other/never_named.py:leg" in refused and not mark.exists()
     own.write_text(own.read_text() + "\n# another text\n")
-    nlp_gait("export", result, "--format", "csv", "--code", f"{own}:leg")
+    nlp_gait("export", result, "--to", "csv", "--code", f"{own}:leg")
     assert mark.exists()

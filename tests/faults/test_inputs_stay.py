@@ -43,13 +43,12 @@ CALLS = [
     ("solve byo.py:two_link --starts 1 --out byo.py", "byo.py"),
     ("evaluate walk12 --x p.csv --csv p.csv", "p.csv"),
     ("evaluate walk12 --x p.csv --csv ../{name}/p.csv", "p.csv"),
-    ("export w.json --format json --out w.json", "w.json"),
-    ("animate w.json --out w.json", "w.json"),
+    ("export w.json --to json --out w.json", "w.json"),
 ]
 # Written files, before and after a change, for commands that write one.
 WRITERS = [
     ("evaluate walk12 --x p.csv --csv {file}", ".csv"),
-    ("export w.json --format json --out {file}", ".json"),
+    ("export w.json --to json --out {file}", ".json"),
     ("solve byo.py:two_link --starts 1 --out {file}", ".json"),
 ]
 MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'

@@ -106,7 +106,7 @@ def test_robots_and_code_that_no_record_could_name_are_refused(tmp_path: Path) -
 
 @pytest.mark.parametrize("path", [".", "..", "nosuch/..", "/"])
 def test_a_folder_in_place_of_a_result_is_reported(path: str) -> None:
-    for command in (["animate", path], ["export", path, "--format", "csv"], ["simulate", path]):
+    for command in (["export", path, "--to", "gif"], ["export", path, "--to", "csv"], ["simulate", path]):
         assert "cannot be read" in one_sentence(*command)
 
 

@@ -1,4 +1,4 @@
-"""``bench``, ``export-objective`` and ``export-solver`` as users call them."""
+"""``bench``, and ``export`` of problems as users call them."""
 
 from __future__ import annotations
 
@@ -129,20 +129,20 @@ def test_instances_are_problems_everywhere(tmp_path: Path) -> None:
     assert solved["objective"] == pytest.approx(-gaitbench.load(drawn).best_known, rel=1e-5)
     best = ",".join(map(repr, solved["x"].values()))
     assert as_json("evaluate", drawn, "--x", best)["feasible"]
-    found = as_json("export-objective", drawn, "--to", tmp_path / "c")
+    found = as_json("export", drawn, "--to", "objective", "--out", tmp_path / "c")
     assert any(name.endswith("gaitbench_gb2_walk12_long_3.h") for name in found["files"])
     assert "unknown family of GaitBench 2" in one_sentence("compare", "gb2:absent:3", "--out", tmp_path / "s")
 
 
 def test_export_objective_writes_and_says_what(tmp_path: Path) -> None:
-    found = as_json("export-objective", ID, "--to", tmp_path / "c")
+    found = as_json("export", ID, "--to", "objective", "--out", tmp_path / "c")
     assert {Path(name).suffix for name in found["files"]} == {".cpp", ".h", ".c", ".m", ".jl", ".sh"}
     assert all(Path(name).is_file() for name in found["files"])
-    assert "did you mean 'walk12-w015'" in one_sentence("export-objective", "walk12-w15", "--to", tmp_path)
+    assert "did you mean 'walk12-w015'" in one_sentence("export", "walk12-w15", "--to", "objective", "--out", tmp_path)
 
 
 def test_export_solver_writes_and_says_what(tmp_path: Path) -> None:
-    found = as_json("export-solver", "walk12", "--to", tmp_path / "c")
+    found = as_json("export", "walk12", "--to", "solver", "--out", tmp_path / "c")
     assert sorted(Path(name).suffix for name in found["files"]) == [".c", ".cpp", ".h", ".sh"]
     assert all(Path(name).is_file() for name in found["files"])
 

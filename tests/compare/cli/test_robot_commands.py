@@ -1,4 +1,4 @@
-"""``simulate``, ``export`` and ``animate`` as scripts use them."""
+"""``simulate`` and ``export`` as scripts use them."""
 
 import json
 import sys
@@ -40,9 +40,11 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["export", "GAIT", "--format", "webot"], ["unknown format 'webot'", "webots"]),
-        (["export", "absent.json", "--format", "csv"], ["'absent.json' cannot be read"]),
-        (["animate", "GAIT", "--out", "walk.avi"], ["must end in .gif or .mp4"]),
+        (["export", "GAIT", "--to", "webot"], ["unknown kind 'webot'", "webots"]),
+        (["export", "GAIT", "--to", "csv", "--set", "a=1"], ["leave out --option and --set"]),
+        (["export", "nao-ssp", "--to", "nl"], ["name their folder by --out DIR"]),
+        (["export", "absent.json", "--to", "csv"], ["'absent.json' cannot be read"]),
+        (["export", "GAIT", "--to", "gif", "--out", "walk.avi"], ["must end in .gif or .mp4"]),
         (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
         (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
         (["simulate", "GAIT", "--viewer", "--video", "walk.gif"], ["--viewer excludes --page and --video"]),
@@ -86,15 +88,16 @@ def test_a_page_plays_the_simulation(gait, tmp_path):
 
 
 def test_export_writes_next_to_the_result_by_default(gait):
-    assert "gait.motion" in nlp_gait("export", gait, "--format", "webots").stdout
+    assert "gait.motion" in nlp_gait("export", gait, "--to", "webots").stdout
     assert gait.with_name("gait.motion").read_text().startswith("#WEBOTS_MOTION,V1.0,LHipYawPitch,")
 
 
-def test_animate_writes_a_video_and_a_sheet(gait, tmp_path):
-    nlp_gait("animate", gait, "--fps", "1")
+def test_export_writes_a_film_and_a_page(gait):
+    gait.write_text(json.dumps({"problem": "nao-dsp", "x": {**X, "double_support_time_s": 0.3}}))
+    nlp_gait("export", gait, "--to", "gif")
     assert gait.with_suffix(".gif").stat().st_size > 5_000
-    nlp_gait("animate", gait, "--out", tmp_path / "sheet.png", "--poses", "2")
-    assert (tmp_path / "sheet.png").stat().st_size > 10_000
+    nlp_gait("export", gait, "--to", "html")
+    assert "support polygon" in gait.with_suffix(".html").read_text()
 
 
 def test_a_film_is_made_without_a_display(gait, tmp_path):
