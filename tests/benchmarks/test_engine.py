@@ -6,13 +6,9 @@ import pytest
 pytest.importorskip("mujoco")
 
 import nlp_gait  # noqa: E402
-from benchmarks.engine import agreement, gaits, other_robots  # noqa: E402
+from benchmarks.engine import agreement, gaits  # noqa: E402
 from compare.judge import evaluate  # noqa: E402
-from compare.papers.walk12.walk12_paper import find_row  # noqa: E402
 from nlp_gait.errors import InputError  # noqa: E402
-from nlp_gait.formulation import Result  # noqa: E402
-from nlp_gait.gaits.walk12.walk12_display import make_rigid_bodies  # noqa: E402
-from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped  # noqa: E402
 
 
 @pytest.mark.slow
@@ -40,25 +36,3 @@ def test_the_engine_ranks_random_gaits_of_double_support_as_the_model_does(monke
     row = list(agreement.ranking())[-1].split(" | ")
     assert row[2:5] == ["0", "0", "1.0000"]
     assert abs(float(row[6].rstrip("%"))) < 5.0
-
-
-def test_point_masses_are_built_otherwise_only_within_the_block():
-    def inertia() -> float:
-        robot = make_rigid_bodies(load_point_mass_biped())
-        return float(robot.links["left foot"].inertia_com_kgm2[0])
-
-    usual = inertia()
-    with other_robots.spheres("SPHERE_RADIUS", 0.03):
-        assert inertia() == pytest.approx(usual * (0.03 / 0.02) ** 2)
-    assert inertia() == usual
-
-
-@pytest.mark.slow
-def test_a_row_of_the_walk_says_share_fate_and_steps(monkeypatch):
-    problem = nlp_gait.load("walk12")
-    gait = Result(problem=problem, x=problem.check_x(find_row(1.0).x))
-    monkeypatch.setattr(other_robots, "walks", lambda: {"paper, lambda 1": gait})
-    monkeypatch.setattr(other_robots, "STEPS", 5)
-    cells = list(other_robots.walk12())[-1].strip("| ").split(" | ")
-    assert cells[:2] == ["paper, lambda 1", "0.45"]
-    assert cells[2].startswith("falls at") and int(cells[3]) < 5 and cells[4] == "-"
