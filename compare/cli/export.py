@@ -59,13 +59,9 @@ def export(
         OUTPUT_FILE,
     ] = None,
     period_ms: Annotated[int, typer.Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
-    option: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="For solver and nl: option of the problem; repeatable."),
-    ] = None,
     values: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="For solver and nl: parameter or bound; repeatable."),
+        typer.Option("--set", metavar="NAME=VALUE", help="For solver and nl: option, parameter or bound; repeatable."),
     ] = None,
     code: Code = None,
     as_json: AsJson = False,
@@ -82,16 +78,14 @@ def export(
     if to not in (*GAITS, *PROBLEMS):
         raise unknown("kind", to, [*GAITS, *PROBLEMS])
     name_all(code)
-    changes = ProblemOptions(option=option, values=values)
+    changes = ProblemOptions(values=values)
     if to in PROBLEMS:
         if out is None:
             raise InputError(f"--to {to} writes several files; name their folder by --out DIR")
         written: Sequence[Path] = PROBLEMS[to](source, changes, out)
     else:
         if changes != ProblemOptions():
-            raise InputError(
-                f"--to {to} writes a stored gait with its own options and values; leave out --option and --set"
-            )
+            raise InputError(f"--to {to} writes a stored gait with its own options and values; leave out --set")
         result, path = load_result(Path(source)), Path(source)
         target = check_output_file(out or path.with_name(path.stem + GAITS[to].ending))
         with report_interrupts():
@@ -120,7 +114,7 @@ def _write_film(path: Path, result: Result, period_ms: int) -> None:
 
 def _write_objective(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
     if changes != ProblemOptions():
-        raise InputError("--to objective writes an instance as it is; leave out --option and --set")
+        raise InputError("--to objective writes an instance as it is; leave out --set")
     return export_objective(gaitbench.load(source), folder)
 
 

@@ -41,7 +41,7 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
     ("arguments", "words"),
     [
         (["export", "GAIT", "--to", "webot"], ["unknown kind 'webot'", "webots"]),
-        (["export", "GAIT", "--to", "csv", "--set", "a=1"], ["leave out --option and --set"]),
+        (["export", "GAIT", "--to", "csv", "--set", "a=1"], ["leave out --set"]),
         (["export", "nao-ssp", "--to", "nl"], ["name their folder by --out DIR"]),
         (["export", "absent.json", "--to", "csv"], ["'absent.json' cannot be read"]),
         (["export", "GAIT", "--to", "gif", "--out", "walk.avi"], ["must end in .gif or .mp4"]),
