@@ -16,7 +16,6 @@ PACKAGES = {
     "cluster": ("dask", "distributed"),
     "dev": ("iohinspector",),
     "docs": ("sphinx_gallery", "nbclient", "latex2mathml", "ziglang"),
-    "parquet": ("pyarrow",),
     "sim": ("mujoco",),
     "test": ("flint", "pandas", "pinocchio"),
     "urdf": ("urdf_parser_py", "lxml"),

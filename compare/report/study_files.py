@@ -1,4 +1,4 @@
-"""Files of a study for other programs and papers: CSV, Parquet, LaTeX tables with booktabs, figures as PDF."""
+"""Files of a study for other programs and papers: CSV, LaTeX tables with booktabs, figures as PDF."""
 
 import math
 from collections.abc import Sequence
@@ -15,8 +15,7 @@ from compare.drawing import PAPER_STYLE
 from compare.drawing.figures import add_styles, check_style, save_pdf
 from compare.report.problem_section import FIGURES
 from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
-from nlp_gait.errors import MissingExtraError
-from nlp_gait.files import format_csv, make_file_name, replace_file, replace_nan, write_text
+from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
 
 TableRows = Sequence[Sequence[object]]
 """Header and rows; None for an unknown value."""
@@ -30,7 +29,6 @@ class FurtherFiles:
     """Which files to write beside a study's report."""
 
     csv: bool = False  #: all runs, and the points of each problem; written again, too, where they exist already
-    parquet: bool = False  #: the same table of runs
     latex: bool = False  #: a table of each problem
     pdf: bool = False  #: figures of each problem one column wide, and their captions in LaTeX
     style: Path | None = None  #: matplotlib style file of the PDF figures, on top of ``paper.mplstyle``
@@ -40,7 +38,6 @@ class FurtherFiles:
 
         Raises:
             InputError: Matplotlib cannot read the style file.
-            MissingExtraError: pyarrow is not installed.
             OutputError: a file cannot be written.
         """
         if self.style is not None:
@@ -50,8 +47,6 @@ class FurtherFiles:
             tables = {"runs": make_runs_table(comparisons), **_make_point_tables(comparisons)}
             for name, rows in tables.items():
                 written.append(write_text(folder / f"{name}.csv", format_csv(replace_nan(rows))))
-        if self.parquet:
-            written.append(_write_parquet(folder / "runs.parquet", make_runs_table(comparisons)))
         for comparison in comparisons:
             stem = folder / make_file_name(comparison.problem)
             if self.latex:
@@ -92,19 +87,6 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
             ),
         ]
     return tables
-
-
-def _write_parquet(path: Path, table: TableRows) -> Path:
-    try:
-        import pyarrow
-        from pyarrow.parquet import write_table
-    except ImportError as error:
-        raise MissingExtraError(f"--parquet needs pyarrow ({error}): pip install 'nlp-gait[parquet]'") from error
-    header, *rows = table
-    columns = {str(name): pyarrow.array(column) for name, column in zip(header, zip(*rows, strict=True), strict=True)}
-    with replace_file(path) as file:
-        write_table(pyarrow.table(columns), file)
-    return path
 
 
 def _write_figures(stem: Path, comparison: Comparison, style: Path | None) -> list[Path]:

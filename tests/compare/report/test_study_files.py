@@ -68,15 +68,6 @@ def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp
     assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
 
 
-@pytest.mark.slow
-def test_parquet_has_the_same_runs(records: list[RunRecord], tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
-    (path,) = FurtherFiles(parquet=True).write(tmp_path, compare_problems(records))
-    rows = parquet.read_table(path).to_pylist()
-    assert [row["solver"] for row in rows] == ["pso"] * 6 + ["RD_1 50"] * 6
-    assert [row["objective"] for row in rows[:6]] == [r.verdict.objective for r in records if r.solver == "pso"]
-
-
 @pytest.mark.parametrize(
     ("style", "message"), [("figur.figsize: 3, 2", "'figur.figsize' is no setting"), ("font.size: big", "font.size")]
 )
