@@ -18,7 +18,6 @@ from tests.referee.series import Array, Series, atan2, cubic, sincos, sqrt, stac
 
 GRAVITY = 9.8  # text after eq. (26)
 HEAT = 0.025  # K of eq. (32)
-SAMPLES = 11  # ten equal parts (section 4.1)
 THIGH, TIBIA = 0.100, 0.1029  # Table 1
 HIP_Y, HIP_Z, ANKLE = 0.050, 0.085, 0.04519  # Table 1
 FRONT, BACK, SIDE = 0.10, 0.05, 0.04  # eqs. (21), (22)
@@ -27,6 +26,17 @@ LEG = ("HipYawPitch", "HipRoll", "HipPitch", "KneePitch", "AnklePitch", "AnkleRo
 ARM = ("ShoulderPitch", "ShoulderRoll", "ElbowYaw", "ElbowRoll", "WristYaw")
 JOINTS = tuple(f"{side}{name}" for part in (LEG, ARM) for side in "LR" for name in part)
 TRUNK = ("torso", "Neck", "Head")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """What the paper's text leaves open."""
+
+    samples: int = 11  # ten equal parts (section 4.1), or ten samples
+    as_printed: bool = False  # (19), (20) with z'' - g and without a term I omega
+    lumped: bool = (
+        False  # neck and head of double support at the torso's centre of mass in the ZMP: 23 masses (section 3.2)
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,6 +50,8 @@ class Link:
         force: (3, N) rate of its momentum with the weight that is to be carried, m (a + g) [N].
         moment: (3, N) rate of its angular momentum about its own centre of mass [Nm].
         centre: (3, N) centre of mass [m].
+        mass: of the link [kg], or of a share of it.
+        acceleration: (3, N) of the centre of mass [m/s^2].
     """
 
     joint: str
@@ -48,6 +60,8 @@ class Link:
     force: Array
     moment: Array
     centre: Array
+    mass: Array | float
+    acceleration: Array
 
 
 def robot() -> Mapping[str, Any]:
@@ -57,11 +71,11 @@ def robot() -> Mapping[str, Any]:
     return data
 
 
-def single_support(X: Array, robot: Mapping[str, Any]) -> dict[str, Array]:
+def single_support(X: Array, robot: Mapping[str, Any], reading: Reading = Reading()) -> dict[str, Array]:
     """Objective, rows and indexes by name, each (P,), at X (P, 9)."""
     x1, x2, x3, x4, x5, x6, x7, x8, x9 = X.T[:, None, :]
-    T = np.broadcast_to(x9, (SAMPLES, len(X)))
-    t = time(np.linspace(0.0, 1.0, SAMPLES)[:, None] * x9, 2)
+    T = np.broadcast_to(x9, (reading.samples, len(X)))
+    t = time(np.linspace(0.0, 1.0, reading.samples)[:, None] * x9, 2)
     hip = stack(
         [cubic(t, T, (0.03, 0.09), (x4, x5)), cubic(t, T, (0.025, 0.025), (x6, x7)), cubic(t, T, (x1, x1), (x2, x3))]
     )  # Table 3, rows 3 to 5
@@ -72,16 +86,16 @@ def single_support(X: Array, robot: Mapping[str, Any]) -> dict[str, Array]:
     angles, reach = _posture(t, T, hip, {"L": t.like(0.0) + _column(STANCE), "R": swing}, arms)
     links = _links(robot, hip, angles)
     torque = _torques(links, {"L": None}, robot)
-    zmp, _ = _zmp(links.values())
+    zmp, _ = _zmp(links.values(), reading)
     margins = (_margin(zmp[0], STANCE[0], FRONT, BACK), _margin(zmp[1], STANCE[1], SIDE, SIDE))
     return _collected(torque, angles, reach, margins, T)
 
 
-def double_support(X: Array, robot: Mapping[str, Any]) -> dict[str, Array]:
+def double_support(X: Array, robot: Mapping[str, Any], reading: Reading = Reading()) -> dict[str, Array]:
     """The same at X (P, 8)."""
     x1, x2, x3, x4, x5, x6, x7, x8 = X.T[:, None, :]
-    T = np.broadcast_to(x8, (SAMPLES, len(X)))
-    t = time(np.linspace(0.0, 1.0, SAMPLES)[:, None] * x8, 2)
+    T = np.broadcast_to(x8, (reading.samples, len(X)))
+    t = time(np.linspace(0.0, 1.0, reading.samples)[:, None] * x8, 2)
     hip = stack(
         [cubic(t, T, (0.07, 0.11), (x4, x5)), cubic(t, T, (0.025, -0.025), (x6, x7)), cubic(t, T, (x1, x1), (x2, x3))]
     )  # Table 5
@@ -93,7 +107,11 @@ def double_support(X: Array, robot: Mapping[str, Any]) -> dict[str, Array]:
     from_left, from_right = STANCE[1] - y, y - LANDED[1]
     shares = {"L": from_left / (from_left + from_right), "R": from_right / (from_left + from_right)}  # (28), (29)
     torque = _torques(links, shares, robot)
-    points, loads = zip(*(_zmp(_half(links, side, share)) for side, share in shares.items()), strict=True)
+    placed = dict(links)
+    if reading.lumped:
+        torso = links["torso"]
+        placed |= {name: replace(links[name], centre=torso.centre, acceleration=torso.acceleration) for name in TRUNK}
+    points, loads = zip(*(_zmp(_half(placed, side, share), reading) for side, share in shares.items()), strict=True)
     zmp = (points[0] * loads[0] + points[1] * loads[1]) / (loads[0] + loads[1])  # (30), (31)
     box = (STANCE[0] - BACK, LANDED[0] + FRONT), (LANDED[1] - SIDE, STANCE[1] + SIDE)
     margins = tuple(np.minimum(zmp[k] - low, high - zmp[k]) for k, (low, high) in enumerate(box))
@@ -163,7 +181,16 @@ def _link(joint: str, robot: Mapping[str, Any], name: str, R: Series, place: Ser
     momentum = np.einsum("ij...,j...->i...", I, rate)
     moment = np.einsum("ij...,j...->i...", I, acceleration) + np.cross(rate, momentum, axis=0)
     force = data["mass_kg"] * (centre.d(2) + np.array([0.0, 0.0, GRAVITY])[:, None, None])
-    return Link(joint=joint, place=place.d(0), axis=axis, force=force, moment=moment, centre=centre.d(0))
+    return Link(
+        joint=joint,
+        place=place.d(0),
+        axis=axis,
+        force=force,
+        moment=moment,
+        centre=centre.d(0),
+        mass=data["mass_kg"],
+        acceleration=centre.d(2),
+    )
 
 
 def _rotation(axis: Array, angle: Series) -> Series:
@@ -189,9 +216,20 @@ def _applied(A: Series, v: Array) -> Series:
     return Series(np.einsum("nij...,j->ni...", A.c, v))
 
 
-def _zmp(links: Iterable[Link]) -> tuple[Array, Array]:
-    """Where the ground's force acts without a moment about x and y: eqs. (19), (20) with the sign of g made physical."""
+def _zmp(links: Iterable[Link], reading: Reading) -> tuple[Array, Array]:
+    """Where the ground's force acts without a moment about x and y, and that force: eqs. (19), (20)."""
     chosen = list(links)
+    if reading.as_printed:
+        load = sum(link.mass * (link.acceleration[2] - GRAVITY) for link in chosen)
+        places = [
+            sum(
+                link.mass * (link.centre[k] * (link.acceleration[2] - GRAVITY) - link.acceleration[k] * link.centre[2])
+                for link in chosen
+            )
+            / load
+            for k in range(2)
+        ]
+        return np.stack(places), load
     force = sum(link.force for link in chosen)
     moment = sum(link.moment + np.cross(link.centre, link.force, axis=0) for link in chosen)
     return np.stack([-moment[1], moment[0]]) / force[2], force[2]
@@ -202,7 +240,7 @@ def _half(links: Mapping[str, Link], side: str, share: Array) -> list[Link]:
     own = [link for link in links.values() if link.joint[:1] == side]
     for name in TRUNK:
         part = links[name]
-        own.append(replace(part, force=share * part.force, moment=share * part.moment))
+        own.append(replace(part, force=share * part.force, moment=share * part.moment, mass=share * part.mass))
     return own
 
 
@@ -259,9 +297,10 @@ def _collected(
 ) -> dict[str, Array]:
     """Objective, rows, indexes, each (P,)."""
     drawn = sum(np.abs(torque[name] * angles[name].d(1)) + HEAT * torque[name] ** 2 for name in JOINTS)
-    weights = np.full(SAMPLES, 1.0)
+    samples = len(T)
+    weights = np.full(samples, 1.0)
     weights[[0, -1]] = 0.5
-    found = {"power_W": weights @ drawn / (SAMPLES - 1)}  # (32), trapezoids
+    found = {"power_W": weights @ drawn / (samples - 1)}  # (32), trapezoids
     found |= {f"joint_angle[{name}, {k}]": q for name in JOINTS for k, q in enumerate(angles[name].d(0))}
     sides = {"L": "left", "R": "right"}
     found |= {f"reach[{sides[side]} leg, {k}]": value for side in "LR" for k, value in enumerate(reach[side])}

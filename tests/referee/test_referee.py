@@ -7,6 +7,7 @@ number of points says how much that is.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,17 +70,39 @@ def worst(found: Mapping[str, float]) -> tuple[float, str]:
     return max((error, name) for name, error in found.items())
 
 
-@pytest.mark.parametrize("phase", ["single_support", pytest.param("double_support", marks=pytest.mark.slow)])
-def test_nao_phases_by_momentum_alone(phase: str) -> None:
+READINGS = [
+    (nao.Reading(), {}),
+    (nao.Reading(samples=10, as_printed=True), {"intervals": 9, "zmp_gravity": "printed"}),
+    (
+        nao.Reading(samples=10, as_printed=True, lumped=True),
+        {"intervals": 9, "zmp_gravity": "printed", "zmp_masses": 23},
+    ),
+]
+PHASES = {"single_support": "nao-ssp", "double_support": "nao-dsp"}
+
+
+@pytest.mark.parametrize(
+    ("phase", "reading", "options"),
+    [
+        pytest.param(
+            phase, *reading, marks=() if reading is READINGS[0] and phase == "single_support" else pytest.mark.slow
+        )
+        for phase in PHASES
+        for reading in READINGS
+        if phase == "double_support" or not reading[0].lumped
+    ],
+)
+def test_nao_phases_by_momentum_alone(phase: str, reading: nao.Reading, options: dict[str, Any]) -> None:
     """All rows, and power, against links whose momenta are Taylor series in time; no recursion of forces, no symbols."""
-    problem = nlp_gait.load({"single_support": "nao-ssp", "double_support": "nao-dsp"}[phase])
+    problem = nlp_gait.load(PHASES[phase], **options)
     robot = nao.robot()
 
     def referee(X: Array) -> Mapping[str, Array]:
-        return getattr(nao, phase)(X, robot)  # type: ignore[no-any-return]
+        return getattr(nao, phase)(X, robot, reading)  # type: ignore[no-any-return]
 
     found = compared(problem, referee, drawn(problem, referee, 300))
-    assert len(found) == 12 * 11 + 22 * 10 + 2 * 12 + 6
+    n = reading.samples
+    assert len(found) == 12 * n + 22 * (n - 1) + 2 * (n + 1) + 6
     assert worst(found)[0] < AGREEMENT, worst(found)
 
 

@@ -95,6 +95,8 @@ class Body(ABC):
     torque_scale: float = 1.0  # torques relative to NAO's
     # Joints of arms that the legs do not carry: each arm is a chain of its own on a torso at rest
     separate_joints: tuple[str, ...] = ()
+    # Whether the share of the torso that a leg carries in double support includes these arms
+    carries_shared_arms: bool = False
 
     @property
     def robot(self) -> Robot:
@@ -132,17 +134,35 @@ class Body(ABC):
     ) -> tuple[dict[str, SX], Wrench]:
         """Return the torques of the joints above a fixed link, and the wrench on it; see ``newton_euler``."""
 
-        def solve(link: str, names: Sequence[str]) -> tuple[dict[str, SX], Wrench]:
+        def solve(
+            link: str, names: Sequence[str], factors: Mapping[str, SX] | None = shares
+        ) -> tuple[dict[str, SX], Wrench]:
             tree = make_tree(self.robot, link, names)
-            return newton_euler(tree, q, qd, qdd, self.gravity_vector, shares, self.upright)
+            return newton_euler(tree, q, qd, qdd, self.gravity_vector, factors, self.upright)
 
         q, qd, qdd = ({name: motion[order] for name, motion in motions.items()} for order in range(3))
         torques, wrench = solve(fixed_link, joints)
         arms = [name for name in joints if name in self.separate_joints]
-        if arms:
-            legs = [name for name in joints if name not in arms]
+        legs = [name for name in joints if name not in arms]
+        if arms and shares and self.carries_shared_arms:
+            (share,) = shares.values()
+            carried = {self.robot.joint(name).child: share for name in self.separate_joints}
+            torques = solve(fixed_link, (*legs, *self.separate_joints), {**shares, **carried})[0]
+            torques = {name: torques[name] for name in legs} | solve(self.robot.root, arms)[0]
+        elif arms:
             torques = solve(self.robot.root, arms)[0] | solve(fixed_link, legs)[0]
         return torques, wrench
+
+    def find_zmp_wrench(
+        self,
+        wrench: Wrench,
+        fixed_link: str,
+        joints: Sequence[str],
+        motions: Mapping[str, Motion],
+        shares: Mapping[str, SX] | None = None,
+    ) -> Wrench:
+        """Return the wrench on a fixed link from which its ZMP follows: by default that of the dynamics."""
+        return wrench
 
     def ankle(self, side: str) -> tuple[float, float]:
         """Return the place of an ankle above its foot ``"L"`` or ``"R"``: across the walking direction, and its height [m]."""

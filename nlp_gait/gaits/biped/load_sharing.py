@@ -185,15 +185,16 @@ def make_divided_loads(body: Body, rule: Division) -> Loader:
         zmps, ground_loads, wrenches = [], [], {}
         for side, name in BOTH_FEET.items():
             foot = robot.feet[name]
-            own, wrench = body.compute_torques(foot.link, body.leg_joints[side], now.joints, {robot.root: shares[side]})
+            half = foot.link, body.leg_joints[side], now.joints, {robot.root: shares[side]}
+            own, wrench = body.compute_torques(*half)
+            acting = body.find_zmp_wrench(wrench, *half)
             height = foot.ankle_height_m
             if side == "R" and now.yaw.shape[0]:  # from the axes of its foot
-                wrench = Wrench(*(axis_rotation(UP, now.yaw) @ part for part in wrench))
-            offset = balance.zmp_of_wrench(wrench, height, weight)
+                wrench, acting = (Wrench(*(axis_rotation(UP, now.yaw) @ part for part in w)) for w in (wrench, acting))
             wrenches[side] = balance.shift_down(wrench, height)
             torques |= own
-            zmps.append(now.ankles[side][:2] + offset)
-            ground_loads.append(balance.ground_load(wrench, weight))
+            zmps.append(now.ankles[side][:2] + balance.zmp_of_wrench(acting, height, weight))
+            ground_loads.append(balance.ground_load(acting, weight))
         return now._replace(torques=torques, zmp=balance.combine_zmps(zmps, ground_loads), wrenches=wrenches)
 
     return loads

@@ -32,7 +32,9 @@ from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 from nlp_gait.symbolic.tape import simplify, tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion
 
-Derivatives = Literal["analytic", "finite-difference"]
+# Analytic ones, or differences of the sampled angles: central, one-sided at the ends of first order as in MATLAB's ``gradient``,
+# the paper's environment, or of second order.
+Derivatives = Literal["analytic", "finite-difference", "finite-difference-2"]
 
 # Force of the ground on each sole, and its moment about the point under the ankle.
 WRENCHES = {
@@ -147,7 +149,7 @@ class Phase:
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
         q, qd, qdd, hip, _, _, world, attitude = self._map(self._exact_kinematics, [at])
-        if self.derivatives == "finite-difference":
+        if self.derivatives != "analytic":
             qd, qdd = self._differences(q, at)
         n = self.grid.parts + 1
         rows = [self.body.joints.index(name) for name in self.moving]
@@ -329,12 +331,13 @@ class Phase:
         """Differentiate sampled angles (m, N + 1) twice: central differences, one-sided at the ends.
 
         Source:
-            Gupta, Pratihar, Deb (2023), section 3.1: "numerical differentiation as per the given time interval"; the
-            stencil is that of MATLAB's ``gradient``, the paper's environment.
+            Gupta, Pratihar, Deb (2023), section 3.1: "numerical differentiation as per the given time interval".
         """
         n = self.grid.parts + 1
         stencil = np.zeros((n, n))
-        stencil[0, :2], stencil[-1, -2:] = (-1.0, 1.0), (-1.0, 1.0)
+        end = (-1.0, 1.0) if self.derivatives == "finite-difference" else (-1.5, 2.0, -0.5)
+        stencil[0, : len(end)] = end
+        stencil[-1, -len(end) :] = [-part for part in reversed(end)]
         for k in range(1, n - 1):
             stencil[k, k - 1], stencil[k, k + 1] = -0.5, 0.5
         rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(at[self.duration], LEAST_DURATION))

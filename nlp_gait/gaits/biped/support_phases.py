@@ -173,8 +173,9 @@ def make_single_support_loads(body: Body) -> Loader:
     foot = body.robot.feet["left"]
 
     def loads(now: Instant) -> Instant:
-        torques, wrench = body.compute_torques(foot.link, tuple(body.robot.joints), now.joints)
-        offset = zmp_of_wrench(wrench, foot.ankle_height_m, body.weight)
+        chain = foot.link, tuple(body.robot.joints), now.joints
+        torques, wrench = body.compute_torques(*chain)
+        offset = zmp_of_wrench(body.find_zmp_wrench(wrench, *chain), foot.ankle_height_m, body.weight)
         wrenches = {"L": shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
         return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)
 

@@ -6,7 +6,8 @@ Options that the problems share:
 
     robot                  name or file of the robot
     intervals              equal parts of a phase over which torques may change by the limit
-    derivatives            analytic, or finite-difference: of the sampled angles, as in the paper
+    derivatives            analytic, or finite-difference: of the sampled angles, as in the paper, of first order at the
+                           ends; finite-difference-2: of second order there, too
     rotational_inertia     false takes every link as a point mass, in torques and ZMP
     step_length_m          from foot to foot
     torso_share            rule that divides the torso's mass between the legs in double support, see
@@ -17,7 +18,13 @@ Options that the problems share:
                            cubics, 4 with splines and with planned loads, which would otherwise bend between the samples
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
     arms                   carried by the legs, or separate: in the torques the legs carry a torso without arms, and each arm
-                           moves on a torso at rest, the ZMP is that of all links; held: carried, at rest in the middle of
-                           their swing
+                           moves on a torso at rest, the ZMP is that of all links; shared: likewise, but in double
+                           support both arms add to the torso's mass that the legs share; held: carried, at rest in the
+                           middle of their swing
+    zmp_gravity            physical, or as printed in (19) and (20): the inertial part of the ZMP has the opposite sign, and
+                           links are point masses in it. It moves the margins of the printed solutions by up to 0.9 mm in
+                           single and 2.9 mm in double support
+    zmp_masses             23: neck and head of double support are at the torso's centre of mass in the ZMP, as the text
+                           counts there (25 in single support); moves the least margins by up to 0.3 mm
     motors                 features of the real motors, separated by commas, see ``gaits.biped.motors``; none by default
 """

@@ -28,7 +28,7 @@ from nlp_gait.gaits.biped.recorded_cycle import (
 from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, RecordedMotion, make_places_function
 from nlp_gait.gaits.biped.support_phases import make_support_phase, place_hip, place_soles, place_stance
 from nlp_gait.gaits.biped.walk import plan_whole_walk
-from nlp_gait.gaits.nao.body import ARM_SWING, Arms, make_nao
+from nlp_gait.gaits.nao.body import ARM_SWING, Arms, ZmpGravity, ZmpMasses, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
 from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES, check_step_length
 from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
@@ -49,6 +49,7 @@ def nao_ssp(
     objective: Criterion = "power",
     motors: str = "",
     arms: Arms = "carried",
+    zmp_gravity: ZmpGravity = "physical",
 ) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length.
 
@@ -56,9 +57,9 @@ def nao_ssp(
         Gupta, Pratihar, Deb (2023), sections 3.1 and 4.1.
     """
     check_step_length(step_length_m)
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms, zmp_gravity=zmp_gravity)
     power_form = None
-    if (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS and samples_per_interval < 2:
+    if (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and samples_per_interval < 2:
         places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
         power_form = make_power_form_maker(body.robot, partial(make_single_support, *places))
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
@@ -80,6 +81,8 @@ def nao_dsp(
     objective: Criterion = "power",
     motors: str = "",
     arms: Arms = "carried",
+    zmp_gravity: ZmpGravity = "physical",
+    zmp_masses: ZmpMasses = 25,
     load_degree: int = LOAD_DEGREE,
 ) -> GaitProblem:
     """Double support of NAO.
@@ -95,9 +98,16 @@ def nao_dsp(
         raise InputError(
             f"arms={arms!r} does not go with torso_share='free', where the legs carry all; choose arms='carried'"
         )
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms)
+    body = make_nao(
+        robot,
+        rotational_inertia=rotational_inertia,
+        motors=motors,
+        arms=arms,
+        zmp_gravity=zmp_gravity,
+        zmp_masses=zmp_masses,
+    )
     power_form = None
-    paper = (derivatives, trajectory, objective, motors, arms) == FORM_OPTIONS
+    paper = (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and zmp_masses == 25
     if paper and samples_per_interval < 2 and torso_share != "free":
         soles = place_soles(body, step_length_m)
         places = (soles, place_hip(body, soles), ARM_SWING["dsp"])
