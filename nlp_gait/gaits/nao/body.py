@@ -162,7 +162,7 @@ class NaoBody(Body):
         """
         if self.zmp_gravity == "physical" and self.zmp_masses == 25:
             return wrench
-        at_rest = {name: constant_motion(motion.position) for name, motion in motions.items()}
+        at_rest = {name: Motion(motion.position, SX(0), SX(0)) for name, motion in motions.items()}
         masses = self.lump_masses()
         moving, resting = (masses.compute_torques(fixed_link, joints, m, shares)[1] for m in (motions, at_rest))
         if self.zmp_gravity == "physical":
