@@ -121,7 +121,6 @@ class MostHipSpeed(Limit):
     parameters = (
         Parameter(name="hip_rate_limit_rad_s", unit="rad/s", default=10.0, description="largest rate of a hip's pitch"),
     )
-    reads_motion = True
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         limit = at["hip_rate_limit_rad_s"]

@@ -156,6 +156,7 @@ def make_walking_cycle(
             grid=grid,
             limits=(*make_phase_limits(body, margins[name]), *body.motors.limits, *more),
             goal=goal,
+            standing=("L",) if name == "ssp" else ("L", "R"),
         )
         for name, (plan, loads, more) in own.items()
     }

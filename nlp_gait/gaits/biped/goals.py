@@ -33,7 +33,6 @@ class Goal:
     objective: Objective = POWER  # name and unit
     power: PowerModel = compute_paper_power  # of the motors; if it is not the paper's, the paper's is an index too
     figure: Callable[[Samples], MX] | None = None  # of the samples; None for power
-    reads_motion: bool = False  # whether it reads angles or their derivatives
     heat: Parameter = HEAT_LOSS  # parameter K with the robot's default
 
     def evaluate(self, at: Point, samples: Samples, ops: Nonsmooth) -> tuple[MX, Mapping[str, MX], Mapping[str, MX]]:
@@ -55,7 +54,6 @@ INSTEAD = {
     "jerk": Goal(
         objective=Objective(name="joint_jerk", unit="rad^2/s^6"),
         figure=lambda samples: _average_squared_rate(samples.qdd, samples),
-        reads_motion=True,
     ),
     "torque": Goal(
         objective=Objective(name="squared_torque", unit="(Nm)^2"),

@@ -3,7 +3,6 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import casadi as ca
@@ -37,9 +36,6 @@ class Limit(ABC):
     """What limits a phase; a subclass overrides what it needs."""
 
     parameters: tuple[Parameter, ...] = ()  # of the limit, which can be changed without rebuilding
-    reads_motion: bool = False  # whether it reads angles and their derivatives
-    reads_wrenches: bool = False  # whether it reads those of the ground on the soles
-    traces: Mapping[str, Trace] = MappingProxyType({})  # other quantities that it reads at each instant, by name
 
     @abstractmethod
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
@@ -111,8 +107,6 @@ class Closure(Limit):
 
 class DriveLimits(Limit):
     """Torque and speed of every joint within the limits of the robot's file; ``size`` scales NAO's torques."""
-
-    reads_motion = True
 
     def __init__(self, robot: Robot, size: float) -> None:
         self._robot, self._size = robot, size
@@ -203,11 +197,12 @@ class AngleLimits(Limit):
     """Angles within the robot's limits between the ends, which a cubic cannot break; the trace is a column of them [rad]."""
 
     def __init__(self, name: str, robot: Robot, joints: Sequence[str], angles: Trace) -> None:
-        self._name, self._robot, self._joints = name, robot, tuple(joints)
-        self.traces = {name: angles}
+        self._name, self._robot, self._joints, self._angles = name, robot, tuple(joints), angles
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        return [make_angle_rows(self._name, self._robot, self._joints, samples.traces[self._name][:, 1:-1])], {}
+        return [
+            make_angle_rows(self._name, self._robot, self._joints, samples.trace(self._name, self._angles)[:, 1:-1])
+        ], {}
 
 
 def make_angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> Constraint:
@@ -224,10 +219,9 @@ class FootClearance(Limit):
 
     def __init__(self, path: Trace, middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height
-        self.traces = {"foot": path}
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        n, heights = samples.steps, samples.traces["foot"][2, 1:-1]
+        n, heights = samples.steps, samples.trace("foot", self._path)[2, 1:-1]
         above = make_rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         # Half the phase is a sample only on some grids.
         names = [name for name, (kind, _) in at.positions.items() if kind == "x"]

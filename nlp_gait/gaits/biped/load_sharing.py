@@ -208,7 +208,6 @@ SWITCH_LOAD = (
 class FootLimits(Limit):
     """What both soles can bear at every sample, how fast load may pass; ``load_slope`` is the right sole's by phase [N]."""
 
-    reads_wrenches = True
     parameters = table(
         ("friction_coefficient", "1", balance.SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
         ("load_rate_limit_1_s", "1/s", 12.5, "fastest change of a foot's load, in weights per second", 0.0, math.inf),
@@ -217,18 +216,18 @@ class FootLimits(Limit):
 
     def __init__(self, body: Body, load_slope: Trace) -> None:
         self._feet, self._weight = body.robot.feet, body.weight
-        self.traces = {"load_slope": load_slope}
+        self._load_slope = load_slope
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, mu = samples.steps + 1, at["friction_coefficient"]
         found, loads = [], {}
         for side, foot in BOTH_FEET.items():
-            kinds = _make_bearing_function(self._feet[foot]).map(n)(samples.wrenches[side], ca.repmat(mu, 1, n))
+            kinds = _make_bearing_function(self._feet[foot]).map(n)(samples.wrench(side), ca.repmat(mu, 1, n))
             for (name, unit, names), values in zip(ROWS, kinds, strict=True):
                 found.append(make_rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
-            loads[foot] = samples.wrenches[side][2, :] / self._weight
+            loads[foot] = samples.wrench(side)[2, :] / self._weight
         # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
-        right = samples.traces["load_slope"] / (samples.step_s * samples.steps * self._weight)
+        right = samples.trace("load_slope", self._load_slope) / (samples.step_s * samples.steps * self._weight)
         total = loads["left"] + loads["right"]
         changes = (total[1:] - total[:-1]) / samples.step_s
         rates = {"left": ca.horzcat(changes[0], (changes[:-1] + changes[1:]) / 2, changes[-1]) - right, "right": right}

@@ -142,7 +142,6 @@ class MotorLimits(Limit):
     """
 
     parameters = (SUPPLY,)
-    reads_motion = True
 
     def __init__(self, motors: Motors, ratings: Sequence[Motor]) -> None:
         self._motors, self._ratings = motors, ratings

@@ -1,14 +1,15 @@
 """A support phase of a spatial biped sampled over time: its motion and the loads on motors and ground."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
+from nlp_gait.errors import unknown
 from nlp_gait.formulation import (
     Array,
     Assembly,
@@ -25,7 +26,17 @@ from nlp_gait.formulation.gait_problem import Start
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
-from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant, Loader, Planner, Samples, Trace
+from nlp_gait.gaits.biped.samples import (
+    BOTH_FEET,
+    CORNERS,
+    LEAST_DURATION,
+    Instant,
+    Loader,
+    Placeholders,
+    Planner,
+    Samples,
+    Trace,
+)
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
@@ -49,6 +60,21 @@ COLUMNS = {
 }
 
 
+# Time histories by name, and the quantities that they are.
+HISTORIES = {
+    "q": "all_q",
+    "qd": "all_qd",
+    "qdd": "all_qdd",
+    "tau": "torque",
+    "zmp": "zmp",
+    "hip": "hip",
+    "com": "com",
+    "left_foot": "left_foot",
+    "right_foot": "right_foot",
+}
+OF_GROUND = tuple(f"wrench_{side}" for side in BOTH_FEET)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Phase:
     """A support phase: how the robot moves, which loads that causes, what limits it and what it minimises."""
@@ -62,6 +88,7 @@ class Phase:
     derivatives: Derivatives = "analytic"  # analytic ones, or finite differences of the sampled angles as in the paper
     limits: Sequence[Limit] = ()  # they add the rows
     goal: Goal = Goal()  # what it minimises
+    standing: tuple[str, ...] = ("L", "R")  # sides of the feet on the ground
     state: tuple[Parameter, ...] = ()  # at the start, if it is measured
     kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
     start: Start | None = None  # start points; None for any within the bounds
@@ -90,43 +117,64 @@ class Phase:
 
     def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
         """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
-        traces, reads_wrenches = self._traces, self._reads_wrenches
+        names, traces = self._names_read, self._requests.traces
         if self.derivatives == "analytic":
-            reads_motion = self._reads_motion
-            found = self._map_instant(ats, ops, phases)
+            columns = self._map_instant(ats, ops, phases)
         else:
-            kinematics = self._write_kinematics(*self._symbolic_plan(ops), traces, self.moving)
-            q, _, _, hip, planned, reach, world, _, *seen = self._map(kinematics, ats)
-            n = self.grid.parts + 1
-            qd, qdd = self._differences(q, ats[0])
-            torque, moving, zmp = self._dynamics.map(n)(q, qd, qdd, hip, world)
-            wrenches = list(self._ground.map(n)(q, qd, qdd, hip, world)) if reads_wrenches else []
-            found = [planned, reach, torque, qd * moving, zmp, MX(0, n), *wrenches, q, qd, qdd, *seen]
-            reads_motion = True
-        columns = [[part] if len(ats) == 1 else ca.horzsplit(part, part.shape[1] // len(ats)) for part in found]
-        counts = (len(BOTH_FEET) * reads_wrenches, 3 * reads_motion, len(traces))
-        several = list[Samples]()
-        for k, at in enumerate(ats):
-            planned, reach, torque, power, zmp, miss, *rest = (part[k] for part in columns)
-            pushes, moved, seen = ([rest.pop(0) for _ in range(count)] for count in counts)
-            several.append(
-                Samples(
-                    joints=self.body.joints,
-                    moving=self.moving,
-                    per_interval=self.grid.samples_per_interval if phases is None else 1,
-                    duration=at[self.duration],
-                    planned=planned,
-                    reach=reach,
-                    torque=torque,
-                    power=power,
-                    zmp=zmp,
-                    miss=miss,
-                    wrenches=dict(zip(BOTH_FEET, pushes, strict=False)),
-                    traces=dict(zip(traces, seen, strict=True)),
-                    **dict(zip(("q", "qd", "qdd"), moved, strict=False)),
-                )
+            staged = self._make_stages(self._symbolic_plan(ops), names, traces)
+            columns = list(self._evaluate_stages(staged, ats[0]).values())
+        split = [[part] if len(ats) == 1 else ca.horzsplit(part, part.shape[1] // len(ats)) for part in columns]
+        return [
+            Samples(
+                joints=self.body.joints,
+                moving=self.moving,
+                standing=self.standing,
+                per_interval=self.grid.samples_per_interval if phases is None else 1,
+                duration=at[self.duration],
+                values={name: part[k] for name, part in zip((*names, *traces), split, strict=True)},
             )
-        return several
+            for k, at in enumerate(ats)
+        ]
+
+    def measure(self, name: str, now: Instant) -> SX:
+        """Return a quantity (k,) of an instant by name, see ``QUANTITIES``; raises UnknownNameError."""
+        if name not in QUANTITIES:
+            raise unknown("quantity of a phase", name, QUANTITIES)
+        return QUANTITIES[name](self, now)
+
+    def count_rows(self, name: str) -> int:
+        """Return the number of rows of a quantity by name; raises UnknownNameError."""
+        return int(self.measure(name, self._exact_now).shape[0])
+
+    @cached_property
+    def _requests(self) -> Placeholders:
+        """What limits and the goal read, found by adding them to symbols in place of samples."""
+        parameters = [parameter.name for parameter in self.parameters]
+        x, p = MX.sym("x", len(self.variables)), MX.sym("p", len(parameters))
+        at = Point.of(x, p, self.names, parameters)
+        symbols = Placeholders(
+            joints=self.body.joints,
+            moving=self.moving,
+            standing=self.standing,
+            per_interval=self.grid.samples_per_interval,
+            duration=at[self.duration],
+            rows=self.count_rows,
+            trace_rows=self._count_trace_rows,
+            count=self.grid.parts + 1,
+        )
+        for limit in self.limits:
+            limit.add(at, symbols, Exact())
+        self.goal.evaluate(at, symbols, Exact())
+        return symbols
+
+    def _count_trace_rows(self, trace: Trace) -> int:
+        (_, _, phase), _, at = self._exact_plan
+        return int(trace(at, phase).shape[0])
+
+    @property
+    def _names_read(self) -> tuple[str, ...]:
+        """Quantities to evaluate: those of every phase, and what limits and the goal read besides."""
+        return (*BASE, *(name for name in self._requests.names if name not in BASE))
 
     def rows_over_time(self, name: str = "", begins: tuple[str, ...] = ()) -> tuple[RowsOverTime, ...]:
         """Return the phase as functions of time, after those of the durations ``begins``; nothing with finite differences."""
@@ -148,32 +196,21 @@ class Phase:
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        q, qd, qdd, hip, _, _, world, attitude = self._map(self._exact_kinematics, [at])
-        if self.derivatives != "analytic":
-            qd, qdd = self._differences(q, at)
+        found = {name: _to_array(part) for name, part in self._evaluate_stages(self._signal_stages, at).items()}
         n = self.grid.parts + 1
-        rows = [self.body.joints.index(name) for name in self.moving]
-        torque, zmp, *wrenches = self._signal_loads.map(n)(q[rows, :], qd[rows, :], qdd[rows, :], hip, world)
-        com, left, right, *_ = (_to_array(part) for part in ca.vertsplit(world, 3))
-        halves = (_to_array(half) for wrench in wrenches for half in ca.vertsplit(wrench, 3))
         arrays = {
             "t": _to_array(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
-            "q": _to_array(q),
-            "qd": _to_array(qd),
-            "qdd": _to_array(qdd),
-            "tau": _to_array(torque),
-            "zmp": _to_array(zmp),
-            "hip": _to_array(hip),
-            "com": com,
-            "left_foot": left,
-            "right_foot": right,
-            **dict(zip(WRENCHES, halves, strict=True)),
+            **{name: found[quantity] for name, quantity in HISTORIES.items()},
+            **{
+                f"{foot}_{half}": part
+                for side, foot in BOTH_FEET.items()
+                for half, part in zip(("force", "moment"), np.hsplit(found[f"wrench_{side}"], 2), strict=True)
+            },
         }
-        if attitude.shape[0]:
-            arrays["attitude"] = _to_array(attitude)
-        if self._exact_plan[1].yaw.shape[0]:
-            yaw = _to_array(world)[:, -1]
-            arrays["feet_yaw"] = np.stack([np.zeros(n), yaw], axis=1)
+        if found["attitude"].size:
+            arrays["attitude"] = found["attitude"]
+        if found["yaw"].size:
+            arrays["feet_yaw"] = np.column_stack([np.zeros(n), found["yaw"]])
         columns = COLUMNS | {name: SIMULATED[name] for name in ("attitude", "feet_yaw") if name in arrays}
         return Signals(joints=self.body.joints, arrays=arrays, columns=columns)
 
@@ -182,10 +219,6 @@ class Phase:
         """Joints whose angle changes over the phase."""
         joints = self._exact_plan[1].joints
         return tuple(name for name in self.body.joints if not joints[name].velocity.is_zero())
-
-    @cached_property
-    def _exact_kinematics(self) -> ca.Function:
-        return self._write_kinematics(*self._exact_plan, {}, self.body.joints)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -206,17 +239,9 @@ class Phase:
         at = InstantPoint.of(x, known, self.names, self.known)
         return [x, known, phase], self.plan(at, phase, ops), at
 
-    @property
-    def _traces(self) -> dict[str, Trace]:
-        return {name: trace for limit in self.limits for name, trace in limit.traces.items()}
-
-    @property
-    def _reads_wrenches(self) -> bool:
-        return any(limit.reads_wrenches for limit in self.limits)
-
-    @property
-    def _reads_motion(self) -> bool:
-        return self.goal.reads_motion or any(limit.reads_motion for limit in self.limits)
+    @cached_property
+    def _exact_now(self) -> Instant:
+        return self.loads(self._exact_plan[1])
 
     @cached_property
     def _exact_instant(self) -> ca.Function:
@@ -246,66 +271,47 @@ class Phase:
     def _instant_outputs(self, ops: Nonsmooth) -> tuple[list[SX], list[SX]]:
         """Return x, margin and phase of one instant, and its outputs for ``sample``, with analytic derivatives."""
         inputs, plan, at = self._exact_plan if ops.exact else self._symbolic_plan(ops)
-        loads = self.loads(plan)
-        power = ca.vertcat(*(plan.joints[name].velocity * loads.torques[name] for name in self.moving))
-        planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
-        torque = ca.vertcat(*(loads.torques[name] for name in self.body.joints))
-        outputs = [planned, plan.reach, torque, power, loads.zmp, plan.miss]
-        outputs += [loads.wrenches[side] for side in BOTH_FEET] if self._reads_wrenches else []
-        outputs += _stack_motions(plan, self.moving) if self._reads_motion else []
-        outputs += [trace(at, inputs[2]) for trace in self._traces.values()]
-        return inputs, outputs
+        now = self._exact_now if ops.exact else self.loads(plan)
+        outputs = [self.measure(name, now) for name in self._names_read]
+        return inputs, outputs + [trace(at, inputs[2]) for trace in self._requests.traces.values()]
 
-    def _write_kinematics(
-        self, inputs: list[SX], plan: Instant, at: InstantPoint, traces: Mapping[str, Trace], joints: Sequence[str]
-    ) -> ca.Function:
-        """One sample: motion, hip, planned angles, reach, world (mass centre, feet, planned wrench, yaw), attitude, traces."""
-        planned = ca.vertcat(*(plan.joints[name].position for name in self.body.planned))
-        tree = make_tree(self.body.robot, self.body.robot.feet["left"].link)
-        angles = {name: joint.position for name, joint in plan.joints.items()}
-        com = centre_of_mass(tree, forward_kinematics(tree, angles, plan.ankles["L"]))
-        soles = [
-            plan.ankles[side] - SX([0, 0, self.body.robot.feet[foot].ankle_height_m])
-            for side, foot in BOTH_FEET.items()
-        ]
-        world = ca.vertcat(com, *soles, plan.wrench, plan.yaw)
-        seen = [trace(at, inputs[2]) for trace in traces.values()]
-        known = [plan.hip, planned, plan.reach, world, plan.attitude]
-        return ca.Function("kinematics", inputs, [*_stack_motions(plan, joints), *known, *seen])
-
-    @cached_property
-    def _dynamics(self) -> ca.Function:
-        """One sample: torques, those of the moving joints, and ZMP."""
-        inputs, loads = self._loads
-        torque, moving = (
-            ca.vertcat(*(loads.torques[name] for name in names)) for names in (self.body.joints, self.moving)
-        )
-        return ca.Function("dynamics", inputs, simplify([torque, moving, loads.zmp]))
-
-    @cached_property
-    def _ground(self) -> ca.Function:
-        """One sample: wrenches (6,) on both soles."""
-        inputs, loads = self._loads
-        return ca.Function("ground", inputs, simplify([loads.wrenches[side] for side in BOTH_FEET]))
-
-    @cached_property
-    def _signal_loads(self) -> ca.Function:
-        """One sample: torques, ZMP and wrenches; not simplified, which takes longer than evaluating it as often as signals do."""
-        inputs, loads = self._loads
-        torque = ca.vertcat(*(loads.torques[name] for name in self.body.joints))
-        return ca.Function("loads", inputs, [torque, loads.zmp, *(loads.wrenches[side] for side in BOTH_FEET)])
-
-    @cached_property
-    def _loads(self) -> tuple[list[SX], Instant]:
-        """Return angles, both derivatives, hip and world (see ``_write_kinematics``), and the loads as functions of these."""
-        plan = self._exact_plan[1]
+    def _make_stages(
+        self, planned: tuple[list[SX], Instant, InstantPoint], names: Sequence[str], traces: Mapping[str, Trace]
+    ) -> "Stages":
+        """Return the evaluation of quantities in two stages: the motion, then the loads that it causes."""
+        inputs, plan, at = planned
+        of_motion = [name for name in names if name in OF_MOTION]
+        of_loads = [name for name in names if name not in OF_MOTION | ALL_JOINTS]
+        world = [plan.hip, *plan.ankles.values(), plan.wrench, plan.yaw]
+        outputs = [*_stack_motions(plan, self.body.joints), ca.vertcat(*world)]
+        outputs += [self.measure(name, plan) for name in of_motion]
+        outputs += [trace(at, inputs[2]) for trace in traces.values()]
+        motion = ca.Function("motion", inputs, outputs)
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
-        sizes = (3, 3, 3, plan.wrench.shape[0], plan.yaw.shape[0])
-        hip, world = SX.sym("hip", 3), SX.sym("world", sum(sizes))
-        _, left, right, wrench, yaw = ca.vertsplit(world, np.cumsum([0, *sizes]).tolist())
+        given = SX.sym("world", ca.vertcat(*world).shape[0])
+        ends = np.cumsum([0, *(part.shape[0] for part in world)]).tolist()
+        hip, left, right, wrench, yaw = ca.vertsplit(given, ends)
         moved = {name: Motion(*(part[i] for part in parts)) for i, name in enumerate(self.moving)}
-        now = Instant(joints={**plan.joints, **moved}, hip=hip, ankles={"L": left, "R": right}, wrench=wrench, yaw=yaw)
-        return [*parts, hip, world], self.loads(now)
+        joints = {**self._exact_plan[1].joints, **moved}
+        now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, wrench=wrench, yaw=yaw))
+        loads = ca.Function("loads", [*parts, given], [self.measure(name, now) for name in of_loads])
+        return Stages(motion, loads, of_motion, of_loads, tuple(names), tuple(traces))
+
+    def _evaluate_stages(self, stages: "Stages", at: NumericPoint) -> dict[str, MX]:
+        """Evaluate quantities and traces at all samples, by their names; derivatives may be finite differences."""
+        q, qd, qdd, world, *others = self._map(stages.motion, [at])
+        if self.derivatives != "analytic":
+            qd, qdd = self._differences(q, at)
+        rows = [self.body.joints.index(name) for name in self.moving]
+        loads = stages.loads.map(self.grid.parts + 1)(q[rows, :], qd[rows, :], qdd[rows, :], world)
+        found = dict(zip((*stages.of_motion, *stages.traces), others, strict=True))
+        found |= dict(zip(stages.of_loads, loads if isinstance(loads, tuple) else [loads], strict=True))
+        found |= {"all_q": q, "all_qd": qd, "all_qdd": qdd}  # see ``ALL_JOINTS``
+        return {name: found[name] for name in (*stages.names, *stages.traces)}
+
+    @cached_property
+    def _signal_stages(self) -> "Stages":
+        return self._make_stages(self._exact_plan, (*HISTORIES.values(), *OF_GROUND, "attitude", "yaw"), {})
 
     def _map(self, function: ca.Function, ats: Sequence[Point], *columns: MX, phases: MX | None = None) -> list[Any]:
         """Evaluate a function of columns and (x, margin, phase) at all samples, or at other phases (1, k), of each point.
@@ -343,6 +349,55 @@ class Phase:
         rate = ca.sparsify(DM(stencil)).T * (self.grid.parts / ca.fmax(at[self.duration], LEAST_DURATION))
         qd = q @ rate
         return qd, qd @ rate
+
+
+class Stages(NamedTuple):
+    """Functions of the motion and of the loads that it causes at one instant, and the names of their outputs."""
+
+    motion: ca.Function
+    loads: ca.Function
+    of_motion: Sequence[str]
+    of_loads: Sequence[str]
+    names: tuple[str, ...]  # of all quantities, in order
+    traces: tuple[str, ...]
+
+
+def _locate_sole(phase: Phase, now: Instant, side: str) -> SX:
+    """Return the point (3,) of a flat sole under its ankle [m]."""
+    return now.ankles[side] - SX([0, 0, phase.body.robot.feet[BOTH_FEET[side]].ankle_height_m])
+
+
+def _locate_mass(phase: Phase, now: Instant) -> SX:
+    tree = make_tree(phase.body.robot, phase.body.robot.feet["left"].link)
+    angles = {name: joint.position for name, joint in now.joints.items()}
+    return centre_of_mass(tree, forward_kinematics(tree, angles, now.ankles["L"]))
+
+
+# Quantities of an instant by name, columns.
+QUANTITIES: dict[str, Callable[[Phase, Instant], SX]] = {
+    "planned": lambda phase, now: ca.vertcat(*(now.joints[name].position for name in phase.body.planned)),
+    "reach": lambda phase, now: now.reach,
+    "torque": lambda phase, now: ca.vertcat(*(now.torques[name] for name in phase.body.joints)),
+    "power": lambda phase, now: ca.vertcat(*(now.joints[n].velocity * now.torques[n] for n in phase.moving)),
+    "zmp": lambda phase, now: now.zmp,
+    "miss": lambda phase, now: now.miss,
+    "q": lambda phase, now: _stack_motions(now, phase.moving)[0],
+    "qd": lambda phase, now: _stack_motions(now, phase.moving)[1],
+    "qdd": lambda phase, now: _stack_motions(now, phase.moving)[2],
+    "wrench_L": lambda phase, now: now.wrenches["L"],
+    "wrench_R": lambda phase, now: now.wrenches["R"],
+    "hip": lambda phase, now: now.hip,
+    "com": _locate_mass,
+    "left_foot": lambda phase, now: _locate_sole(phase, now, "L"),
+    "right_foot": lambda phase, now: _locate_sole(phase, now, "R"),
+    "swing_heights": lambda phase, now: ca.repmat(_locate_sole(phase, now, "R")[2], len(CORNERS), 1),
+    "attitude": lambda phase, now: now.attitude,
+    "yaw": lambda phase, now: now.yaw,
+}
+BASE = ("planned", "reach", "torque", "power", "zmp", "miss")  # of every phase
+ALL_JOINTS = {"all_q", "all_qd", "all_qdd"}  # of time histories
+# What follows from the planned motion without its derivatives.
+OF_MOTION = {"planned", "reach", "miss", "hip", "com", "left_foot", "right_foot", "swing_heights", "attitude", "yaw"}
 
 
 def _stack_motions(plan: Instant, joints: Sequence[str]) -> list[SX]:

@@ -20,8 +20,8 @@ from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
 from nlp_gait.gaits.biped.phase import COLUMNS, WRENCHES, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
-from nlp_gait.gaits.biped.recorded_motion import CORNERS, FINE, RecordedMotion, make_instant_function
-from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner, Samples
+from nlp_gait.gaits.biped.recorded_motion import FINE, RecordedMotion, make_instant_function
+from nlp_gait.gaits.biped.samples import CORNERS, LEAST_DURATION, Loader, Planner, Samples
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -48,29 +48,37 @@ class RecordedPhase(Phase):
     def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
         """Evaluate the phase at N + 1 equidistant samples.
 
-        Traces: ``hip`` (3, N + 1) and ``hip_rate``, ``heights`` (4, N + 1) of the right sole's corners, ``ground`` (2, N + 1),
-        the right sole's place [m, m/s].
+        Quantities besides those of all phases: ``hip_rate`` (3, N + 1) [m/s], ``sides`` (4, N + 1), y of the right sole's
+        corners, and ``ground`` (2, N + 1), its place [m].
         """
         q, qd, qdd = (MX(part) for part in self._angles(at))
         instant = make_instant_function(self.body, self.loads).map(self.grid.parts + 1)
-        torque, zmp, _, hip, hip_rate, ankle, corners, *_ = instant(q, qd, qdd)
+        torque, zmp, _, hip, hip_rate, ankle, corners, _, left, right = instant(q, qd, qdd)
         rows_of = [self.body.joints.index(name) for name in self.moving]
         planned = [self.body.joints.index(name) for name in self.body.planned]
-        sole = {"heights": corners[2::3, :], "sides": corners[1::3, :], "ground": ankle[:2, :]}
         return Samples(
             joints=self.body.joints,
             moving=self.moving,
+            standing=self.standing,
             per_interval=self.grid.samples_per_interval,
             duration=at[self.duration],
-            planned=q[planned, :],
-            reach=self.body.compute_cosines(q),
-            torque=torque,
-            power=qd[rows_of, :] * torque[rows_of, :],
-            zmp=zmp,
-            q=q[rows_of, :],
-            qd=qd[rows_of, :],
-            qdd=qdd[rows_of, :],
-            traces={"hip": hip, "hip_rate": hip_rate, **sole},
+            values={
+                "planned": q[planned, :],
+                "reach": self.body.compute_cosines(q),
+                "torque": torque,
+                "power": qd[rows_of, :] * torque[rows_of, :],
+                "zmp": zmp,
+                "q": q[rows_of, :],
+                "qd": qd[rows_of, :],
+                "qdd": qdd[rows_of, :],
+                "hip": hip,
+                "hip_rate": hip_rate,
+                "swing_heights": corners[2::3, :],
+                "sides": corners[1::3, :],
+                "ground": ankle[:2, :],
+                "wrench_L": left,
+                "wrench_R": right,
+            },
         )
 
     def signals(self, at: NumericPoint) -> Signals:
@@ -125,7 +133,7 @@ class HipLimits(Limit):
         self.parameters = make_bound_parameters(tuple(unique.values()))
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        hip, rate = samples.traces["hip"], samples.traces["hip_rate"]
+        hip, rate = samples.read("hip"), samples.read("hip_rate")
         found = []
         for end, limits, label in zip((0, hip.shape[1] - 1), self._variables, self._labels, strict=False):
             values = {axis: hip[k, end] for k, axis in enumerate("xyz")}
@@ -149,7 +157,7 @@ class SwingLimits(Limit):
         self._inner_edge = motion.body.support[1] - motion.body.robot.feet["left"].right_m
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        heights, sides, tolerance = samples.traces["heights"], samples.traces["sides"], at[GROUND_TOLERANCE.name]
+        heights, sides, tolerance = samples.swing_heights, samples.read("sides"), at[GROUND_TOLERANCE.name]
         inside = range(1, samples.steps)
         # Of the whole motion, not of the samples alone.
         highest = MX(float(self._motion.right_foot(np.linspace(0.0, self._motion.duration_s, FINE))[:, 2].max()))
@@ -172,7 +180,7 @@ class StandingLimits(Limit):
     parameters = (GROUND_TOLERANCE,)
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        heights, ground, tolerance = samples.traces["heights"], samples.traces["ground"], at[GROUND_TOLERANCE.name]
+        heights, ground, tolerance = samples.swing_heights, samples.read("ground"), at[GROUND_TOLERANCE.name]
         n = samples.steps + 1
         drift = ground - ca.repmat(ca.sum2(ground) / n, 1, n)
         every = range(n)
@@ -242,6 +250,7 @@ def make_recorded_phase_problem(body: Body, name: PhaseName, motion: RecordedMot
         grid=grid,
         limits=(*make_phase_limits(body, balance, solved=False), HipLimits(ends, ("start", "end")), own),
         goal=Goal(heat=body.heat),
+        standing=("L",) if name == "ssp" else ("L", "R"),
         recorded=motion,
     )
     problem = make_phase_problem(name, "", phase)
@@ -292,6 +301,7 @@ class RecordedCycles:
                 grid=grid,
                 limits=(*make_phase_limits(body, margins[name], solved=False), *own[name]),
                 goal=Goal(heat=body.heat),
+                standing=("L",) if name == "ssp" else ("L", "R"),
                 recorded=motions[name],
             )
             for name, loads in make_recorded_loads(body, "lever").items()

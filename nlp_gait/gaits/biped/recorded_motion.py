@@ -30,7 +30,6 @@ LIFTED = 2e-3  # [m]; a foot that rises by less stands
 STILL = 1e-5  # [m]; a foot nearer than this to its last place has landed
 LEAST_SHARE = 0.02  # of the time; a shorter phase does not count
 CLOSED = 1e-3  # [rad]; a motion repeats if its end is nearer than this to the mirror image of its beginning
-CORNERS = ("back right", "back left", "front right", "front left")  # of a sole
 FINE = 400  # instants at which a whole motion is evaluated
 
 

@@ -8,12 +8,14 @@ import casadi as ca
 import numpy as np
 from casadi import DM, MX, SX
 
+from nlp_gait.errors import unknown
 from nlp_gait.formulation import InstantPoint
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 
 BOTH_FEET = {"L": "left", "R": "right"}
 LEAST_DURATION = 1e-3  # [s]; a shorter phase is evaluated as this one, so that rates stay finite
+CORNERS = ("back right", "back left", "front right", "front left")  # of a sole
 
 
 class Instant(NamedTuple):
@@ -42,25 +44,24 @@ Trace: TypeAlias = Callable[[InstantPoint, SX], SX]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """A phase at N + 1 samples; columns are samples."""
+    """A phase at N + 1 samples, whose quantities are read by name; columns are samples."""
 
     joints: tuple[str, ...]  # rows of torque
     moving: tuple[str, ...]  # rows of power and of the motion
+    standing: tuple[str, ...]  # sides of the feet on the ground, ``"L"`` and ``"R"``
     per_interval: int  # samples in each interval over which changes are limited
     duration: MX  # of the phase [s]
-    planned: MX  # (k, N + 1) planned angles [rad]
-    reach: MX  # (2, N + 1) cosines of the knees
-    torque: MX  # (J, N + 1) [Nm]
-    power: MX  # (m, N + 1) mechanical power of the joints that move [W], signed
-    zmp: MX  # (2, N + 1) in the world [m]
-    traces: Mapping[str, MX]  # quantities that limits requested, by name
-    # (6, N + 1) of the ground on each sole by side, about the point under the ankle [N, Nm]; empty unless a limit reads them
-    wrenches: Mapping[str, MX] = field(default_factory=dict)
-    miss: MX = MX(0, 1)  # (k, N + 1) distances by which legs miss their feet [m]; empty where they cannot
-    # Angles of the joints that move and both derivatives, (m, N + 1) each; empty unless a limit or the goal reads them
-    q: MX = MX(0, 1)
-    qd: MX = MX(0, 1)
-    qdd: MX = MX(0, 1)
+    values: Mapping[str, MX]  # (k, N + 1) by name of the quantity
+
+    def read(self, name: str) -> MX:
+        """Return a quantity (k, N + 1) by name; raises UnknownNameError if this kind of motion does not have it."""
+        if name not in self.values:
+            raise unknown("quantity of this motion", name, tuple(self.values))
+        return self.values[name]
+
+    def trace(self, name: str, column: Trace) -> MX:
+        """Return a quantity (k, N + 1) that the caller defines at an instant of a planned motion."""
+        return self.read(name)
 
     @property
     def steps(self) -> int:
@@ -71,6 +72,83 @@ class Samples:
     def step_s(self) -> MX:
         """Time between two samples [s], never zero."""
         return ca.fmax(self.duration, LEAST_DURATION) / self.steps
+
+    @property
+    def planned(self) -> MX:
+        """(k, N + 1) planned angles [rad]."""
+        return self.read("planned")
+
+    @property
+    def reach(self) -> MX:
+        """(2, N + 1) cosines of the knees."""
+        return self.read("reach")
+
+    @property
+    def torque(self) -> MX:
+        """(J, N + 1) torques [Nm]."""
+        return self.read("torque")
+
+    @property
+    def power(self) -> MX:
+        """(m, N + 1) mechanical power of the joints that move [W], signed."""
+        return self.read("power")
+
+    @property
+    def zmp(self) -> MX:
+        """(2, N + 1) ZMP in the world [m]."""
+        return self.read("zmp")
+
+    @property
+    def miss(self) -> MX:
+        """(k, N + 1) distances by which legs miss their feet [m]; empty where they cannot."""
+        return self.read("miss")
+
+    @property
+    def q(self) -> MX:
+        """(m, N + 1) angles of the joints that move [rad]."""
+        return self.read("q")
+
+    @property
+    def qd(self) -> MX:
+        """(m, N + 1) their velocities [rad/s]."""
+        return self.read("qd")
+
+    @property
+    def qdd(self) -> MX:
+        """(m, N + 1) their accelerations [rad/s^2]."""
+        return self.read("qdd")
+
+    def wrench(self, side: str) -> MX:
+        """Return the ground's wrench (6, N + 1) on a sole ``"L"`` or ``"R"``, about the point under its ankle [N, Nm]."""
+        return self.read(f"wrench_{side}")
+
+    @property
+    def swing_heights(self) -> MX:
+        """(4, N + 1) heights of the right sole's corners above the left sole [m], in the order of ``CORNERS``."""
+        return self.read("swing_heights")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placeholders(Samples):
+    """Symbols in place of samples, which record what limits and the goal read."""
+
+    rows: Callable[[str], int]  # number of rows of a quantity by name; raises UnknownNameError
+    trace_rows: Callable[[Trace], int]
+    count: int  # N + 1
+    names: list[str] = field(default_factory=list)  # quantities that were read
+    traces: dict[str, Trace] = field(default_factory=dict)
+    values: Mapping[str, MX] = field(default_factory=dict)
+
+    def read(self, name: str) -> MX:
+        """Return symbols, and record the name."""
+        if name not in self.names:
+            self.names.append(name)
+        return MX.sym(name, self.rows(name), self.count)
+
+    def trace(self, name: str, column: Trace) -> MX:
+        """Return symbols, and record the definition."""
+        self.traces[name] = column
+        return MX.sym(name, self.trace_rows(column), self.count)
 
 
 def average_over_time(values: MX) -> MX:

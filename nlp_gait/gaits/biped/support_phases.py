@@ -153,6 +153,7 @@ def make_support_phase(
         derivatives=derivatives,
         limits=(*make_phase_limits(body, balance), *clearance, *curve_limits, *body.motors.limits, *sharing.limits),
         goal=goal,
+        standing=("L",) if swings else ("L", "R"),
         state=measured,
         kinks=splines.kinks,
         start=sharing.start(names, splines.start_of(names)),

@@ -220,6 +220,7 @@ def make_walk_phases(
             grid=grid,
             limits=(*make_phase_limits(body, own), *body.motors.limits),
             goal=goal,
+            standing=("L",) if kind == "ssp" else ("L", "R"),
         )
         for kind, own in {"ssp": margins["ssp"], "dsp": margins["dsp"], STAND: limit_to_box(box)}.items()
     }

@@ -107,8 +107,6 @@ def parse_nao_motors(text: str, robot: Robot) -> Motors:
 class AnkleCoupling(Limit):
     """Roll of both ankles within the lines over their pitch."""
 
-    reads_motion = True
-
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         angles: Mapping[str, MX] = dict(zip(samples.moving, vertsplit(samples.q), strict=True))
         names = [str(k) for k in range(samples.steps + 1)]

@@ -6,9 +6,8 @@ at rest. In between all joints of the legs are free, including the coupled yaw-p
 paper swings: the torso leans and turns, the swing foot tilts and leaves its line.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -20,8 +19,8 @@ from nlp_gait.gaits.biped.body import LIFT, read_duration
 from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.phase import Phase
-from nlp_gait.gaits.biped.recorded_motion import CORNERS, FreeParts, locate_free_parts
-from nlp_gait.gaits.biped.samples import Instant, Samples
+from nlp_gait.gaits.biped.recorded_motion import FreeParts, locate_free_parts
+from nlp_gait.gaits.biped.samples import CORNERS, Instant, Samples
 from nlp_gait.gaits.biped.support_phases import make_support_phase
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, KNEES, PLANNED_JOINTS, YAW_PITCHES
@@ -34,6 +33,9 @@ YAW_PITCH = "HipYawPitch"  # curve of both hips
 CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING["ssp"])
 MOVING = (*YAW_PITCHES, *CURVES[1:])
 OTHERS = (YAW_PITCHES[0], *ARM_SWING["ssp"])
+OWN_ROWS = {"others": len(OTHERS), "along": 1, "sides": 2}  # of quantities of this motion alone
+# Quantities that follow from the joints' motion at one sample, in the order in which gradient solvers get them as variables.
+OF_SAMPLE = ("torque", "zmp", "along", "swing_heights", "sides", "hip", "wrench_L", "wrench_R")
 FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which free joints are fitted
 
 
@@ -72,9 +74,8 @@ class FreeMotion:
         """Return the places of torso and right foot for angles by joint name."""
         return locate_free_parts(self.paper.body.robot, q, self.support)
 
-    @cached_property
-    def instant(self) -> ca.Function:
-        """One sample: from angles, velocities and accelerations (45,) to torques, ZMP, and places of ankle and sole."""
+    def make_instant_function(self, names: Sequence[str]) -> ca.Function:
+        """Return the function of one sample: from angles, velocities and accelerations (45,) to quantities by name."""
         rows = len(CURVES)
         v = SX.sym("v", 3 * rows)
         joints = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
@@ -83,9 +84,16 @@ class FreeMotion:
             joints |= dict.fromkeys(YAW_PITCHES if curve == YAW_PITCH else (curve,), motion)
         body = self.body({name: motion.position for name, motion in joints.items()})
         loads = self.paper.loads(Instant(joints=joints, hip=body.torso, ankles={"L": SX(DM(self.support))}))
-        torque = ca.vertcat(*(loads.torques[name] for name in JOINTS))
-        left = body.corners[1, 1::2]
-        return ca.Function("instant", [v], simplify([torque, loads.zmp, body.ankle[0], body.corners[2, :].T, left.T]))
+        known = {
+            "torque": ca.vertcat(*(loads.torques[name] for name in JOINTS)),
+            "zmp": loads.zmp,
+            "along": body.ankle[0],
+            "swing_heights": body.corners[2, :].T,
+            "sides": body.corners[1, 1::2].T,
+            "hip": body.torso,
+            **{f"wrench_{side}": wrench for side, wrench in loads.wrenches.items()},
+        }
+        return ca.Function("instant", [v], simplify([known[name] for name in names]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,9 +108,9 @@ class FreePhase(Phase):
         The joints' motion becomes variables of gradient solvers, because torques are far from linear in it and it is linear in
         most of the many variables; so does what follows from it at each sample, before limits join samples.
 
-        Traces: ``others`` (5, N + 1), angles of the hips' yaw-pitch and of the arms, rows as ``OTHERS`` [rad]; ``along``
-        (1, N + 1), x of the right ankle [m]; ``heights`` (4, N + 1) of the right sole's corners above the ground [m]; ``sides``
-        (2, N + 1), y of its left corners [m].
+        Quantities besides those of all phases: ``others`` (5, N + 1), angles of the hips' yaw-pitch and of the arms, rows as
+        ``OTHERS`` [rad]; ``along`` (1, N + 1), x of the right ankle [m]; ``sides`` (2, N + 1), y of the left corners of the
+        right sole [m].
         """
         n = self.grid.parts + 1 if phases is None else int(phases.shape[1])
         x, margin, s = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("s")
@@ -114,25 +122,33 @@ class FreePhase(Phase):
         )
         values = motion.map(n)(ca.repmat(at.x, 1, n), ca.repmat(at[limits.REACH_MARGIN], 1, n), table)
         motions = tie_entries(values, ops)
-        torque, zmp, along, heights, sides = (tie_entries(part, ops) for part in self.free.instant.map(n)(motions))
+        names = [name for name in OF_SAMPLE if name in ("torque", "zmp") or name in self._names_read]
+        tied = {
+            name: tie_entries(part, ops)
+            for name, part in zip(names, self.free.make_instant_function(names).map(n)(motions), strict=True)
+        }
         rows = (dict(zip(CURVES, ca.vertsplit(part), strict=True)) for part in ca.vertsplit(motions, len(CURVES)))
         q, qd, qdd = ({n: part[YAW_PITCH if n in YAW_PITCHES else n] for n in MOVING} for part in rows)
-        others = ca.vertcat(*(q[name] for name in OTHERS))
         return Samples(
             joints=JOINTS,
             moving=MOVING,
+            standing=self.standing,
             per_interval=self.grid.samples_per_interval if phases is None else 1,
             duration=at[self.duration],
-            planned=ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
-            reach=ca.cos(ca.vertcat(*(q[knee] for knee in KNEES))),
-            torque=torque,
-            power=ca.vertcat(*(qd[name] * torque[JOINTS.index(name), :] for name in MOVING)),
-            zmp=zmp,
-            q=ca.vertcat(*q.values()),
-            qd=ca.vertcat(*qd.values()),
-            qdd=ca.vertcat(*qdd.values()),
-            traces={"others": others, "along": along, "heights": heights, "sides": sides},
+            values={
+                **tied,
+                "planned": ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),
+                "reach": ca.cos(ca.vertcat(*(q[knee] for knee in KNEES))),
+                "power": ca.vertcat(*(qd[name] * tied["torque"][JOINTS.index(name), :] for name in MOVING)),
+                "q": ca.vertcat(*q.values()),
+                "qd": ca.vertcat(*qd.values()),
+                "qdd": ca.vertcat(*qdd.values()),
+                "others": ca.vertcat(*(q[name] for name in OTHERS)),
+            },
         )
+
+    def count_rows(self, name: str) -> int:
+        return OWN_ROWS[name] if name in OWN_ROWS else super().count_rows(name)
 
 
 class FreeLimits(limits.Limit):
@@ -142,13 +158,13 @@ class FreeLimits(limits.Limit):
         self._robot, self._path_middle, self._inner_edge = robot, path_middle, inner_edge
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> limits.RowsAndIndexes:
-        traces, middle = samples.traces, samples.steps // 2  # the number of samples is odd
-        heights, aside = traces["heights"], self._inner_edge - traces["sides"][:, 1:-1]
+        middle = samples.steps // 2  # the number of samples is odd
+        heights, aside = samples.swing_heights, self._inner_edge - samples.read("sides")[:, 1:-1]
         return (
-            limits.make_angle_rows("other_angle", self._robot, OTHERS, traces["others"][:, 1:-1]),
+            limits.make_angle_rows("other_angle", self._robot, OTHERS, samples.read("others")[:, 1:-1]),
             limits.make_rows_at_samples("foot_height", "m", heights[:, 1:-1], CORNERS, MX(0.0), first=1),
             *limits.make_halfway_rows(
-                traces["along"][middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS
+                samples.read("along")[middle], self._path_middle, heights[:, middle], at[LIFT], CORNERS
             ),
             limits.make_rows_at_samples("feet_apart", "m", aside, CORNERS[1::2], MX(0.0), first=1),
         ), {}
@@ -169,6 +185,7 @@ def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Tra
         loads=paper.loads,
         grid=grid,
         limits=(*paper.limits, FreeLimits(body.robot, step_m, left_y - body.robot.feet["left"].right_m)),
+        standing=paper.standing,
         free=motion,
         kinks=splines.kinks,
     )

@@ -68,10 +68,10 @@ class FlatSoles(Limit):
     """Soles that the closed chain leaves flat where Newton's method has converged; ``turns`` (2,) are their angles [rad]."""
 
     def __init__(self, turns: Trace) -> None:
-        self.traces = {"sole_turn": turns}
+        self._turns = turns
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        turns = samples.traces["sole_turn"][:, 1:-1]
+        turns = samples.trace("sole_turn", self._turns)[:, 1:-1]
         return [make_rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
 
 

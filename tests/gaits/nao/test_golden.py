@@ -142,7 +142,10 @@ def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
         ({"intervals": 0}, "intervals must be a whole number >= 1, got 0"),
         ({"intervals": 2.5}, r"intervals must be a whole number, got 2\.5"),
         ({"samples_per_interval": -1}, "samples_per_interval must be a whole number >= 1, got -1"),
-        ({"derivatives": "exact"}, "derivatives must be one of analytic, finite-difference, finite-difference-2, got 'exact'"),
+        (
+            {"derivatives": "exact"},
+            "derivatives must be one of analytic, finite-difference, finite-difference-2, got 'exact'",
+        ),
     ],
 )
 @pytest.mark.parametrize("name", NAMES)

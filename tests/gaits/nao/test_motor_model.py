@@ -33,17 +33,15 @@ Q[:, 0], Q[:, 1] = -1.5, 1.2  # beyond both ends of the ankles' table
 SAMPLES = Samples(
     joints=JOINTS,
     moving=MOVING,
+    standing=("L",),
     per_interval=1,
     duration=MX(1.0),
-    planned=MX(0, COUNT),
-    reach=MX(0, COUNT),
-    torque=MX(DM(TORQUE)),
-    power=MX(DM(POWER)),
-    zmp=MX(2, COUNT),
-    q=MX(DM(Q)),
-    qd=MX(DM(QD)),
-    qdd=MX(DM(QD)),
-    traces={},
+    values={
+        "torque": MX(DM(TORQUE)),
+        "power": MX(DM(POWER)),
+        "q": MX(DM(Q)),
+        "qd": MX(DM(QD)),
+    },
 )
 
 
@@ -89,7 +87,7 @@ def test_power(braking: str, heat: str) -> None:
 
 def test_limits() -> None:
     (limit,) = parse_nao_motors("limits, rotor", ROBOT).limits
-    assert limit.reads_motion and limit.parameters == (SUPPLY,)
+    assert limit.parameters == (SUPPLY,)
     assert (SUPPLY.default, SUPPLY.minimum, SUPPLY.maximum) == (1.0, 0.05, 2.0)
     found = rows_of(limit)
     assert list(found) == ["joint_speed", "torque_forwards", "torque_backwards", "continuous_torque"]
@@ -121,7 +119,6 @@ def test_limits() -> None:
 
 def test_ankles() -> None:
     (limit,) = parse_nao_motors("ankle", ROBOT).limits
-    assert limit.reads_motion
     found, corners = rows_of(limit), np.array(ANKLE_ROLL)
     assert len(found) == 4
     for side, sign, least, greatest in (("L", 1.0, 1, 2), ("R", -1.0, 2, 1)):
