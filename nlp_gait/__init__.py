@@ -6,7 +6,7 @@ exact functions to search algorithms, and ``compile_function`` compiles any CasA
 
 from __future__ import annotations
 
-from nlp_gait.providers import FILE_HASHES, FUNCTIONS, PROBLEMS, import_object
+from nlp_gait.providers import FILE_HASHES, FUNCTIONS, LIMITS, PROBLEMS, import_object
 
 # In place of typing's, whose import takes longer than all that Ctrl-C waits for; type checkers know the name.
 TYPE_CHECKING = False
@@ -60,6 +60,8 @@ PROBLEMS |= {
     "stairs-ideal": "nlp_gait.gaits.stairs.ideal:stairs_ideal",
     "gaitbench": "nlp_gait.gaitbench.suite_problem:gaitbench",
 }
+LIMITS |= {name: f"nlp_gait.gaits.biped.limits:{name}" for name in ("FrictionCone", "FootClearance")}
+FILE_HASHES["limits"] = "nlp_gait.formulation.added_limits:hash_limits"
 FILE_HASHES["robot"] = "nlp_gait.robots.loading:hash_robot"
 FUNCTIONS["resolve_instance"] = "nlp_gait.gaitbench.generated:resolve_instance"
 FUNCTIONS["load_generated"] = "nlp_gait.gaitbench.instance:load_generated"

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 PROBLEMS: dict[str, str] = {}  # makers of problems, by the problem's name
+LIMITS: dict[str, str] = {}  # classes of limits that a user may add to a gait, by name
 # By option of problems that may name a file: hash of its content, "" for another value.
 FILE_HASHES: dict[str, str] = {}
 FUNCTIONS: dict[str, str] = {}  # by their task, such as ``plot_gait``

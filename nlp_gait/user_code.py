@@ -28,10 +28,14 @@ from nlp_gait.errors import GaitError, UserCodeError, unknown
 from nlp_gait.files import check_path, make_writable_folder, read_bytes, write_bytes
 
 T = TypeVar("T")
-Kind = Literal["problem", "algorithm"]
+Kind = Literal["problem", "algorithm", "limit"]
 
 # Groups of entry points, for ``[project.entry-points."nlp_gait.problems"]`` of another package.
-GROUPS: Mapping[Kind, str] = {"problem": "nlp_gait.problems", "algorithm": "nlp_gait.algorithms"}
+GROUPS: Mapping[Kind, str] = {
+    "problem": "nlp_gait.problems",
+    "algorithm": "nlp_gait.algorithms",
+    "limit": "nlp_gait.limits",
+}
 ENDING = ".py"
 PROGRAM = "cmd:"
 LARGEST_SOURCE = 4 * 2**20  # bytes

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 
 import casadi as ca
+import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError, format_value, unknown
@@ -98,6 +99,11 @@ class Grid:
     def parts(self) -> int:
         """Number of equal parts between the samples."""
         return self.intervals * self.samples_per_interval
+
+    @property
+    def progress(self) -> MX:
+        """(1, N + 1) shares of the phase's time at the samples, from 0 to 1."""
+        return MX(DM(np.linspace(0.0, 1.0, self.parts + 1)).T)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

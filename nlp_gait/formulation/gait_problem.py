@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
@@ -19,6 +19,7 @@ from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError, format_value, unknown
 from nlp_gait.formulation import assembly as parts
+from nlp_gait.formulation.added_limits import make_added_limits, parse_limits
 from nlp_gait.formulation.assembly import Assembly, NumericPoint, Objective, Parameter, Point, Variable
 from nlp_gait.formulation.display import Display
 from nlp_gait.formulation.locking import Cache, lock_casadi
@@ -38,6 +39,7 @@ Origin: TypeAlias = "tuple[Callable[..., GaitProblem], Mapping[str, Any]]"
 Start = Callable[[Mapping[str, float], np.random.Generator], Array]
 # A point is on a bound if it misses it by at most this share of the variable's default range.
 ROUNDING = 1e-6
+LIMITS_OPTION = "limits"  # of makers whose problems have phases
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,6 +169,18 @@ class GaitProblem:
                     f"set {name} and {stem}.upper so that lower <= upper"
                 )
         return changed
+
+    def with_limits(self, *, single_support: Iterable[Any] = (), double_support: Iterable[Any] = ()) -> GaitProblem:
+        """Return the problem built again with more limits of its phases, see ``nlp_gait.limits``; parameter values are kept.
+
+        Raises InputError for a problem without phases, or an object that is not a limit.
+        """
+        make, options = self._origin or (None, {})
+        if make is None or LIMITS_OPTION not in options:
+            raise InputError(f"problem {self.name!r} takes no limits; those of NAO and of humanoids do")
+        more = make_added_limits(single_support, double_support)
+        limits = parse_limits(options[LIMITS_OPTION]).extend(more)
+        return make(**{**options, LIMITS_OPTION: limits}).with_values(**self.values)
 
     def fix(self, /, **values: float) -> GaitProblem:
         """Return the same problem with some variables fixed at a value within their bounds."""

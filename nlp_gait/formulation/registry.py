@@ -15,6 +15,7 @@ from casadi import MX, Function, vertcat
 import nlp_gait.user_code as user_code
 from nlp_gait.errors import InputError, check_name, describe_type, format_value, unknown
 from nlp_gait.files import check_path
+from nlp_gait.formulation.added_limits import AddedLimits, resolve_limits
 from nlp_gait.formulation.assembly import Assembly, Parameter, Variable
 from nlp_gait.formulation.gait_problem import GaitProblem
 from nlp_gait.formulation.locking import lock_casadi
@@ -46,7 +47,8 @@ def maker(make: Maker) -> Maker:
         problem = make(**call)
         if not isinstance(problem, GaitProblem):
             raise InputError(f"{make.__name__!r} must make a GaitProblem, it made {type(problem).__name__}")
-        grid, recorded = problem.grid, dict(call)
+        grid = problem.grid
+        recorded = {name: str(value) if isinstance(value, AddedLimits) else value for name, value in call.items()}
         if grid is not None and "samples_per_interval" in call:
             recorded["samples_per_interval"] = grid.samples_per_interval  # 0 leaves the choice to the problem
         problem = replace(problem, options=recorded)
@@ -127,7 +129,7 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
     """Check that a maker has these options, and allows their values; raises UnknownNameError or InputError."""
     known, allowed = inspect.signature(make).parameters, _list_choices(make)
     for option, given in options.items():
-        value = _to_python(given)
+        value = _to_python(str(given) if isinstance(given, AddedLimits) else given)
         if option not in known:
             raise unknown(f"option of {make.__name__.replace('_', '-')}", option, known)
         expected = type(known[option].default)
@@ -143,6 +145,12 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
     if math.prod(max(1, count) for count in counts.values()) > LARGEST_COUNT:
         product = " x ".join(f"{name} {count}" for name, count in counts.items())
         raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
+
+
+def load_stored(name: str, options: Mapping[str, Any], owner: str) -> GaitProblem:
+    """Return a problem of a data file (the owner), whose user code must have been named; raises as ``load``, ``resolve_code``."""
+    limits = {"limits": resolve_limits(str(options["limits"]), owner)} if options.get("limits") else {}
+    return load(user_code.resolve_code(name, "problem", owner), **{**options, **limits})
 
 
 def hash_files(options: Mapping[str, Any]) -> dict[str, str]:

@@ -13,6 +13,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
+from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
@@ -95,6 +96,7 @@ class Body(ABC):
     torque_scale: float = 1.0  # torques relative to NAO's
     # Joints of arms that the legs do not carry: each arm is a chain of its own on a torso at rest
     separate_joints: tuple[str, ...] = ()
+    added_limits: AddedLimits = AddedLimits()  # of the user, for all gaits of this body
     # Whether the share of the torso that a leg carries in double support includes these arms
     carries_shared_arms: bool = False
 

@@ -12,7 +12,7 @@ from casadi import DM, MX
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.formulation.assembly import make_parameters as table
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.samples import Samples, Trace
+from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Samples, Trace
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -22,6 +22,7 @@ SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "
 REACH_MARGIN = "reach_margin"
 TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
 LEGS = ("left leg", "right leg")
+SMOOTH_N = 1e-6  # [N]; smaller forces are rounding
 CLOSURE_M = 1e-9  # by which a leg may miss its foot: far below what matters, far above rounding
 
 Side = TypeVar("Side", float, MX)
@@ -214,7 +215,7 @@ def make_angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX
     return make_rows_at_samples(name, "rad", angles, joints, lower, upper, first=1)
 
 
-class FootClearance(Limit):
+class SplineClearance(Limit):
     """A planned swing foot above the ground between its ends, and high enough in the middle of its path, an x, at half time."""
 
     def __init__(self, path: Trace, middle: float, least_height: str) -> None:
@@ -239,3 +240,56 @@ def make_halfway_rows(
         make_rows("foot_middle", "m", along - middle, MX(0.0), MX(0.0), over="once"),
         make_rows("foot_lift", "m", heights - least, MX(0.0), labels=corners, over="once"),
     )
+
+
+class FrictionCone(Limit):
+    """Tangential force of each standing sole within the friction coefficient times its normal force.
+
+    The tangential force is sqrt(f_x^2 + f_y^2 + e^2) with e = 1e-6 N, which is smooth where the force vanishes. Indexes: the
+    friction that the gait needs, its largest ratio of tangential to normal force.
+
+    Source:
+        Kajita, Hirukawa, Harada, Yokoi (2014), "Introduction to Humanoid Robotics", section 3.2: a foot does not slip while the
+        ground's force is within the cone of Coulomb's friction.
+    """
+
+    parameters = table(("friction_coefficient", "1", 0.6, "of both soles on the ground", 0.0, math.inf))
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        rows, ratios = [], []
+        for side in samples.standing:
+            force = samples.wrench(side)[:3, :]
+            tangential = ca.sqrt(force[0, :] ** 2 + force[1, :] ** 2 + SMOOTH_N**2)
+            slack = at["friction_coefficient"] * force[2, :] - tangential
+            rows.append(make_rows_at_samples("friction", "N", slack, (BOTH_FEET[side],), MX(0.0)))
+            ratios.append(ca.mmax(tangential / ca.fmax(force[2, :], SMOOTH_N)))
+        return rows, {
+            f"{BOTH_FEET[side]}_friction": ratio for side, ratio in zip(samples.standing, ratios, strict=True)
+        }
+
+
+class FootClearance(Limit):
+    """Sole of the swinging foot above the ground by at least h(s) = 16 c s^2 (1 - s)^2, where s is the share of the swing's time.
+
+    It vanishes with its slope at both ends, and is the clearance c in the middle. Heights are above the standing sole: of a flat
+    sole, or of the four corners of one that may tilt. A phase in which both feet stand has no rows of it.
+
+    Source:
+        This package's own; c is a parameter. That toes need clearance in mid-swing: Winter (1992), "Foot trajectory in human
+        gait", Physical Therapy 72(1).
+    """
+
+    parameters = table(
+        ("foot_clearance_m", "m", 0.01, "of the swinging sole in the middle of its swing", 0.0, math.inf)
+    )
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        if len(samples.standing) > 1:
+            return [], {}
+        s, heights = samples.progress[1:-1], samples.swing_heights[:, 1:-1]
+        points = CORNERS if heights.shape[0] > 1 else ("sole",)
+        needed = at["foot_clearance_m"] * 16 * s**2 * (1 - s) ** 2
+        above = heights - ca.repmat(needed, len(points), 1)
+        return [make_rows_at_samples("foot_clearance", "m", above, points, MX(0.0), first=1)], {
+            "foot_clearance_m": ca.mmax(samples.swing_heights)
+        }

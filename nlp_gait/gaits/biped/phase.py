@@ -28,7 +28,6 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, Limit
 from nlp_gait.gaits.biped.samples import (
     BOTH_FEET,
-    CORNERS,
     LEAST_DURATION,
     Instant,
     Loader,
@@ -94,15 +93,23 @@ class Phase:
     start: Start | None = None  # start points; None for any within the bounds
 
     @property
+    def every_limit(self) -> tuple[Limit, ...]:
+        """The phase's limits, and those that the user has added."""
+        return (*self.limits, *self.body.added_limits.select(self.standing))
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Of the goal and of all limits; pairs of bounds are last because there are many."""
-        own = (self.goal.heat, *self.state, *(parameter for limit in self.limits for parameter in limit.parameters))
-        return tuple(sorted(own, key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
+        unique: dict[str, Parameter] = {}
+        of_limits = (parameter for limit in self.every_limit for parameter in limit.parameters)
+        for parameter in (self.goal.heat, *self.state, *of_limits):
+            unique.setdefault(parameter.name, parameter)
+        return tuple(sorted(unique.values(), key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
     def assemble(self, at: Point, ops: Nonsmooth, samples: Samples | None = None) -> Assembly:
         """Return the rows of all limits, the goal, and the indexes of both; by default at all samples."""
         samples = self.sample(at, ops) if samples is None else samples
-        added = [limit.add(at, samples, ops) for limit in self.limits]
+        added = [limit.add(at, samples, ops) for limit in self.every_limit]
         value, before, after = self.goal.evaluate(at, samples, ops)
         indexes = {name: index for _, own in added for name, index in own.items()}
         return Assembly(
@@ -131,6 +138,7 @@ class Phase:
                 standing=self.standing,
                 per_interval=self.grid.samples_per_interval if phases is None else 1,
                 duration=at[self.duration],
+                progress=self.grid.progress if phases is None else phases,
                 values={name: part[k] for name, part in zip((*names, *traces), split, strict=True)},
             )
             for k, at in enumerate(ats)
@@ -158,11 +166,12 @@ class Phase:
             standing=self.standing,
             per_interval=self.grid.samples_per_interval,
             duration=at[self.duration],
+            progress=self.grid.progress,
             rows=self.count_rows,
             trace_rows=self._count_trace_rows,
             count=self.grid.parts + 1,
         )
-        for limit in self.limits:
+        for limit in self.every_limit:
             limit.add(at, symbols, Exact())
         self.goal.evaluate(at, symbols, Exact())
         return symbols
@@ -390,7 +399,7 @@ QUANTITIES: dict[str, Callable[[Phase, Instant], SX]] = {
     "com": _locate_mass,
     "left_foot": lambda phase, now: _locate_sole(phase, now, "L"),
     "right_foot": lambda phase, now: _locate_sole(phase, now, "R"),
-    "swing_heights": lambda phase, now: ca.repmat(_locate_sole(phase, now, "R")[2], len(CORNERS), 1),
+    "swing_heights": lambda phase, now: _locate_sole(phase, now, "R")[2],  # its sole stays flat
     "attitude": lambda phase, now: now.attitude,
     "yaw": lambda phase, now: now.yaw,
 }

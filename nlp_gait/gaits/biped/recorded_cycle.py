@@ -62,6 +62,7 @@ class RecordedPhase(Phase):
             standing=self.standing,
             per_interval=self.grid.samples_per_interval,
             duration=at[self.duration],
+            progress=self.grid.progress,
             values={
                 "planned": q[planned, :],
                 "reach": self.body.compute_cosines(q),

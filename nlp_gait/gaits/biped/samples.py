@@ -51,6 +51,7 @@ class Samples:
     standing: tuple[str, ...]  # sides of the feet on the ground, ``"L"`` and ``"R"``
     per_interval: int  # samples in each interval over which changes are limited
     duration: MX  # of the phase [s]
+    progress: MX  # (1, N + 1) shares of the phase's time, from 0 to 1
     values: Mapping[str, MX]  # (k, N + 1) by name of the quantity
 
     def read(self, name: str) -> MX:
@@ -124,7 +125,7 @@ class Samples:
 
     @property
     def swing_heights(self) -> MX:
-        """(4, N + 1) heights of the right sole's corners above the left sole [m], in the order of ``CORNERS``."""
+        """(1, N + 1) height of the right sole above the left one [m]; of a sole that may tilt (4, N + 1), of its ``CORNERS``."""
         return self.read("swing_heights")
 
 

@@ -12,7 +12,7 @@ from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
-from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, FootClearance, Margins, compute_margins
+from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
@@ -136,7 +136,7 @@ def make_support_phase(
         return body.plan(*state(at, s), at[REACH_MARGIN], ops)
 
     balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
-    clearance = (FootClearance(sole, step_m, LIFT),) if swings and splines.count else ()
+    clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()
     curve_limits = body.make_curve_limits(name, splines.count, state)
     hip, measured = body.split_hip(splines, *hip_places)
     lift = (body.lift_variable,) if swings else ()

@@ -11,6 +11,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
+from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
@@ -124,7 +125,9 @@ class Humanoid(Body):
         )
 
 
-def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") -> Humanoid:
+def make_humanoid(
+    robot: str, *, drive_limits: bool = True, motors: str = "", limits: str | AddedLimits = ""
+) -> Humanoid:
     """Return a humanoid, by name or file, as its gaits take it; raises InputError if its legs cannot be solved.
 
     Torques and speeds may be within the limits of the robot's file; for the motors see ``gaits.biped.motors``.
@@ -139,6 +142,7 @@ def make_humanoid(robot: str, *, drive_limits: bool = True, motors: str = "") ->
     heat = float(f"{biped.heat_W_per_Nm2:.4g}")
     return Humanoid(
         family="humanoid",
+        added_limits=parse_limits(limits),
         title=biped.full.name,
         full=biped.full,
         simulated=biped.model,

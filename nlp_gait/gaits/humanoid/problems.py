@@ -4,6 +4,7 @@ from typing import Literal
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
+from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.gaits.biped.curves import PhaseTrajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
@@ -30,13 +31,14 @@ def humanoid_ssp(
     objective: Criterion = "power",
     drive_limits: bool = True,
     motors: str = "",
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Single support; the swing foot moves by twice the step length.
 
     Source:
         Phase of Gupta, Pratihar, Deb (2023), section 4.1; general legs and the free lean of the torso are this package's own.
     """
-    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     step_m = body.check_step_length(step_length_m)
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
     phase = make_support_phase(body, "ssp", step_m, trajectory, grid, goal)
@@ -56,13 +58,14 @@ def humanoid_dsp(
     drive_limits: bool = True,
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Double support, the right foot a step ahead.
 
     Source:
         Phase of Gupta, Pratihar, Deb (2023), section 4.2; general legs and the free lean of the torso are this package's own.
     """
-    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     step_m = body.check_step_length(step_length_m)
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
@@ -81,6 +84,7 @@ def humanoid_cycle(
     drive_limits: bool = True,
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one.
 
@@ -91,7 +95,7 @@ def humanoid_cycle(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; general legs, the free lean of the torso and the
         cycle are this package's own.
     """
-    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors)
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
 
@@ -109,6 +113,7 @@ def humanoid_walk(
     footholds: str = "",
     drive_limits: bool = True,
     motors: str = "",
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 
@@ -121,7 +126,7 @@ def humanoid_walk(
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
-    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors).tilt_ground(slope_deg)
+    body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
     if footholds:
         if slope_deg or stair_rise_m or stair_run_m:

@@ -9,6 +9,7 @@ from casadi import DM, MX, SX, cos, fmax, vertcat, vertsplit
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point, Signals
+from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped import skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
@@ -268,6 +269,7 @@ def make_nao(
     arms: Arms = "carried",
     zmp_gravity: ZmpGravity = "physical",
     zmp_masses: ZmpMasses = 25,
+    limits: str | AddedLimits = "",
 ) -> NaoBody:
     """Return NAO, or a robot of its build by name or file, as its gaits take it; raises InputError for other robots.
 
@@ -299,6 +301,7 @@ def make_nao(
         arms=arms,
         zmp_gravity=zmp_gravity,
         zmp_masses=zmp_masses,
+        added_limits=parse_limits(limits),
         separate_joints=separate if arms in ("separate", "shared") else (),
         carries_shared_arms=arms == "shared",
         hip_height_m=(lowest, highest),

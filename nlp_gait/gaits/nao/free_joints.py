@@ -33,7 +33,7 @@ YAW_PITCH = "HipYawPitch"  # curve of both hips
 CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING["ssp"])
 MOVING = (*YAW_PITCHES, *CURVES[1:])
 OTHERS = (YAW_PITCHES[0], *ARM_SWING["ssp"])
-OWN_ROWS = {"others": len(OTHERS), "along": 1, "sides": 2}  # of quantities of this motion alone
+OWN_ROWS = {"others": len(OTHERS), "along": 1, "sides": 2, "swing_heights": len(CORNERS)}  # that planned motions lack
 # Quantities that follow from the joints' motion at one sample, in the order in which gradient solvers get them as variables.
 OF_SAMPLE = ("torque", "zmp", "along", "swing_heights", "sides", "hip", "wrench_L", "wrench_R")
 FIT_FACTOR = 40  # samples of a planned motion, in each of its own, to which free joints are fitted
@@ -135,6 +135,7 @@ class FreePhase(Phase):
             standing=self.standing,
             per_interval=self.grid.samples_per_interval if phases is None else 1,
             duration=at[self.duration],
+            progress=self.grid.progress if phases is None else phases,
             values={
                 **tied,
                 "planned": ca.vertcat(*(q[name] for name in PLANNED_JOINTS)),

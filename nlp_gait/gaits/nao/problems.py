@@ -8,6 +8,7 @@ import numpy as np
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, load, maker
+from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, PhaseName
@@ -50,6 +51,7 @@ def nao_ssp(
     motors: str = "",
     arms: Arms = "carried",
     zmp_gravity: ZmpGravity = "physical",
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length.
 
@@ -57,7 +59,9 @@ def nao_ssp(
         Gupta, Pratihar, Deb (2023), sections 3.1 and 4.1.
     """
     check_step_length(step_length_m)
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms, zmp_gravity=zmp_gravity)
+    body = make_nao(
+        robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms, zmp_gravity=zmp_gravity, limits=limits
+    )
     power_form = None
     if (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and samples_per_interval < 2:
         places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
@@ -84,6 +88,7 @@ def nao_dsp(
     zmp_gravity: ZmpGravity = "physical",
     zmp_masses: ZmpMasses = 25,
     load_degree: int = LOAD_DEGREE,
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Double support of NAO.
 
@@ -105,6 +110,7 @@ def nao_dsp(
         arms=arms,
         zmp_gravity=zmp_gravity,
         zmp_masses=zmp_masses,
+        limits=limits,
     )
     power_form = None
     paper = (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and zmp_masses == 25
@@ -129,6 +135,7 @@ def nao_cycle(
     samples_per_interval: int = 0,
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Walking cycle of NAO: one step, whose mirror image is the next one.
 
@@ -143,7 +150,7 @@ def nao_cycle(
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
     """
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors)
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, limits=limits)
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
     return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
 
@@ -159,6 +166,7 @@ def nao_walk(
     slope_deg: float = 0.0,
     footholds: str = "",
     motors: str = "",
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
 
@@ -172,7 +180,7 @@ def nao_walk(
     Source:
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
-    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors).tilt_ground(slope_deg)
+    body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, limits=limits).tilt_ground(slope_deg)
     grid = make_grid("cubic", intervals, samples_per_interval)
     if not footholds:
         return plan_whole_walk(body, steps, grid)
@@ -191,6 +199,7 @@ def nao_ssp_free(
     rotational_inertia: bool = True,
     step_length_m: float = 0.06,
     samples_per_interval: int = SPLINE_SAMPLES,
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Single support of NAO with free joints. One of the samples must be the middle.
 
@@ -201,7 +210,7 @@ def nao_ssp_free(
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
     if grid.parts % 2:
         raise InputError(f"intervals * samples_per_interval must be even, got {grid.parts}: one sample is the middle")
-    body = make_nao(robot, rotational_inertia=rotational_inertia)
+    body = make_nao(robot, rotational_inertia=rotational_inertia, limits=limits)
     phase = make_free_single_support_phase(body, step_length_m, trajectory, grid)
 
     @cache
@@ -227,6 +236,7 @@ def nao_dsp_free(
     step_length_m: float = 0.06,
     samples_per_interval: int = SPLINE_SAMPLES,
     load_degree: int = LOAD_DEGREE,
+    limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Double support of NAO with every freedom that two flat soles leave.
 
@@ -237,7 +247,7 @@ def nao_dsp_free(
         Ends, limits, loads and objective of Gupta, Pratihar, Deb (2023), section 4.2; the formulation is this package's own.
     """
     check_step_length(step_length_m)
-    body = make_leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia))
+    body = make_leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia, limits=limits))
     sharing = share_load(body, torso_share, load_degree)
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
     phase = make_support_phase(body, "dsp", step_length_m, trajectory, grid, Goal(), sharing)

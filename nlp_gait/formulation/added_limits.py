@@ -1,0 +1,81 @@
+"""Limits that the user adds to those of a gait's phases, as objects or by name."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import nlp_gait.user_code as user_code
+from nlp_gait.errors import InputError, unknown
+from nlp_gait.providers import LIMITS, import_object
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddedLimits:
+    """Limits (see ``nlp_gait.limits.Limit``) by kind of phase, and their names, which are recorded as an option."""
+
+    single_support: tuple[Any, ...] = ()
+    double_support: tuple[Any, ...] = ()
+    names: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return ",".join(self.names)
+
+    def select(self, standing: Iterable[str]) -> tuple[Any, ...]:
+        """Return the limits of a phase from the sides of the feet that stand."""
+        return self.single_support if len(tuple(standing)) == 1 else self.double_support
+
+    def extend(self, more: "AddedLimits") -> "AddedLimits":
+        """Return these limits and more."""
+        return AddedLimits(
+            single_support=self.single_support + more.single_support,
+            double_support=self.double_support + more.double_support,
+            names=self.names + more.names,
+        )
+
+
+def make_added_limits(single_support: Iterable[Any], double_support: Iterable[Any]) -> AddedLimits:
+    """Return limits that are given as objects; raises InputError for a class in place of an object."""
+    single, double = tuple(single_support), tuple(double_support)
+    for limit in (*single, *double):
+        if isinstance(limit, type) or not callable(getattr(limit, "add", None)):
+            raise InputError(f"a limit must be an object with a method add, got {limit!r}; for example FrictionCone()")
+    names = [type(limit).__name__ for limit in (*single, *double)]
+    return AddedLimits(single_support=single, double_support=double, names=tuple(dict.fromkeys(names)))
+
+
+def parse_limits(value: str | AddedLimits) -> AddedLimits:
+    """Return the limits of an option: objects, or names separated by commas, of limits that every phase gets.
+
+    A name is that of a limit of this package, of an installed package's entry point, or ``file.py:name`` or ``module:name`` of a
+    class without required arguments. Raises UnknownNameError, and UserCodeError for code that is not found or fails.
+    """
+    if isinstance(value, AddedLimits):
+        return value
+    names = tuple(name.strip() for name in value.split(",") if name.strip())
+    limits = tuple(_load_limit(name) for name in names)
+    return AddedLimits(single_support=limits, double_support=limits, names=names)
+
+
+def resolve_limits(text: str, owner: str) -> str:
+    """Return names of limits in a data file (the owner) as the user gave them; raises as ``resolve_code``."""
+    return ",".join(user_code.resolve_code(name.strip(), "limit", owner) for name in text.split(",") if name.strip())
+
+
+def hash_limits(text: str) -> str:
+    """Return a hash of the user's code that names of limits refer to, "" if there is none."""
+    own = [name.strip() for name in text.split(",") if user_code.is_reference(name.strip())]
+    return ",".join(user_code.hash_source(name, "limit") for name in own)
+
+
+def _load_limit(name: str) -> Any:
+    if name in LIMITS:
+        return import_object(LIMITS[name])()
+    if not user_code.is_user_code(name, "limit"):
+        raise unknown("limit", name, [*LIMITS, *user_code.find_entry_points("limit")])
+    user_code.allow_code(name, "limit")
+    found: Any = user_code.load_object(name, "limit")
+    path = user_code.parse_reference(name, "limit").home
+    limit = user_code.call_user_code(name, path, found) if isinstance(found, type) else found
+    if not callable(getattr(limit, "add", None)):
+        raise InputError(f"{name!r} must be a class of limits with a method add, got {found!r}")
+    return limit
