@@ -1,0 +1,228 @@
+"""Limits that a user adds: every one on every kind of phase, and against values by hand and MuJoCo."""
+
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import DM, MX
+
+import nlp_gait
+from nlp_gait.backends.exact import build_exact_model
+from nlp_gait.backends.nlp import build_nlp
+from nlp_gait.errors import GaitError, UserCodeError
+from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples
+from nlp_gait.proofs.guarantee import guarantee
+from nlp_gait.symbolic.nonsmooth import Exact
+
+LIMITS = {"FrictionCone": "friction[", "FootClearance": "foot_clearance["}  # and their rows
+OPTIMUM = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)  # of nao-ssp, to printed digits
+ONE = """
+from nlp_gait.limits import MX, Limit, make_parameters, make_rows_at_samples
+
+class HipHeight(Limit):
+    parameters = make_parameters(("least_hip_m", "m", 0.2, "least height of the hip", 0.0, 1.0))
+
+    def add(self, at, samples, ops):
+        return [make_rows_at_samples("hip_height", "m", samples.read("hip")[2, :], ("hip",), at["least_hip_m"])], {}
+"""
+
+
+@pytest.fixture(scope="module")
+def problems() -> Callable[[str], GaitProblem]:
+    made: dict[str, GaitProblem] = {}
+
+    def load(name: str) -> GaitProblem:
+        if name not in made:
+            made[name] = nlp_gait.load(name, intervals=4, limits=",".join(LIMITS))
+        return made[name]
+
+    return load
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "nao-ssp",
+        "nao-dsp",
+        "nao-cycle",
+        "nao-ssp-free",
+        "nao-dsp-free",
+        "humanoid-ssp",
+        "humanoid-dsp",
+        pytest.param("nao-walk", marks=pytest.mark.slow),
+        pytest.param("humanoid-cycle", marks=pytest.mark.slow),
+        pytest.param("humanoid-walk", marks=pytest.mark.slow),
+    ],
+)
+def test_every_limit_has_rows_in_every_kind_of_phase(problems: Callable[[str], GaitProblem], name: str) -> None:
+    problem = problems(name)
+    rows = build_exact_model(problem).row_names
+    assert any("friction[" in row for row in rows)
+    assert any("foot_clearance[" in row for row in rows) == ("dsp" not in name)
+    assert build_nlp(problem).g.shape[0] >= len(rows) - len(problem.names)  # the other interpretation has them, too
+    x = 0.5 * (problem.lower + problem.upper)
+    values = build_exact_model(problem).at(x, problem.p)
+    added = [value for row, value in zip(rows, values.g, strict=True) if "friction[" in row or "clearance[" in row]
+    assert np.isfinite(added).all()
+
+
+def evaluate_rows(limit: Limit, **samples: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return values (m,) of a limit's rows and its indexes on samples by hand."""
+    found = Samples(joints=(), moving=(), per_interval=1, duration=MX(1.0), **samples)
+    names = [parameter.name for parameter in limit.parameters]
+    at = Point.of(MX(0, 1), MX(DM([parameter.default for parameter in limit.parameters])), (), names)
+    rows, indexes = limit.add(at, found, Exact())
+    values = [np.array(ca.evalf(row.value)).ravel() for row in rows]
+    return np.concatenate(values or [np.zeros(0)]), np.array([float(ca.evalf(v)) for v in indexes.values()])
+
+
+def test_friction_by_hand() -> None:
+    wrench = MX(DM([[3.0, 0.0], [4.0, -6.0], [10.0, 10.0], [0, 0], [0, 0], [0, 0]]))
+    values, ratios = evaluate_rows(
+        FrictionCone(), standing=("L",), progress=MX(DM([[0.0, 1.0]])), values={"wrench_L": wrench}
+    )
+    np.testing.assert_allclose(values, [0.6 * 10 - 5, 0.6 * 10 - 6], atol=1e-6)
+    np.testing.assert_allclose(ratios, [0.6], atol=1e-6)
+
+
+def test_clearance_by_hand() -> None:
+    progress = MX(DM([[0.0, 0.25, 0.5, 0.75, 1.0]]))
+    heights = MX(DM([[0.0, 0.006, 0.009, 0.006, 0.0]]))
+    values, highest = evaluate_rows(
+        FootClearance(), standing=("L",), progress=progress, values={"swing_heights": heights}
+    )
+    quarter = 0.01 * 16 * (0.25 * 0.75) ** 2
+    np.testing.assert_allclose(values, [0.006 - quarter, -0.001, 0.006 - quarter], atol=1e-15)
+    assert highest == 0.009
+    none, _ = evaluate_rows(FootClearance(), standing=("L", "R"), progress=progress, values={})
+    assert none.size == 0
+
+
+def test_friction_and_height_are_those_of_mujoco() -> None:
+    """The ground's wrench on the standing foot by MuJoCo's inverse dynamics, and the swinging foot by its kinematics."""
+    pytest.importorskip("mujoco", reason="needs the extra sim")
+    from nlp_gait.gaits.nao.body import GRAVITY
+    from nlp_gait.robots.tree import make_tree
+    from nlp_gait.simulation.engine import load_mujoco
+    from tests.simulation.inverse_dynamics_oracle import fixed_model, standing_on
+
+    problem = nlp_gait.load("nao-ssp", limits=",".join(LIMITS)).with_values(friction_coefficient=0.3)
+    x = problem.check_x((*OPTIMUM[:-1], 0.6))  # fast, so that there is friction
+    model, signals = build_exact_model(problem), problem.signals(x)
+    rows = dict(zip(model.row_names, model.at(x, problem.p).g, strict=True))
+    robot = problem.display.simulation_model.robot  # type: ignore[union-attr]
+    _, wrench = standing_on(robot, GRAVITY, "left", signals)
+    slack = 0.3 * wrench[:, 2] - np.hypot(wrench[:, 0], wrench[:, 1])
+    np.testing.assert_allclose([rows[f"friction[left, {k}]"] for k in range(11)], slack, atol=1e-5)
+    assert np.ptp(slack) > 1.0
+
+    engine = load_mujoco()
+    fixed = engine.MjModel.from_xml_string(fixed_model(make_tree(robot, robot.feet["left"].link)))
+    data = engine.MjData(fixed)
+    columns = [signals.joints.index(fixed.joint(i).name) for i in range(fixed.njnt)]
+    place = []
+    for angles in signals.arrays["q"]:
+        data.qpos[:] = angles[columns]
+        engine.mj_kinematics(fixed, data)
+        place.append(data.body(robot.feet["right"].link).xpos[2])
+    heights = np.array(place) - place[0]
+    s = np.linspace(0.0, 1.0, 11)
+    above = heights - 0.01 * 16 * s**2 * (1 - s) ** 2
+    np.testing.assert_allclose([rows[f"foot_clearance[sole, {k}]"] for k in range(1, 10)], above[1:-1], atol=1e-9)
+
+
+def test_a_limit_costs_what_it_must_and_is_guaranteed_between_samples() -> None:
+    problem = nlp_gait.load("nao-ssp", intervals=4)
+    higher = problem.with_limits(single_support=[FootClearance()]).with_values(foot_clearance_m=0.02)
+    optimum, limited = (nlp_gait.solve(p, starts=2, seed=0) for p in (problem, higher))
+    assert limited.objective > optimum.objective
+    (price, *_) = [active.price for active in limited.active_constraints if active.name.startswith("foot_clearance[")]
+    assert price > 0.0
+    assert "foot_clearance" in str(guarantee(higher, higher.check_x(optimum.x)))
+    slippery = problem.with_limits(single_support=[FrictionCone()])
+    assert guarantee(slippery, slippery.check_x(optimum.x)).satisfied == guarantee(problem, optimum.x_array).satisfied
+
+
+def test_values_and_options_are_kept_and_problems_can_be_pickled() -> None:
+    problem = nlp_gait.load("nao-dsp", intervals=3).with_values(dbm_y_mean_limit_m=0.07)
+    limited = problem.with_limits(double_support=[FrictionCone()])
+    assert limited.value("dbm_y_mean_limit_m") == 0.07 and limited.options["intervals"] == 3
+    assert limited.options["limits"] == "FrictionCone"
+    again = pickle.loads(pickle.dumps(limited))
+    assert build_exact_model(again).row_names == build_exact_model(limited).row_names
+
+
+def test_a_recorded_motion_has_the_rows_too() -> None:
+    from nlp_gait.formulation import Grid
+    from nlp_gait.gaits.biped.recorded_cycle import make_recorded_phase_problem
+    from nlp_gait.gaits.biped.recorded_motion import RecordedMotion
+    from nlp_gait.gaits.nao.body import make_nao
+
+    problem = nlp_gait.load("nao-ssp")
+    signals = problem.signals(problem.check_x(OPTIMUM))
+    motion = RecordedMotion(body=make_nao("nao-v5"), t=signals.arrays["t"], q=signals.arrays["q"])
+    body = make_nao("nao-v5", limits=",".join(LIMITS))
+    recorded = make_recorded_phase_problem(body, "ssp", replace(motion, body=body), Grid(intervals=10))
+    rows = build_exact_model(recorded)
+    values = dict(zip(rows.row_names, rows.at(np.array([4.0]), recorded.p).g, strict=True))
+    planned = nlp_gait.load("nao-ssp", limits=",".join(LIMITS))
+    model = build_exact_model(planned)
+    own = dict(zip(model.row_names, model.at(planned.check_x(OPTIMUM), planned.p).g, strict=True))
+    assert values["friction[left, 5]"] == pytest.approx(own["friction[left, 5]"], abs=0.05)
+    assert values["foot_clearance[front left, 5]"] == pytest.approx(own["foot_clearance[sole, 5]"], abs=1e-4)
+
+
+def test_your_own_limit_from_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "my_limits.py"
+    file.write_text(ONE)
+    problem = nlp_gait.load("nao-ssp", intervals=3, limits=f"{file}:HipHeight")
+    assert "hip_height[hip, 3]" in build_exact_model(problem).row_names
+    assert problem.value("least_hip_m") == 0.2
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [("Frictoin", "unknown limit 'Frictoin'"), ("no_such_file.py:A", "no_such_file.py")],
+)
+def test_unknown_limits_are_refused(limits: str, message: str) -> None:
+    with pytest.raises(GaitError, match=message):
+        nlp_gait.load("nao-ssp", limits=limits)
+
+
+def test_objects_that_are_no_limits_are_refused() -> None:
+    with pytest.raises(GaitError, match="FrictionCone()"):
+        nlp_gait.load("nao-ssp").with_limits(single_support=[FrictionCone])  # type: ignore[list-item]
+    with pytest.raises(GaitError, match="takes no limits"):
+        nlp_gait.load("walk12").with_limits(single_support=[FrictionCone()])
+
+
+def test_a_limit_that_reads_what_a_motion_lacks_is_refused() -> None:
+    class Unknown(Limit):
+        def add(self, at: Point, samples: Samples, ops: Any) -> Any:
+            return [], {"index": ca.mmax(samples.read("temperature"))}
+
+    problem = nlp_gait.load("nao-ssp").with_limits(single_support=[Unknown()])
+    with pytest.raises(GaitError, match="temperature"):
+        build_exact_model(problem)
+
+
+def test_a_stored_gait_runs_no_limit_that_was_not_named(tmp_path: Path) -> None:
+    from nlp_gait.formulation.result import load_result
+
+    problem = nlp_gait.load("nao-ssp", intervals=3)
+    stored = nlp_gait.solve(problem, starts=1).to_json()
+    stored["problem"]["options"]["limits"] = f"{tmp_path / 'evil.py'}:Limit"
+    (tmp_path / "evil.py").write_text("raise SystemExit('ran')")
+    import json
+
+    file = tmp_path / "gait.json"
+    file.write_text(json.dumps(stored))
+    with pytest.raises(UserCodeError, match="--code"):
+        load_result(file)
+    assert Result  # imported for its name in messages
