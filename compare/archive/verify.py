@@ -26,6 +26,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError
 from nlp_gait.files import make_temporary_folder, read_text
 from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.progress import Progress, ignore_progress
 from nlp_gait.proofs.certificate import check_certificate, load_certificates, read_certificate
@@ -218,9 +219,9 @@ def _make_task(record: RunRecord, definition: Mapping[str, Any]) -> Task:
     stop, handling = ({**polishes, **definition}.get(key) for key in ("stop", "handling"))
     if (stop or {}).get("time_limit_s") is not None:
         raise InputError("it ended by the clock or could have")
-    name = resolve_code(stored.name, "problem", "the run")
+    name, options = resolve_stored(stored.name, stored.options, "the run")
     task = Task(
-        problem=ProblemSpec(name=name, options=stored.options, values=stored.parameters, label=record.problem),
+        problem=ProblemSpec(name=name, options=options, values=stored.parameters, label=record.problem),
         solver=solver,
         settings=definition["settings"],
         handling=decode(Handling, handling) if handling else Handling(),

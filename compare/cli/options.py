@@ -178,6 +178,7 @@ def name_all(code: Sequence[str] | None) -> None:
             raise InputError(f"--code takes FILE.py:NAME, MODULE:NAME or cmd:COMMAND, got {text!r}")
         allow_code(text, "problem")
         allow_code(text, "algorithm")
+        allow_code(text, "limit")
 
 
 def parse_names(text: str) -> list[str]:

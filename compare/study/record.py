@@ -23,11 +23,12 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import LARGEST_FILE, check_plain, convert_errors, read_json, replace_nan
 from nlp_gait.formulation import GaitProblem, Objective, Result
+from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import ActiveConstraint, Evaluations
 from nlp_gait.notebook import format_html_table, import_pandas
 from nlp_gait.proofs.guarantee import Guarantee
-from nlp_gait.user_code import remove_comments, resolve_code
+from nlp_gait.user_code import remove_comments
 
 # Packages and modules that decide the result of a run, next to the problem, whose probes are in the definition.
 CODE = ("metaheuristics", "nlp_gait.backends.solvers", "nlp_gait.backends.nlp", "compare.study.run_task")
@@ -330,8 +331,9 @@ def load_gait(record: RunRecord) -> Result:
 def load_problem(record: RunRecord) -> GaitProblem:
     """Return the problem of a record; raises GaitError if it cannot be loaded."""
     stored = decode(StoredProblem, record.definition["problem"], "definition.problem")
-    name = resolve_code(stored.name, "problem", f"the record of {record.solver}, run {record.run},")
-    return ProblemSpec(name=name, options=stored.options, values=stored.parameters).load()
+    owner = f"the record of {record.solver}, run {record.run},"
+    name, options = resolve_stored(stored.name, stored.options, owner)
+    return ProblemSpec(name=name, options=options, values=stored.parameters).load()
 
 
 def make_row(record: RunRecord) -> list[object]:

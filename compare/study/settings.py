@@ -17,6 +17,7 @@ from nlp_gait.backends.kernel.compiler import BASE_FLAGS, find_compiler, lane_fl
 from nlp_gait.decoding import decode
 from nlp_gait.errors import CompilerError, InputError
 from nlp_gait.files import check_plain, convert_errors, read_json, read_text, write_json
+from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import resolve_code
 
@@ -100,12 +101,17 @@ def resolve_user_code(settings: StudySettings, owner: str) -> StudySettings:
     """Return settings from a folder with user code as this command names it; raises UserCodeError if it does not."""
     return replace(
         settings,
-        problems=tuple(replace(p, name=resolve_code(p.address, "problem", owner)) for p in settings.problems),
+        problems=tuple(_resolve_problem(p, owner) for p in settings.problems),
         solvers=tuple(
             s if s.name in list_solvers() else replace(s, name=resolve_code(s.name, "algorithm", owner))
             for s in settings.solvers
         ),
     )
+
+
+def _resolve_problem(problem: ProblemSpec, owner: str) -> ProblemSpec:
+    name, options = resolve_stored(problem.address, problem.options, owner)
+    return replace(problem, name=name, options=options)
 
 
 def read_settings(path: Path) -> StudySettings:

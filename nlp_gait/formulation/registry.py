@@ -147,10 +147,10 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
         raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
 
 
-def load_stored(name: str, options: Mapping[str, Any], owner: str) -> GaitProblem:
-    """Return a problem of a data file (the owner), whose user code must have been named; raises as ``load``, ``resolve_code``."""
+def resolve_stored(name: str, options: Mapping[str, Any], owner: str) -> tuple[str, dict[str, Any]]:
+    """Return name and options of a problem in a data file (the owner), with user code as it was named; see ``resolve_code``."""
     limits = {"limits": resolve_limits(str(options["limits"]), owner)} if options.get("limits") else {}
-    return load(user_code.resolve_code(name, "problem", owner), **{**options, **limits})
+    return user_code.resolve_code(name, "problem", owner), {**options, **limits}
 
 
 def hash_files(options: Mapping[str, Any]) -> dict[str, str]:

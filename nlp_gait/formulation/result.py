@@ -13,9 +13,8 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import GaitError, InputError, check_count
 from nlp_gait.files import read_json
 from nlp_gait.formulation.gait_problem import GaitProblem
-from nlp_gait.formulation.registry import load
+from nlp_gait.formulation.registry import load, resolve_stored
 from nlp_gait.formulation.signals import Array, Signals
-from nlp_gait.user_code import resolve_code
 
 SCHEMA = 1  # of a result, and the default
 SHORTEST_S, LONGEST_S = 0.001, 300.0  # of a gait; a step takes a second
@@ -107,7 +106,8 @@ def explain_errors(owner: str, remedy: str) -> Iterator[None]:
 def _make_result(
     name: str, options: Mapping[str, str | int | float | bool], parameters: Mapping[str, float], x: Mapping[str, float]
 ) -> Result:
-    problem = load(resolve_code(name, "problem", "it"), **options).with_values(**parameters)
+    name, options = resolve_stored(name, options, "it")
+    problem = load(name, **options).with_values(**parameters)
     return Result(problem=problem, x=problem.check_x(x))
 
 

@@ -21,6 +21,7 @@ from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.files import convert_errors, read_json
 from nlp_gait.formulation import Array, GaitProblem, load
+from nlp_gait.formulation.registry import resolve_stored
 from nlp_gait.formulation.result import StoredProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.progress import Progress
@@ -28,7 +29,6 @@ from nlp_gait.proofs.bounds import make_bounds
 from nlp_gait.proofs.boxes import halve
 from nlp_gait.proofs.branch_and_bound import Certificate, certify, target_cost
 from nlp_gait.proofs.checkpoint import PROVER
-from nlp_gait.user_code import resolve_code
 
 CERTIFICATES = Path(str(files("nlp_gait.proofs") / "certificates"))
 PATHS, STARTS = 200, 5
@@ -91,8 +91,8 @@ def load_certified_problem(file: CertificateFile) -> GaitProblem:
     """Return the problem of a certificate; raises InputError if it cannot be made or has changed."""
     with convert_errors("the certificate's problem cannot be made", InputError):
         stored = decode(StoredProblem, file.problem, "problem")
-        name = resolve_code(stored.name, "problem", "the certificate")
-        problem = load(name, **stored.options).with_values(**stored.parameters)
+        name, options = resolve_stored(stored.name, stored.options, "the certificate")
+        problem = load(name, **options).with_values(**stored.parameters)
     difference = describe_difference(file.problem, identify_problem(problem))
     if difference:
         raise InputError(
