@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import nlp_gait
 
 # %%
+# The limit: a class with parameters and rows.
 from nlp_gait.limits import Limit, make_parameters, make_rows_at_samples
 
 HIPS = ("LHipPitch", "RHipPitch")
@@ -29,12 +30,12 @@ class HipPitchRate(Limit):
 
 
 # %%
-# The slower the hips must be, the longer the step takes or the more power it needs.
+# The slower the hips must be, the more power a step of 0.8 s needs.
 
 problem = nlp_gait.load("nao-ssp").with_limits(single_support=[HipPitchRate()]).fix(single_support_time_s=0.8)
-limits, powers = (3.0, 1.4, 1.3, 1.25), []
+limits, powers = (3.0, 1.4, 1.2, 1.1), []
 for limit in limits:
-    solution = nlp_gait.solve(problem.with_values(hip_pitch_rate_limit_rad_s=limit), starts=6, seed=0)
+    solution = nlp_gait.solve(problem.with_values(hip_pitch_rate_limit_rad_s=limit), starts=2, seed=0)
     powers.append(solution.objective)
     print(f"{limit} rad/s: {solution.objective:.4f} W, {solution.status}")
 

@@ -34,7 +34,7 @@ Kind = Literal["problem", "algorithm", "limit"]
 GROUPS: Mapping[Kind, str] = {
     "problem": "nlp_gait.problems",
     "algorithm": "nlp_gait.algorithms",
-    "limit": "nlp_gait.limits",
+    "limit": "nlp_gait.gait_limits",
 }
 ENDING = ".py"
 PROGRAM = "cmd:"

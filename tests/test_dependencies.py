@@ -30,6 +30,7 @@ LAYERS = (
     "nlp_gait.symbolic",
     "nlp_gait.formulation",
     "nlp_gait.gaits",
+    "nlp_gait.limits",
     "nlp_gait.backends",
     "nlp_gait.proofs",
     "nlp_gait.simulation",

@@ -81,6 +81,13 @@ class ProblemOptions:
             "NAME.lower=VALUE; repeatable.",
         ),
     ] = None
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Add a limit to every phase: FrictionCone, FootClearance, or your own, FILE.py:NAME; repeatable.",
+        ),
+    ] = None
 
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these values; raises UnknownNameError, and InputError for bad values."""
@@ -89,6 +96,8 @@ class ProblemOptions:
         options = parse_options(spec.address, [(key, text) for key, text in given.items() if key in known])
         if self.robot is not None:
             options["robot"] = self.robot
+        if self.limit:
+            options |= parse_options(spec.address, [("limits", ",".join(self.limit))])
         spec = spec.with_options(**options)
         problem = spec.load()
         numbers = {key: parse_number(key, text, "--set") for key, text in given.items() if key not in known}

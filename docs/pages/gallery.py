@@ -14,6 +14,7 @@ ORDER = (
     "sweep.py",
     "front.py",
     "your_own_objective.py",
+    "your_own_limit.py",
     "your_own_problem.py",
     "your_own_algorithm.py",
     "results_from_matlab.py",

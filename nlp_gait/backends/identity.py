@@ -5,6 +5,7 @@ Keys of files hash names and numbers. A stored value is used only where the prob
 """
 
 import hashlib
+import inspect
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +15,8 @@ import numpy as np
 
 from nlp_gait.backends.exact import ExactModel, build_exact_model
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.formulation.registry import hash_files
+from nlp_gait.formulation.registry import find_maker, hash_files
+from nlp_gait.providers import PROBLEMS
 from nlp_gait.user_code import shorten_name
 
 PROBES, FILES, VALUES = "probes", "files", "values"
@@ -61,8 +63,14 @@ def make_key(problem: Mapping[str, Any]) -> dict[str, Any]:
     part = {key: value for key, value in problem.items() if key not in (PROBES, FILES)}
     numbers = (probe[key] for probe in problem.get(PROBES, ()) for key in ("objective", "violation"))
     digits = " ".join("nan" if number is None else f"{number:.6g}" for number in numbers)
-    options = {**problem["options"], **problem.get(FILES, {})}
+    options = {**_drop_defaults(problem["name"], problem["options"]), **problem.get(FILES, {})}
     return {**part, "name": shorten_name(problem["name"]), "options": options, VALUES: digits}
+
+
+def _drop_defaults(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of a problem of this package that differ from its defaults: a new option changes no key."""
+    known = inspect.signature(find_maker(name)).parameters if name in PROBLEMS else {}
+    return {key: value for key, value in options.items() if key not in known or known[key].default != value}
 
 
 def split_probes(data: Any) -> tuple[Any, list[Any]]:

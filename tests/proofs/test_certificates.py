@@ -115,12 +115,12 @@ def test_a_random_path_of_a_shipped_proof_ends(name: str) -> None:
     assert check_certificate(load_certificates()[name], starts=1, paths=1).paths == 1
 
 
-def test_shipped_certificates_record_all_options_of_their_problems() -> None:
+def test_shipped_certificates_load_the_problems_that_they_name() -> None:
+    """Options that are newer than a certificate have their defaults."""
     for name, file in load_certificates().items():
         assert file.certificate.closed, name
-        assert (
-            dict(nlp_gait.load(file.problem["name"], **file.problem["options"]).options) == file.problem["options"]
-        ), name
+        options = nlp_gait.load(file.problem["name"], **file.problem["options"]).options
+        assert file.problem["options"].items() <= options.items(), name
 
 
 def test_evidence_is_what_certificates_prove() -> None:

@@ -20,4 +20,5 @@ Options that the problems share:
     motors                 features of the real motors, see ``gaits.biped.motors``, if the file has their data
     torso_share            in double support: lever shares the torso's mass by the lever rule, free plans the ground's wrench
     load_degree            of that wrench's polynomials over double support
+    limits                 more limits of every phase, see ``nlp_gait.limits``
 """
