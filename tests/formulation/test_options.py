@@ -31,6 +31,7 @@ OTHER: dict[str, Any] = {
     "step_length_m": 0.07,
     "samples_per_interval": 2,
     "motors": "limits",
+    "limits": "FrictionCone",
     "drive_limits": False,
     "angle_limits": False,
     "load_degree": 3,

@@ -36,6 +36,7 @@ SAMPLES = Samples(
     standing=("L",),
     per_interval=1,
     duration=MX(1.0),
+    progress=MX(DM(np.linspace(0.0, 1.0, COUNT)).T),
     values={
         "torque": MX(DM(TORQUE)),
         "power": MX(DM(POWER)),
