@@ -67,9 +67,9 @@ def describe_shipped() -> str:
     """Return a sentence on the instances whose records are shipped."""
     there, everything = list_baselines(), gaitbench.list_instances()
     if set(there) >= set(everything):
-        return "Records of all instances are shipped."
+        return "Runs on all instances are shipped."
     return (
-        f"Shipped so far are the records of {len(there)} of the {len(everything)} instances: "
+        f"Shipped so far are runs on {len(there)} of the {len(everything)} instances: "
         + ", ".join(f"`{id}`" for id in everything if id in there)
         + "."
     )

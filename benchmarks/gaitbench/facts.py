@@ -1,6 +1,6 @@
 """Best known points of GaitBench, the evidence for them, and probe values: ``python -m benchmarks.gaitbench.facts``.
 
-The points are found with IPOPT from random starts, with CMA-ES, and from the best points of the baseline's solvers.
+The points are found with IPOPT from random starts and with CMA-ES.
 Finished instances are stored in ``nlp_gait/gaitbench/facts.json``; rerun the command to continue with the missing ones. With
 ``--again``, a better point may replace the stored one; probe values never change once they are published. The bounds that the
 shipped certificates prove are always included.
@@ -20,7 +20,6 @@ import numpy as np
 
 import metaheuristics
 import nlp_gait
-from compare.bench.baseline import list_baselines, load_baseline
 from metaheuristics.adapters.cma import CmaEs
 from nlp_gait import gaitbench
 from nlp_gait.decoding import decode
@@ -58,7 +57,6 @@ THOROUGH = Effort(
 QUICK = Effort(starts=((12, 6), (22, 2), (300, 1)), cma_runs=1, cma_evaluations=5_000, cma_most_variables=12)
 SHARES, TIMED = 100_000, 20_000
 PROOF_TOLERANCE = 1e-3
-BASELINE_POINTS = 5  # points of the baseline's best runs that the search starts from
 
 
 class NothingFound(Exception):
@@ -111,7 +109,7 @@ def find_facts(id: str, effort: Effort, prove_s: float, published: Facts | None)
     best_known = float(instance(best[None])[0][0])
     searched = long_search(instance, effort) if n <= effort.cma_most_variables else None
     others = [] if searched is None else [searched]
-    for objective, point in others + best_baseline_points(id):
+    for objective, point in others:
         if objective < best_known:
             for x in near(instance, point):
                 f, violation = instance(x[None])
@@ -168,16 +166,6 @@ def near(instance: Instance, point: Array) -> Iterator[Array]:
     for x in (point, np.array(list(refined.x.values()))):
         if (feasible := make_strictly_feasible(instance, x)) is not None:
             yield feasible
-
-
-def best_baseline_points(id: str) -> list[tuple[float, Array]]:
-    """Return objective and point of the baseline's best feasible runs, the best first; empty without shipped records."""
-    if id not in list_baselines():
-        return []
-    runs = sorted(
-        (record for record in load_baseline(id) if record.verdict.feasible), key=lambda r: r.verdict.objective
-    )
-    return [(record.verdict.objective, np.array(list(record.x.values()))) for record in runs[:BASELINE_POINTS]]
 
 
 def find_proven_gap(id: str, best_known: float) -> float | None:

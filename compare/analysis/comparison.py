@@ -123,22 +123,32 @@ class Comparison:
         return 0.0 if -BETTER <= gap < 0.0 else gap
 
 
-def compare_problems(records: Sequence[RunRecord], weighting: Weighting = DEFAULT_WEIGHTING) -> list[Comparison]:
+def compare_problems(
+    records: Sequence[RunRecord],
+    weighting: Weighting = DEFAULT_WEIGHTING,
+    references: Mapping[str, float] | None = None,
+) -> list[Comparison]:
     """Return one comparison per problem among records, in their order; InputError if runs disagree on a problem's objective.
 
-    Gaps are measured from the shipped best known value of exactly this problem, else from the best of the records.
+    Gaps are measured from a problem's entry in ``references``, else from the shipped best known value of exactly this
+    problem, else from the best of the records.
     """
-    problems = dict.fromkeys(record.problem for record in records)
-    return [_make_comparison(name, [r for r in records if r.problem == name], weighting) for name in problems]
+    groups: dict[str, list[RunRecord]] = {}
+    for record in records:
+        groups.setdefault(record.problem, []).append(record)
+    return [_make_comparison(name, group, weighting, (references or {}).get(name)) for name, group in groups.items()]
 
 
-def _make_comparison(problem: str, records: Sequence[RunRecord], weighting: Weighting) -> Comparison:
+def _make_comparison(
+    problem: str, records: Sequence[RunRecord], weighting: Weighting, reference: float | None
+) -> Comparison:
     objective = read_objective(records[0])
     for record in records:
         if read_objective(record) != objective:
             raise InputError(f"records of {problem!r} disagree on the objective: {record.solver}, run {record.run}")
     known = find_reference(records[0].definition["problem"])
-    reference = find_best_known(records, objective) if known.objective is None else known.objective
+    if reference is None:
+        reference = find_best_known(records, objective) if known.objective is None else known.objective
     solvers = []
     for name in dict.fromkeys(record.solver for record in records):
         runs = tuple(sorted((r for r in records if r.solver == name), key=lambda r: r.run))

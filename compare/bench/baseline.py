@@ -1,20 +1,25 @@
-"""The rules of GaitBench 1, and the shipped records of its baseline: one compressed file for each instance.
+"""The rules of GaitBench 1, and its shipped baseline: final objectives and running times to targets of twelve solvers.
 
-A packed record lacks time histories, the dense grid, prices and indexes; ``benchmarks.gaitbench.baseline`` packs them.
+``python -m benchmarks.gaitbench.baseline`` writes the table from full records.
 """
 
-import gzip
-import json
+import csv
+import lzma
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from compare.study.record import RunRecord, decode_record
+from compare.analysis.anytime import SHARES
+from compare.analysis.best_known import is_zero
+from compare.analysis.record_statistics import ECDF_TARGETS
+from compare.study.record import History, RunRecord, Times, Verdict
 from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import ProblemSpec, Stop
+from compare.study.task import GRADIENT_SOLVERS, ProblemSpec, Stop
 from nlp_gait import gaitbench
 from nlp_gait.errors import InputError
 from nlp_gait.gaitbench.facts import Subset
@@ -24,8 +29,9 @@ from nlp_gait.gaitbench.generated import is_generated, list_test_seeds, make_id
 RUNS = 15
 EVALUATIONS = 10_000  # as in the papers: 50 candidates, 200 generations
 BASELINE = tuple("random pso ga aco aco-grid cma de pymoo:GA pymoo:DE pymoo:ISRES slsqp ipopt".split())
-FOLDER = Path(__file__).with_name("records")
-DRAWN = "drawn"  # folder below it, and the suite, of drawn instances: fewer runs of the same solvers
+DRAWN_RUNS = 3  # on each drawn instance
+TABLE = Path(__file__).with_name("baseline.csv.xz")
+BELOW = 1.0 - 1e-8  # of a target's gap: that of the run when it was reached, so that no rounding leaves it above
 SEEDS = re.compile(r"([0-9]{1,12}):([0-9]{1,12})")
 MOST_SEEDS = 1000
 
@@ -70,27 +76,111 @@ def make_bench_study(
     return StudySettings(problems=problems, solvers=solvers, runs=runs, starts=runs, stop=Stop(evaluations=evaluations))
 
 
-def list_baselines(folder: Path = FOLDER) -> tuple[str, ...]:
-    """Return the ids of the instances with baseline records, without drawn ones."""
-    return tuple(sorted(path.name.removesuffix(".json.gz") for path in folder.glob("*.json.gz")))
+@dataclass(frozen=True, kw_only=True)
+class BaselineRun:
+    """One run of the baseline."""
 
-
-def list_drawn(folder: Path = FOLDER) -> tuple[str, ...]:
-    """Return the ids of the drawn instances with baseline records."""
-    return tuple(id.replace("_", ":") for id in list_baselines(folder / DRAWN))
-
-
-def locate_records(instance: str, folder: Path | None) -> Path:
-    """Return the file of an instance's records: Windows allows no colons in names."""
-    folder = folder or (FOLDER / DRAWN if is_generated(instance) else FOLDER)
-    return folder / f"{instance.replace(':', '_')}.json.gz"
+    instance: str
+    solver: str
+    run: int  #: also the seed
+    objective: float  #: in the problem's sense; NaN if no feasible point was found
+    in_history: bool  #: whether the history ends at it; IPOPT without convergence has reached no target
+    evaluations: int  #: equivalent ones of the whole run
+    #: Gaps after ``SHARES`` of the budget, infinite before the first feasible point; empty for a run without a history
+    gaps: tuple[float, ...]
+    times: tuple[int, ...]  #: evaluations until each of ``ECDF_TARGETS``, as far as they were reached
 
 
 @cache
-def load_baseline(instance: str, folder: Path | None = None) -> tuple[RunRecord, ...]:
-    """Return the records of all solvers of the baseline on an instance; raises InputError if none are shipped."""
-    path = locate_records(instance, folder)
-    if not path.is_file():
-        available = ", ".join((*list_baselines(folder or FOLDER), *list_drawn(folder or FOLDER)))
-        raise InputError(f"no baseline records of {instance!r} are shipped; available: {available}")
-    return tuple(map(decode_record, json.loads(gzip.decompress(path.read_bytes()))))
+def load_table(path: Path = TABLE) -> Mapping[str, tuple[BaselineRun, ...]]:
+    """Return the rows of each instance."""
+    rows: dict[str, list[BaselineRun]] = {}
+    with lzma.open(path, "rt", encoding="utf-8", newline="") as file:
+        for instance, solver, run, objective, in_history, evaluations, gaps, times in csv.reader(file):
+            row = BaselineRun(
+                instance=instance,
+                solver=solver,
+                run=int(run),
+                objective=float(objective),
+                in_history=in_history == "1",
+                evaluations=int(evaluations),
+                gaps=tuple(map(float, gaps.split())),
+                times=tuple(map(int, times.split())),
+            )
+            rows.setdefault(instance, []).append(row)
+    return {instance: tuple(group) for instance, group in rows.items()}
+
+
+def list_baselines() -> tuple[str, ...]:
+    """Return the ids of the instances with a baseline, without drawn ones."""
+    return tuple(id for id in load_table() if not is_generated(id))
+
+
+def list_drawn() -> tuple[str, ...]:
+    """Return the ids of the drawn instances with a baseline."""
+    return tuple(id for id in load_table() if is_generated(id))
+
+
+@cache
+def get_reference(instance: str) -> float:
+    """Return the objective from which the table's gaps are: the best known one; of a drawn instance, the best of its rows."""
+    loaded = gaitbench.load(instance)
+    sign = loaded.gait_problem.objective.sign
+    if not is_generated(instance):
+        return sign * loaded.best_known
+    return sign * min(sign * row.objective for row in load_table()[instance] if not math.isnan(row.objective))
+
+
+@cache
+def load_baseline(instance: str) -> tuple[RunRecord, ...]:
+    """Return the runs of the baseline on an instance; raises InputError if none are shipped.
+
+    A record has what rankings read: its final objective without its point, and the best so far where a target was reached.
+    """
+    if instance not in load_table():
+        raise InputError(f"no baseline of {instance!r} is shipped; available: {', '.join(load_table())}")
+    return tuple(map(make_record, load_table()[instance]))
+
+
+def make_record(row: BaselineRun) -> RunRecord:
+    """Return the record of a run of the baseline."""
+    problem = gaitbench.load(row.instance).gait_problem
+    definition: dict[str, Any] = {
+        "problem": {"name": "gaitbench", "options": {"instance": row.instance}, "parameters": {}},
+        "objective": asdict(problem.objective),
+        "solver": row.solver,
+        "seed": row.run,
+    }
+    if row.solver not in GRADIENT_SOLVERS:
+        definition["handling"] = {"name": "deb", "settings": {}}
+    reference = get_reference(row.instance)
+    unit = problem.objective.sign * (1.0 if is_zero(reference) else abs(reference))
+    gaps = {time: target * BELOW for time, target in zip(row.times, ECDF_TARGETS, strict=False)}
+    budget = max((other.evaluations for other in load_table()[row.instance] if other.gaps), default=0)
+    for share, gap in zip(SHARES, row.gaps, strict=False):
+        if (time := int(share * budget)) < row.evaluations:
+            gaps[time] = min(gap, gaps.get(time, math.inf))
+    values = {time: reference + unit * gap if math.isfinite(gap) else None for time, gap in gaps.items()}
+    feasible = not math.isnan(row.objective)
+    values[row.evaluations] = row.objective if row.in_history else None
+    times = sorted(values)
+    return RunRecord(
+        problem=row.instance,
+        solver=row.solver,
+        run=row.run,
+        seed=row.run,
+        definition=definition,
+        settings={},
+        status="",
+        claimed=row.in_history,
+        x=dict.fromkeys(problem.names, math.nan),
+        claimed_objective=row.objective if row.in_history else None,
+        claimed_violation=None,
+        verdict=Verdict.make_plain(row.objective, 0.0 if feasible else math.nan, feasible),
+        evaluations={"f": row.evaluations},
+        failed_evaluations=0,
+        iterations=0,
+        active_constraints=(),
+        history=History(evaluations=tuple(times), objective=tuple(values[time] for time in times)),
+        time_s=Times.make_unknown(math.nan, (math.nan,) * len(times)),
+    )

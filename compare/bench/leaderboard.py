@@ -12,7 +12,7 @@ from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning
-from compare.bench.baseline import EVALUATIONS, load_baseline
+from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.comparison_figures import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, make_table_section, make_text_table
 from compare.report.provenance import TERMS
@@ -63,7 +63,8 @@ def rank_solvers(instances: Sequence[str], records: Sequence[RunRecord] = (), *,
         for record in (*(load_baseline(id) if shipped else ()), *records)
         if record.problem == id
     ]
-    comparisons = tuple(compare_problems(everything))
+    references = {id: get_reference(id) for id in instances} if shipped else {}
+    comparisons = tuple(compare_problems(everything, references=references))
     return Leaderboard(comparisons=comparisons, standings=tuple(_make_standings(comparisons)))
 
 

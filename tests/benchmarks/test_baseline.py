@@ -1,17 +1,19 @@
-"""Packed records of the baseline have all that the leaderboard needs."""
+"""Rows of the baseline's table have all that rankings need."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.gaitbench.baseline import pack_records
+from benchmarks.gaitbench.baseline import make_rows, write_table
+from compare.analysis.anytime import compute_gaps
 from compare.analysis.comparison import compare_problems
-from compare.analysis.record_statistics import TARGETS
-from compare.bench.baseline import load_baseline, make_bench_study
+from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
+from compare.bench import baseline
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.settings import SolverSpec
@@ -22,30 +24,42 @@ ID = "walk12-w015"
 
 @pytest.fixture(scope="module")
 def runs() -> list[RunRecord]:
-    """A few runs of two solvers."""
-    solvers = (SolverSpec(name="pso"), SolverSpec(name="ipopt"))
-    return run_study(Study(tasks=make_bench_study([ID], *solvers, runs=3, evaluations=1000).tasks()))
+    """A few runs of three solvers, the last of which finds nothing."""
+    solvers = (SolverSpec(name="pso"), SolverSpec(name="ipopt"), SolverSpec(name="random"))
+    study = baseline.make_bench_study([ID], *solvers, runs=3, evaluations=1000)
+    records = run_study(Study(tasks=study.tasks()))
+    infeasible = [
+        replace(r, verdict=replace(r.verdict, objective=math.nan, violation=1.0, feasible=False))
+        for r in records
+        if r.solver == "random"
+    ]
+    return [r for r in records if r.solver != "random"] + infeasible
 
 
 @pytest.mark.slow
-def test_packing_keeps_what_the_leaderboard_needs(runs: list[RunRecord], tmp_path: Path) -> None:
-    """Expected running times and final objectives to twelve digits; equal records give an equal file."""
-    path = pack_records(ID, runs, tmp_path)
+def test_a_table_gives_the_same_rankings_as_the_records(
+    runs: list[RunRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Running times to all targets are equal; equal rows give an equal file."""
+    rows, path = make_rows(runs), tmp_path / "table.csv.xz"
+    write_table(rows, path)
     first = path.read_bytes()
-    assert pack_records(ID, runs, tmp_path).read_bytes() == first
-    again = load_baseline(ID, tmp_path)
-    assert [(r.solver, r.run, r.seed, r.status) for r in again] == [(r.solver, r.run, r.seed, r.status) for r in runs]
-    (before,), (after,) = map(compare_problems, (runs, again))
-    for old, new in zip(before.solvers, after.solvers, strict=True):
-        np.testing.assert_allclose(new.costs, old.costs, rtol=1e-12)
-        for target in (1.0, *TARGETS):
+    write_table(rows, path)
+    assert path.read_bytes() == first and repr(baseline.load_table(path)[ID]) == repr(tuple(rows))
+    monkeypatch.setattr(baseline, "load_table", lambda: {ID: tuple(rows)})
+    again = [baseline.make_record(row) for row in rows]
+    references = {ID: baseline.get_reference(ID)}
+    (before,), (after,) = (compare_problems(records, references=references) for records in (runs, again))
+    for old in before.solvers:
+        new = next(solver for solver in after.solvers if solver.name == old.name)
+        assert new.costs == old.costs
+        for target in (*TARGETS, *ECDF_TARGETS):
             assert new.expected_cost(target) == old.expected_cost(target)
+            assert [c.cost_to_reach(target) for c in new.curves] == [c.cost_to_reach(target) for c in old.curves]
         assert [c.total_cost() for c in new.curves] == [c.total_cost() for c in old.curves]
-    with pytest.raises(InputError, match="does not belong"):
-        pack_records("ssp-v5", runs, tmp_path)
-    with pytest.raises(InputError, match="differ in their settings"):
-        pack_records(
-            ID, [runs[0], replace(runs[1], definition={**runs[1].definition, "settings": {"population": 7}})], tmp_path
-        )
-    with pytest.raises(InputError, match="no baseline records of 'ssp-v4'"):
-        load_baseline("ssp-v4", tmp_path)
+        np.testing.assert_allclose(compute_gaps([after])[old.name], compute_gaps([before])[old.name], rtol=1e-6)
+
+
+def test_an_instance_without_a_baseline_is_named() -> None:
+    with pytest.raises(InputError, match="no baseline of 'gb2:ssp:0' is shipped"):
+        baseline.load_baseline("gb2:ssp:0")

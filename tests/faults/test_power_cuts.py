@@ -170,7 +170,6 @@ ALLOWED = {
     "nlp_gait/export/formats.py",
     "nlp_gait/simulation/video.py",
     "compare/archive/unpack.py",  # into a temporary folder
-    "compare/bench/baseline.py",
     "compare/drawing/animation.py",
     "compare/drawing/figures.py",
     "compare/drawing/notebook_figure.py",  # into memory
