@@ -12,7 +12,7 @@ import numpy as np
 
 from metaheuristics.adapters.pymoo import FRONT_MODULES, MultiObjective
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import UNKNOWN, Array, Bounded, Start
+from metaheuristics.interface import UNKNOWN, Array, Bounded
 from metaheuristics.preparation import prepare_start, seed_sequence
 from metaheuristics.registry import make_by_name
 
@@ -28,42 +28,18 @@ class ManyObjectives(Bounded, Protocol):
         """Objectives (P, m), finite and all of comparable size, and total violations (P,) of points (P, n)."""
 
 
-class FrontSearch(Protocol):
-    """A run in progress: `ask`, evaluate, `tell`, and again; `front` at any time between."""
-
-    def ask(self) -> Array:
-        """Points (P, n) of a generation, within the bounds."""
-
-    def tell(self, X: Array, F: Array, violation: Array, /) -> None:
-        """Learn from the points of the last `ask`: objectives (P, m), violations (P,), 1e30 where an evaluation failed."""
-
-    def front(self) -> tuple[Array, Array]:
-        """Return the nondominated feasible members (k, n) of the population and their objectives (k, m)."""
-
-
-class FrontAlgorithm(Protocol):
-    """Settings of an algorithm for several objectives, immutable."""
-
-    @property
-    def population(self) -> int:
-        """Number of starting points that it wants."""
-
-    def start(self, start: Start, objectives: int, /) -> FrontSearch:
-        """Begin a run for a number of objectives; SearchError for a setting that it cannot work with."""
-
-
-FRONT_ALGORITHMS: Mapping[str, Callable[..., FrontAlgorithm]] = {
+FRONT_ALGORITHMS: Mapping[str, Callable[..., MultiObjective]] = {
     name: partial(MultiObjective, algorithm=name) for name in FRONT_MODULES
 }
 """Algorithms by name; `pip install 'nlp-gait[algorithms]'` installs pymoo, which they need."""
 
 
-def make_front_algorithm(name: str, /, **settings: object) -> FrontAlgorithm:
+def make_front_algorithm(name: str, /, **settings: object) -> MultiObjective:
     """Make an algorithm for several objectives by its name in `FRONT_ALGORITHMS`; raises SearchError as `make_algorithm` does."""
     return make_by_name("algorithm for several objectives", name, FRONT_ALGORITHMS, settings)
 
 
-def check_budgets(algorithm: FrontAlgorithm, evaluations: Sequence[int]) -> None:
+def check_budgets(algorithm: MultiObjective, evaluations: Sequence[int]) -> None:
     """Raise SearchError unless the budgets of snapshots rise and the first holds a generation."""
     budgets = list(evaluations)
     if not budgets or budgets != sorted(set(budgets)) or budgets[0] < algorithm.population:
@@ -83,7 +59,7 @@ class Snapshot:
 
 def minimize_many(
     objectives: ManyObjectives,
-    algorithm: FrontAlgorithm,
+    algorithm: MultiObjective,
     *,
     evaluations: Sequence[int] = (10_000,),
     seed: int = 0,
@@ -127,8 +103,8 @@ def minimize_many(
 
 __all__ = [
     "FRONT_ALGORITHMS",
-    "FrontAlgorithm",
     "ManyObjectives",
+    "MultiObjective",
     "Snapshot",
     "check_budgets",
     "make_front_algorithm",

@@ -273,7 +273,6 @@ def _loaded(q: Mapping[str, Array], t: Array, x: Mapping[str, Array]) -> dict[st
     gaps[PARTS :: PARTS + 1] = QUANTUM
     jerks = [np.abs(np.diff(turned[joint][2], axis=0) / gaps) for joint in turned]
     found["peak_jerk_rad_s3"] = np.max([jerk.max(axis=0) for jerk in jerks], axis=0)
-    found["knot_jerk_rad_s3"] = np.max([jerk[PARTS :: PARTS + 1].max(axis=0) for jerk in jerks], axis=0)
     found["peak_acceleration_rad_s2"] = np.max([np.abs(turned[j][2]).max(axis=0) for j in turned], axis=0)
     found["peak_torque_Nm"] = np.max([np.abs(torque[j]).max(axis=0) for j in torque], axis=0)
     found["zmp_margin_min_m"] = np.minimum(pressure, FOOT - pressure).min(axis=0)

@@ -18,7 +18,7 @@ from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
-from metaheuristics.multi_objective import FrontAlgorithm, check_budgets, make_front_algorithm, minimize_many
+from metaheuristics.multi_objective import MultiObjective, check_budgets, make_front_algorithm, minimize_many
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
@@ -230,7 +230,7 @@ class Pareto(Question[FoundFront]):
 
 
 def _run_search(
-    objectives: PowerAndCompeting, algorithm: FrontAlgorithm, budgets: Sequence[int], seed: int
+    objectives: PowerAndCompeting, algorithm: MultiObjective, budgets: Sequence[int], seed: int
 ) -> list[dict[str, Any]]:
     snapshots = minimize_many(objectives, algorithm, evaluations=budgets, seed=seed)
     return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]

@@ -216,7 +216,6 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
         if step.kind == "first"
         else ()
     )
-    at_knots = step.jerk(samples, point["quantum_s"], knots=True)
     return Assembly(
         objective=step.energy(samples, ops) if minimise == "energy" else ops.largest(jerk),
         constraints=(
@@ -228,7 +227,6 @@ def _assemble(point: Point, step: PlannedStep, minimise: Minimise, ops: Nonsmoot
         indexes={
             "energy_J": step.energy(samples, exact),
             "peak_jerk_rad_s3": exact.largest(jerk),
-            "knot_jerk_rad_s3": exact.largest(at_knots),
             "peak_acceleration_rad_s2": exact.largest(ca.vec(DM(JOINT_RATES) @ samples.qdd)),
             "peak_torque_Nm": exact.largest(ca.vec(samples.torque)),
             "zmp_margin_min_m": ca.mmin(exact.min(pressure - rear, front - pressure)),

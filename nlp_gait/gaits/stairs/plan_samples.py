@@ -101,14 +101,13 @@ class PlannedStep:
             total += durations / self.per_phase * (ca.sum1(ca.sum2(inner)) - ca.sum1(ends) / 2)
         return total
 
-    def jerk(self, samples: PlanSamples, quantum: MX, *, knots: bool = False) -> MX:
-        """Return joint jerk between samples [rad/s^3] as a column, or between phases only, where a jump takes one quantum [s]."""
+    def jerk(self, samples: PlanSamples, quantum: MX) -> MX:
+        """Return joint jerk between samples [rad/s^3] as a column; a jump between phases takes one quantum [s]."""
         change = DM(biped.JOINT_RATES) @ (samples.qdd[:, 1:] - samples.qdd[:, :-1])
         columns = []
         for k in range(change.shape[1]):
-            jump = k + 1 in self._phase_starts
-            if jump or not knots:
-                columns.append(change[:, k] / (quantum if jump else samples.time[k + 1] - samples.time[k]))
+            duration = quantum if k + 1 in self._phase_starts else samples.time[k + 1] - samples.time[k]
+            columns.append(change[:, k] / duration)
         return ca.vertcat(*columns)
 
     @property
