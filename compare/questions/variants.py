@@ -183,16 +183,26 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
         """Return name and start of the richest earlier variant that this one contains, or joints fitted to the richest one."""
         feasible = [found for found in solved.values() if found.feasible]
         feasible.sort(key=lambda found: (found.problem == problem.name, found.variables), reverse=True)
+        variants = {each.name: each for each in self.variants}
         for found in feasible:
+            if not self._has_curves(problem, variants[found.name]):
+                continue
             x = convert_motion(found.x, problem)
             if x is not None:
                 return found.name, np.clip(x, problem.lower, problem.upper)
         if feasible and problem.name in FITTED_STARTS:
-            planned = load_variant(self.problem, next(v for v in self.variants if v.name == feasible[0].name))
+            planned = load_variant(self.problem, variants[feasible[0].name])
             fit = resolve(FITTED_STARTS, problem.name)
             x = fit(problem.options["trajectory"], planned, planned.check_x(feasible[0].x))
             return feasible[0].name, np.clip(x, problem.lower, problem.upper)
         return "", None
+
+    def _has_curves(self, problem: GaitProblem, simpler: Variant) -> bool:
+        """Return whether a problem has all curves that a variant has with the problem's trajectory; a cubic names none."""
+        richer, order = load_variant(self.problem, simpler), problem.options.get("trajectory")
+        if order is not None and "trajectory" in richer.options:
+            richer = load_variant(self.problem, replace(simpler, options={**simpler.options, "trajectory": order}))
+        return set(richer.names) <= set(problem.names)
 
     def _compare_to_first(
         self, problem: GaitProblem, x: Mapping[str, float], solved: Mapping[str, SolvedVariant]

@@ -80,6 +80,14 @@ def test_a_richer_motion_contains_a_simpler_one(problem: GaitProblem, found: tup
     assert convert_motion(quintic.x, problem) is None
 
 
+def test_free_joints_of_single_support_do_not_contain_a_plan() -> None:
+    phase = load("nao-ssp", intervals=2)
+    cubic, *_, free = (v for v in list_trajectories(phase) if v.options["trajectory"] in ("cubic", "spline-2"))
+    question = Variants(problem=phase, variants=[cubic, free])
+    assert not question._has_curves(load_variant(phase, free), cubic)
+    assert question._has_curves(load_variant(phase, free), free)
+
+
 def test_lists_of_trajectories() -> None:
     variants = list_trajectories(load("nao-ssp"))
     assert [(v.problem, v.options["trajectory"], v.options["samples_per_interval"]) for v in variants] == [
