@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compare.cli import app
+from tests.compare.records import DSP_X
 
 SEEDS = Path(__file__).with_name("seeds")
-WALK = {"step_length_m": 0.1, "frontal_shift_m": 0.1, "foot_lift_m": 0.02, "bending_height_m": 0.01}
 KEPT = (
     ("report", "9" * 400),
     ("report", "absent", "--weights", "nan,1"),
@@ -27,9 +27,9 @@ KEPT = (
     ("export", "result.json", "--to", "csv", "--out", "x" * 300),
     ("evaluate", "nao-dsp", "--x", "1", "--robot", "x" * 300 + ".urdf"),
     ("certainty", "walk12", "--check", "certificate.json"),
-    ("simulate", "walk.json", "--steps", "1000000000"),
-    ("simulate", "walk.json", "--push", "1e999,0"),
-    ("simulate", "walk.json", "--push", "0,0,-1,2"),
+    ("simulate", "step.json", "--steps", "1000000000"),
+    ("simulate", "step.json", "--push", "1e999,0"),
+    ("simulate", "step.json", "--push", "0,0,-1,2"),
     ("variants", "--starts", "1000000000"),
     ("prices", "walk12", "--starts", "1000000000"),
     ("pareto", "nao-ssp", "--points", "1000000000"),
@@ -42,7 +42,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name, seed in (("result", "result/by-hand.json"), ("certificate", "certificate/closed.json")):
         Path(f"{name}.json").write_bytes((SEEDS / seed).read_bytes())
-    Path("walk.json").write_text(json.dumps({"problem": "walk12", "x": WALK}))
+    Path("step.json").write_text(json.dumps({"problem": "nao-dsp", "x": DSP_X}))
     os.mkfifo("pipe.json")
 
 
