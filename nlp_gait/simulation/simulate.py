@@ -38,6 +38,10 @@ class Push:
     start_s: float | None = None  # of the force; None for the middle of the motion
     duration_s: float = 0.05  # of the constant force
 
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, (*self.impulse_Ns, self.start_s or 0.0))):
+            raise InputError(f"a push must be finite, got {self.impulse_Ns} N s at {self.start_s} s")
+
     def force(self, since_s: float) -> tuple[float, float]:
         """Return the force (x, y) at a time since its begin [N]."""
         if not 0.0 <= since_s < self.duration_s:
