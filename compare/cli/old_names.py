@@ -15,6 +15,12 @@ FILM = "simulate --page FILE.html plays the simulation at any speed"
 REPLACEMENTS = {
     "animate": "export --to gif (or mp4, html) draws a gait",
     "archive": "verify FOLDER --pack FILE.zip packs a study",
+    "bench --code": "verify FILE.zip --code names user code of an archive",
+    "bench --leaderboard": "bench ranks an algorithm beside the baseline",
+    "bench --objectives": "pareto PROBLEM --search NSGA2=10000 compares searches with the true front",
+    "bench --rerun": "verify FILE.zip --rerun 5% repeats runs of an archive",
+    "bench --submit": "verify FOLDER --pack FILE.zip packs a study",
+    "bench --verify": "verify FILE.zip checks an archive",
     "capabilities": "sweep --capabilities reports what a robot can do",
     "cite": "list --cite [NAME] prints BibTeX",
     "export --format": "export --to KIND names the kind of the file",
