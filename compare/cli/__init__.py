@@ -60,9 +60,31 @@ NAMES = {
     list_problems: "list",
     import_results: "import",
 }
+# One line each, so that the help fits one screen.
+SUMMARIES = {
+    "list": "List problems, algorithms and robots, or describe one.",
+    "evaluate": "Judge candidates by the exact functions.",
+    "solve": "Solve a problem by IPOPT or SLSQP.",
+    "plan": "Plan a whole walk from standing to standing.",
+    "compare": "Compare searches and IPOPT.",
+    "import": "Add results of other programs to a study.",
+    "report": "Write a study's report again.",
+    "reproduce": "Recompute a paper's tables, figures and claims.",
+    "bench": "Rank an algorithm on GaitBench.",
+    "verify": "Check a study or its archive, or pack it.",
+    "sweep": "Solve a problem over a grid of values.",
+    "prices": "What each limit and each error of the robot costs.",
+    "pareto": "Power against stability or speed.",
+    "certainty": "Is the best known optimum the global one?",
+    "variants": "What changes with motors, motions or options.",
+    "robust": "One gait for all masses and soles within tolerances.",
+    "simulate": "Simulate a gait in MuJoCo.",
+    "export": "Write a gait, an instance or a problem for others.",
+}
 for panel, functions in PANELS.items():
     for function in functions:
-        app.command(NAMES.get(function, function.__name__), rich_help_panel=panel)(function)
+        name = NAMES.get(function, function.__name__)
+        app.command(name, rich_help_panel=panel, short_help=SUMMARIES[name])(function)
 
 
 def main() -> None:

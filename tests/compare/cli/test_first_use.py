@@ -62,6 +62,8 @@ def test_at_sixty_columns_a_table_is_stacked(monkeypatch, capsys):
 def test_help_shows_every_command_in_a_panel_and_the_version_is_the_package_s():
     shown = CliRunner().invoke(app, ["-h"]).stdout
     assert all(panel in shown for panel in PANELS)
+    screen = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "80"}).stdout.strip()
+    assert screen.count("\n") < 45 and "..." not in screen.split("COMMAND [ARGS]...")[1]
     assert CliRunner().invoke(app, ["--version"]).stdout.strip() == nlp_gait.__version__
 
 
