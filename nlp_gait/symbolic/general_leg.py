@@ -6,7 +6,7 @@ spherical hip and a universal ankle, and works on cosines and sines: each joint 
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -14,14 +14,19 @@ from casadi import DM, SX
 
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic.elimination import Factors, choose_pivots, factorise
-from nlp_gait.symbolic.kinematics import UP, axis_rotation, build_rotation
 from nlp_gait.symbolic.nonsmooth import LEAST_REACH_MARGIN, Exact, Nonsmooth, Root
+from nlp_gait.symbolic.rotations import (
+    TINY,
+    UP,
+    Array,
+    axis_rotation,
+    build_rotation,
+    find_rotation,
+    invert_turn,
+    rotate_vector,
+)
 from nlp_gait.symbolic.trajectories import Motion, map_motion, stack
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
-# Keeps square roots and norms away from zero, where a pose is out of reach.
-TINY = 1e-20
 # Least absolute value of a pivot, with lengths in units of the leg's length: a knee bent by 0.14 rad has 0.07. The second one is
 # for the iterates of a solver, which may be poses that no gait has.
 LEAST_PIVOT, LEAST_PIVOT_OF_ITERATES = 1e-6, 1e-3
@@ -157,16 +162,16 @@ def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[
     knee = leg.straight_rad + bent if leg.straight_rad else bent
     knee_turn = ca.cos(knee), ca.sin(knee)
     # Ankle: m is the hip in the axes of the shank; rotated by the fifth joint it is the direction rotated back by the sixth.
-    m = -(_rotate(a[3], *_invert(knee_turn), SX(DM(leg.thigh_m))) + DM(leg.shank_m))
+    m = -(rotate_vector(a[3], *invert_turn(knee_turn), SX(DM(leg.thigh_m))) + DM(leg.shank_m))
     five, six = _solve_ankle(leg.axes[4], leg.axes[5], m, from_ankle, leg.hip_m - leg.ankle_m)
     # Hip: three axes through one point.
-    in_torso = _rotate(a[3], *_invert(knee_turn), a[2])
+    in_torso = rotate_vector(a[3], *invert_turn(knee_turn), a[2])
     for axis, turn in ((a[4], five), (a[5], six)):
-        in_torso = _rotate(axis, *_invert(turn), in_torso)
+        in_torso = rotate_vector(axis, *invert_turn(turn), in_torso)
     third = rotation.T @ in_torso
     first = rotation @ a[0]
     for axis, turn in ((a[5], six), (a[4], five), (a[3], knee_turn)):
-        first = _rotate(axis, *turn, first)
+        first = rotate_vector(axis, *turn, first)
     turns = (*_solve_hip(leg.axes[:3], third, first), knee_turn, five, six)
     return ca.vertcat(*(cos for cos, _ in turns)), ca.vertcat(*(sin for _, sin in turns))
 
@@ -196,7 +201,7 @@ def _solve_ankle(fifth: Array, sixth: Array, m: SX, seen: SX, at_zero: Array) ->
     left = (ca.sumsqr(seen) - alpha**2 - beta**2 - 2 * c * alpha * beta) / sine_squared
     sign = 1.0 if float(at_zero @ normal) >= 0 else -1.0
     between = alpha * DM(fifth) + beta * DM(sixth) + sign * ca.sqrt(ca.fmax(left, TINY)) * DM(normal)
-    return _find_rotation(fifth, between, m), _find_rotation(sixth, seen, between)
+    return find_rotation(fifth, between, m), find_rotation(sixth, seen, between)
 
 
 def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[SX, SX], tuple[SX, SX]]:
@@ -210,26 +215,9 @@ def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[
     rest = -np.sign(across) * ca.sqrt(ca.fmax(1 - kappa**2, TINY))
     cos_d, sin_d = along / gain, across / gain
     two = cos_d * kappa - sin_d * rest, sin_d * kappa + cos_d * rest
-    one = _find_rotation(a, _rotate(SX(DM(b)), *two, SX(DM(c))), third)
-    back = _find_rotation(c, _rotate(SX(DM(b)), *_invert(two), SX(DM(a))), first)
-    return one, two, _invert(back)
-
-
-def _find_rotation(axis: Array, before: SX, after: SX) -> tuple[SX, SX]:
-    """Return cosine and sine of the rotation about an axis that takes one vector nearest to another."""
-    k = DM(axis)
-    cos = ca.dot(before, after) - ca.dot(k, before) * ca.dot(k, after)
-    sin = ca.dot(k, ca.cross(before, after))
-    scale = 1 / ca.sqrt(ca.fmax(cos**2 + sin**2, TINY**2))
-    return cos * scale, sin * scale
-
-
-def _invert(turn: tuple[SX, SX]) -> tuple[SX, SX]:
-    return turn[0], -turn[1]
-
-
-def _rotate(axis: SX, cos: SX, sin: SX, vector: SX) -> SX:
-    return cos * vector + sin * ca.cross(axis, vector) + ((1 - cos) * ca.dot(axis, vector)) * axis
+    one = find_rotation(a, rotate_vector(SX(DM(b)), *two, SX(DM(c))), third)
+    back = find_rotation(c, rotate_vector(SX(DM(b)), *invert_turn(two), SX(DM(a))), first)
+    return one, two, invert_turn(back)
 
 
 def _build_chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:

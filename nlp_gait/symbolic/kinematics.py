@@ -1,14 +1,14 @@
 """Kinematics of a tree of bodies, and in closed form of a leg with two axes at the hip, a knee, and two axes at the ankle."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import DM, SX
 
 from nlp_gait.robots.tree import TreeBody
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.rotations import axis_rotation
 from nlp_gait.symbolic.trajectories import Motion, stack
 
 
@@ -18,28 +18,6 @@ class Pose(NamedTuple):
     rotation: SX  #: (3, 3) from body axes to world axes
     position: SX  #: (3,) reference point of the body [m]
     com: SX  #: (3,) centre of mass [m]
-
-
-FORWARD, TO_THE_LEFT, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)  # axes of the world
-
-
-def axis_rotation(axis: Sequence[float], angle: SX) -> SX:
-    """Return the rotation (3, 3) about a fixed unit axis by an angle [rad]."""
-    return build_rotation(tuple(axis))(ca.cos(angle), ca.sin(angle))
-
-
-def turn_quaternion(attitude: Iterable[Any], cos: Any, sin: Any) -> list[Any]:
-    """Return an attitude, a quaternion (w, x, y, z), after a rotation about the vertical by twice the angle of cos and sin."""
-    w, x, y, z = attitude
-    return [cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w]
-
-
-@lru_cache
-def build_rotation(axis: tuple[float, ...]) -> ca.Function:
-    """Return the rotation (3, 3) about a fixed unit axis as a function of cosine and sine (Rodrigues), sparse if it can be."""
-    k, cos, sin = DM(axis), SX.sym("cos"), SX.sym("sin")
-    along = k @ k.T
-    return ca.Function("rotation", [cos, sin], [SX(along) + cos * (DM.eye(3) - along) + sin * ca.skew(k)])
 
 
 def relative_rotation(body: TreeBody, q: Mapping[str, SX]) -> SX:

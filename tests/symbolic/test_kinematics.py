@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.kinematics import axis_rotation, centre_of_mass, forward_kinematics, relative_rotation
+from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics, relative_rotation
+from nlp_gait.symbolic.rotations import axis_rotation
 
 # Products of sines and cosines.
 ROUNDING = 1e-12

@@ -26,8 +26,8 @@ from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic import balance
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
-from nlp_gait.symbolic.kinematics import UP, axis_rotation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.rotations import UP, axis_rotation
 
 COMPONENTS = {f"{half}_{axis}": unit for half, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"}
 LARGEST_DEGREE = 12

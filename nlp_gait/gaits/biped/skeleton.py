@@ -11,6 +11,7 @@ from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, Sol
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import forward_kinematics
+from nlp_gait.symbolic.rotations import turn_about_vertical
 
 ON_GROUND = 1e-6  # [m]; a higher sole does not bear load
 SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs are fingers and cameras
@@ -85,10 +86,3 @@ def locate_links(robot: Robot, signals: Signals) -> dict[str, Array]:
         return found
     yaw = signals.arrays["feet_yaw"][:, 0]
     return {name: standing + turn_about_vertical(place - standing, yaw) for name, place in found.items()}
-
-
-def turn_about_vertical(points: Array, yaw: Array) -> Array:
-    """Return points (..., 3) turned about the vertical through the origin by angles [rad] of the leading shape."""
-    x, y, z = (points[..., i] for i in range(3))
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return np.stack(np.broadcast_arrays(cos * x - sin * y, sin * x + cos * y, z), axis=-1)

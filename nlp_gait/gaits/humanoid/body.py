@@ -22,8 +22,8 @@ from nlp_gait.robots import load_robot
 from nlp_gait.robots.biped import GRAVITY, NAO_SWING_S, STEP_M, Biped, compare_swing, make_biped_model
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, Leg
 from nlp_gait.symbolic import general_leg
-from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT, UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
+from nlp_gait.symbolic.rotations import FORWARD, TO_THE_LEFT, UP, axis_rotation, turn_quaternion
 from nlp_gait.symbolic.trajectories import Motion, constant_motion
 
 # Heights of the hip's middle above the ankles, as shares of a leg's length. The least is the paper's; the greatest is more than

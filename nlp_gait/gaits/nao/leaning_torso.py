@@ -18,8 +18,9 @@ from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
 from nlp_gait.gaits.nao.body import NaoBody
 from nlp_gait.gaits.nao.joints import AXIS_TOLERANCE, HELD_ARM_ANGLES, LEG_JOINTS, YAW_PITCHES, measure_leg
 from nlp_gait.robots import Robot
-from nlp_gait.symbolic.kinematics import FORWARD, TO_THE_LEFT, UP, axis_rotation, leg_angles
+from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+from nlp_gait.symbolic.rotations import FORWARD, TO_THE_LEFT, UP, axis_rotation
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, map_motion, stack
 
 LEAN = ("torso_roll", "torso_pitch")

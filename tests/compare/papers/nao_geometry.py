@@ -12,7 +12,8 @@ import numpy as np
 from nlp_gait.formulation import Array
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.kinematics import axis_rotation, forward_kinematics
+from nlp_gait.symbolic.kinematics import forward_kinematics
+from nlp_gait.symbolic.rotations import axis_rotation
 
 POSTURES = 20
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
