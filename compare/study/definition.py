@@ -4,6 +4,7 @@ Paths are part of a definition, for its readers, but not of its hash: a robot or
 """
 
 import inspect
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,7 @@ def describe_edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     return ", ".join(parts)
 
 
+HASH = re.compile("[0-9a-f]{64}")  # in place of a file that an option names
 Difference = tuple[tuple[str, ...], Any, Any]
 """Place, and the values there."""
 
@@ -115,6 +117,8 @@ def _join(found: list[Difference]) -> str:
     texts = []
     for place, before, after in found:
         words = WORDS.get(place) or INPUT_WORDS.get(place[-1]) or INPUT_WORDS.get(place[0])
+        if not words and all(HASH.fullmatch(str(value)) for value in (before, after)):
+            words = f"the file of {place[-1]}"
         texts.append(words or f"{place[-1]} {_shorten(before)} -> {_shorten(after)}")
     return ", ".join(dict.fromkeys(texts))
 

@@ -76,6 +76,9 @@ class _Record(NamedTuple):
     about: About = None  # reference point of the file's inertia tensors, if it states one
     reversed: bool = False  # the joint's angle is counted in the opposite direction
 
+    def __repr__(self) -> str:  # of the content, which a hash of the robot takes: the file may be moved
+        return repr((self.raw, self.about, self.reversed))
+
 
 def list_robots() -> tuple[str, ...]:
     """Return the names of the robots of the package."""

@@ -147,7 +147,7 @@ def test_a_package_that_lacks_is_named(
     name: str, instance: gaitbench.Instance, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("nlp_gait.gaitbench.adapters.find_spec", lambda package: None)
-    with pytest.raises(MissingExtraError, match=rf"to\('{name}'\) needs the package {name}.*nlp-gait\[suites\]"):
+    with pytest.raises(MissingExtraError, match=rf"to\('{name}'\) needs the package {name}.*nlp-gait\[algorithms\]"):
         instance.to(name)
 
 

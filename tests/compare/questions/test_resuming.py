@@ -141,7 +141,7 @@ def test_changes_are_reported_and_recomputed(tmp_path: Path) -> None:
     assert text != content
     (light, _), (heavy, messages) = found
     assert heavy["points"][0]["objective"] > light["points"][0]["objective"]
-    assert messages == "sweep-nao-ssp: recomputed: the problem's mathematics or limits\n"
+    assert messages == "sweep-nao-ssp: recomputed: the file of robot\n"
     again, messages = answer(tmp_path / "out", *sweep)
     assert again == heavy and messages == "2 of 2 results were stored by an earlier run\n"
     _, messages = answer(tmp_path / "out", *sweep[:-1], "swing_height_m=0.021", "--seed", "1")

@@ -116,7 +116,7 @@ def test_a_robot_is_its_content_wherever_its_file_lies(
     (elsewhere / "my.json").write_text(json.dumps(heavier))
     monkeypatch.chdir(elsewhere)
     (second,), kept, said = grown(out, study("my.json"))
-    assert kept == 0 and said == ["pso on nao-ssp: 1 run recomputed: the problem's mathematics or limits"]
+    assert kept == 0 and said == ["pso on nao-ssp: 1 run recomputed: the file of robot"]
     assert second.verdict.objective != first.verdict.objective
     monkeypatch.chdir(tmp_path)
     assert grown(out, study("my.json"))[1:] == (1, [])
