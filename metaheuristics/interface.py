@@ -58,28 +58,6 @@ class BatchObjective(Bounded, Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
-class Constraints:
-    """Separate constraints of an objective that provides them; see `Start`.
-
-    An objective provides them by the attributes `inequalities` and `groups`, as here.
-    """
-
-    #: Values (P, m) of m rows at points (P, n) within the bounds; a row is satisfied where its value is <= 0. Called only for
-    #: points that are also evaluated; does not count as an evaluation.
-    inequalities: Callable[[Array], Array]
-    groups: tuple[str, ...]  #: (m,) the constraint that each row belongs to; rows of one constraint are adjacent
-
-    def worst(self, X: Array) -> Array:
-        """Return the greatest value (P, c) within each constraint at points (P, n); 1e30 where it is not finite."""
-        first = [k for k, name in enumerate(self.groups) if k == 0 or name != self.groups[k - 1]]
-        values = np.nan_to_num(self.inequalities(X), nan=UNKNOWN, posinf=UNKNOWN, neginf=-UNKNOWN)
-        return np.asarray(np.maximum.reduceat(values, first, axis=1))
-
-
-UNKNOWN = 1e30  # value of a row without a finite value
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class Start:
     """Inputs of an algorithm at the start of a run."""
 
@@ -89,15 +67,7 @@ class Start:
     initial: Array
     evaluations: int  #: budget of the run, a hint for algorithms that plan ahead
     rng: np.random.Generator  #: the only source of randomness of the search
-    #: Separate constraints, for searches that use them; None where only the total violation is available
-    constraints: Constraints | None = None
     names: tuple[str, ...] = ()  #: the n names of the variables
-
-    def inequalities(self, X: Array, violation: Array) -> Array:
-        """Return each constraint's value (P, c) at points (P, n); without `constraints`, the violation (P,) as the only one."""
-        if self.constraints is not None:
-            return self.constraints.worst(X)
-        return np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN)[:, None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from metaheuristics.adapters.pymoo import FRONT_MODULES, MultiObjective
 from metaheuristics.errors import SearchError
-from metaheuristics.interface import UNKNOWN, Array, Bounded
+from metaheuristics.interface import Array, Bounded
 from metaheuristics.preparation import prepare_start, seed_sequence
 from metaheuristics.registry import make_by_name
 
@@ -97,7 +97,7 @@ def minimize_many(
         if not np.all(np.isfinite(F)):
             raise SearchError("an objective is not finite; give a large finite number where it has no value")
         # A violation that is not finite counts as the worst.
-        search.tell(X, F, np.nan_to_num(violation, nan=UNKNOWN, posinf=UNKNOWN))
+        search.tell(X, F, np.nan_to_num(violation, nan=1e30, posinf=1e30))
         used += len(X)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from metaheuristics.errors import SearchError, abbreviate
-from metaheuristics.interface import Algorithm, Array, Bounded, Constraints, Start, to_real_array
+from metaheuristics.interface import Algorithm, Array, Bounded, Start, to_real_array
 from metaheuristics.settings import is_number
 
 LARGEST = 1e100  # of a bound; algorithms multiply distances
@@ -23,7 +23,6 @@ def prepare_start(
 ) -> Start:
     """Return the inputs of an algorithm; raises SearchError for bounds or starting points (R, n) that are not allowed."""
     lower, upper = read_bounds(objective)
-    values, groups = getattr(objective, "inequalities", None), getattr(objective, "groups", ())
     # The children that a first `spawn` would give, without counting them in the parent.
     keys = [(*seed.spawn_key, index) for index in (0, 1)]
     size = seed.pool_size
@@ -34,7 +33,6 @@ def prepare_start(
         initial=draw_starting_points(lower, upper, population, initial, first),
         evaluations=evaluations,
         rng=np.random.default_rng(second),
-        constraints=Constraints(inequalities=values, groups=tuple(groups)) if callable(values) and groups else None,
         names=tuple(objective.names),
     )
 

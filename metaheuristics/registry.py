@@ -6,15 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import TypeVar
 
-from metaheuristics.adapters.cma import CmaEs, CmaLagrangian
-from metaheuristics.adapters.egobox import BayesianOptimisation
-from metaheuristics.adapters.many_starts import CobyqaStarts, SlsqpStarts
+from metaheuristics.adapters.cma import CmaEs
 from metaheuristics.adapters.pymoo import MODULES, Pymoo
 from metaheuristics.algorithms.ant_colony import AntColony, AntColonyGrid
 from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
 from metaheuristics.algorithms.genetic import GeneticAlgorithm
 from metaheuristics.algorithms.particle_swarm import ConstantInertiaSwarm, ParticleSwarm
-from metaheuristics.algorithms.random_search import RandomSearch, SobolPoints
+from metaheuristics.algorithms.random_search import RandomSearch
 from metaheuristics.constraint_handling import Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.errors import SearchError, abbreviate
 from metaheuristics.interface import Algorithm, ConstraintHandling
@@ -32,21 +30,14 @@ ALGORITHMS: Mapping[str, Callable[..., Algorithm]] = {
     "de": DifferentialEvolution,
     "lshade": LShade,
     "random": RandomSearch,
-    "sobol": SobolPoints,
 }
 """This package's own algorithms."""
 
 ADAPTERS: Mapping[str, Callable[..., Algorithm]] = {
     "cma": CmaEs,
-    "cma-al": CmaLagrangian,
-    "bayes": BayesianOptimisation,
-    "scipy:SLSQP": SlsqpStarts,
-    "scipy:COBYQA": CobyqaStarts,
     **{f"pymoo:{name}": partial(Pymoo, algorithm=name) for name in MODULES},
 }
-"""Those of other packages: `pip install 'nlp-gait[algorithms]'` installs them, and `'nlp-gait[bayes]'` that of `bayes`."""
-
-PACKAGES = {"cma-al": "cma", "bayes": "egobox"}  # of adapters whose names do not begin with the package's
+"""Those of other packages, by the package's name and a colon: `pip install 'nlp-gait[algorithms]'` installs them."""
 
 HANDLINGS: Mapping[str, Callable[..., ConstraintHandling]] = {
     "deb": Deb,
@@ -77,7 +68,7 @@ def list_installed_algorithms() -> tuple[str, ...]:
 
 
 def _find_package(name: str) -> str:
-    return PACKAGES.get(name, name.partition(":")[0])
+    return name.partition(":")[0]
 
 
 def make_handling(name: str, /, **settings: object) -> ConstraintHandling:

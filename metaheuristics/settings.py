@@ -87,10 +87,8 @@ def is_installed(package: str) -> bool:
 def check_installed(algorithm: str, package: str) -> None:
     """Raise SearchError unless the package that an algorithm comes from is installed."""
     if not is_installed(package):
-        extra = "bayes" if package == "egobox" else "algorithms"
         raise SearchError(
-            f"algorithm {algorithm!r} needs the package {package}, which is not installed: "
-            f"pip install 'nlp-gait[{extra}]'"
+            f"algorithm {algorithm!r} needs the package {package}, which is not installed: pip install 'nlp-gait[algorithms]'"
         )
     if package == "cma" and sys.flags.optimize > 1:
         raise SearchError(f"algorithm {algorithm!r} needs docstrings: run Python without -OO and PYTHONOPTIMIZE=2")

@@ -11,7 +11,6 @@ import pytest
 # Modules by the extra of pyproject.toml that installs them.
 PACKAGES = {
     "algorithms": ("cma", "pymoo", "optuna", "ioh", "pygmo"),
-    "bayes": ("egobox",),
     "browser": ("playwright", "axe_playwright_python"),
     "cluster": ("dask", "distributed"),
     "dev": ("iohinspector",),

@@ -38,8 +38,6 @@ from compare.study.settings import (
 )
 from compare.study.task import GRADIENT_SOLVERS, IPOPT
 from metaheuristics import list_installed_algorithms
-from metaheuristics.adapters.egobox import MOST as MOST_OF_BAYES
-from metaheuristics.adapters.egobox import BayesianOptimisation
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_writable_folder
@@ -48,7 +46,7 @@ from nlp_gait.interrupts import Interrupted
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
 MOST_RUNS = 12  # of a problem whose runs are printed one by one
-ALL, ALL_GRADIENT, BAYES = "all", (IPOPT, "slsqp"), BayesianOptimisation.name
+ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
 # Options for how and where a study runs; all others decide what it computes and are part of a study file.
 SESSION_OPTIONS = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
@@ -65,8 +63,7 @@ def compare(
         typer.Option(
             help="Searches and other solvers, separated by commas, see `nlp-gait list`; `pso` damps its inertia weight by 0.99 "
             "as the code that the NAO paper cites, because the constant weight that the paper prints, `pso-constant`, does not "
-            "settle; `all` stands for every installed "
-            f"search (`bayes` for at most {MOST_OF_BAYES} evaluations), IPOPT and SLSQP."
+            "settle; `all` stands for every installed search, IPOPT and SLSQP."
         ),
     ] = DEFAULT_ALGORITHMS,
     starts: Annotated[
@@ -248,17 +245,11 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
 
 
 def choose_solvers(algorithms: str, starts: int, searches: SearchOptions) -> list[SolverSpec]:
-    """Return IPOPT and the named solvers; without starts, only searches.
-
-    `all` includes Bayesian optimisation only for budgets that it can use.
-    """
+    """Return IPOPT and the named solvers; without starts, only searches."""
     names = parse_names(algorithms)
     if ALL in names:
-        every = [*ALL_GRADIENT, *list_installed_algorithms()]
-        if searches.evaluations > MOST_OF_BAYES and BAYES in every and BAYES not in names:
-            say(f"skipped {BAYES}, which takes at most {MOST_OF_BAYES} evaluations; add it to {ALL} to run it")
-            every.remove(BAYES)
-        names = [*dict.fromkeys([*every, *(name for name in names if name != ALL)])]
+        named = [name for name in names if name != ALL]
+        names = [*dict.fromkeys([*ALL_GRADIENT, *list_installed_algorithms(), *named])]
     if starts == 0:
         names = [name for name in names if name not in GRADIENT_SOLVERS]
     elif IPOPT not in names:

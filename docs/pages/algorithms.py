@@ -19,7 +19,7 @@ best known point stands on the [page of each problem](problems/index.md)."""
 PARTS = {
     "Searches": ("They see the compiled objective in batches, and no derivatives.", metaheuristics.ALGORITHMS),
     "Searches of other packages": (
-        "With the extra `algorithms`; `bayes` with the extra `bayes`.",
+        "With the extra `algorithms`.",
         metaheuristics.ADAPTERS,
     ),
     "For several objectives": ("For `nlp-gait pareto` only, with the extra `algorithms`.", FRONT_ALGORITHMS),

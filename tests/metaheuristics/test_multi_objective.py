@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metaheuristics import SearchError
-from metaheuristics.interface import Array, Constraints
+from metaheuristics.interface import Array
 from metaheuristics.multi_objective import FRONT_ALGORITHMS, make_front_algorithm, minimize_many
 
 
@@ -74,10 +74,3 @@ def test_nothing_to_vary_is_refused() -> None:
 
     with pytest.raises(SearchError, match="all variables are fixed"):
         minimize_many(Fixed(), make_front_algorithm("CMOPSO", population=20), evaluations=(100,))
-
-
-def test_separate_constraints_are_given_by_their_worst_row() -> None:
-    """The value of a group is that of its worst row; a row without a finite value is the greatest."""
-    rows = np.array([[-1.0, 2.0, 0.5], [np.nan, -3.0, -0.5]])
-    constraints = Constraints(inequalities=lambda X: rows, groups=("a", "a", "b"))
-    np.testing.assert_array_equal(constraints.worst(np.zeros((2, 1))), [[2.0, 0.5], [1e30, -0.5]])

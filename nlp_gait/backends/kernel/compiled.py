@@ -190,8 +190,7 @@ class CompiledObjective:
         self.description = evaluator.description  #: backend, compiler and lane count, in words
         self._evaluator = evaluator
         self._lower, self._upper = kernel.row_bounds(problem)
-        self._weights = kernel.weights
-        #: (m - n,) what each row of ``inequalities`` belongs to: its name without the place
+        #: (m - n,) names of the rows without their places, those of the variables left out
         self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
         self._p = np.array(problem.p)
         self._threads = RowThreads(threads)
@@ -215,15 +214,6 @@ class CompiledObjective:
         f, violation, g = np.empty(len(X)), np.empty(len(X)), np.empty((len(X), len(self.row_names)))
         self._evaluate(X, f, violation, g)
         return g
-
-    def inequalities(self, X: Array | Mapping[str, float]) -> Array:
-        """Return (P, m - n) signed violations of the rows in units of their scales: a row is satisfied where <= 0.
-
-        Bounds of the variables are left out.
-        """
-        g = self.constraints(X)
-        signed: Array = np.maximum(self._lower - g, g - self._upper) * self._weights
-        return signed[:, : len(self.groups)]
 
     def __reduce__(self) -> tuple[Callable[..., "CompiledObjective"], tuple[Any, ...]]:
         return self._rebuild, (self.problem,)

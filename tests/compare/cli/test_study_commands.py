@@ -92,14 +92,7 @@ def test_a_search_is_polished(tmp_path: Path) -> None:
     assert polished["claimed_objective"] == pytest.approx(0.845868, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("algorithms", "evaluations", "takes_part"),
-    [("all", 500, True), ("all", 501, False), ("all,bayes", 501, True), ("pso", 500, False)],
-)
-def test_all_are_those_that_can_use_up_the_budget(
-    algorithms: str, evaluations: int, takes_part: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sys.modules[choose_solvers.__module__], "list_installed_algorithms", lambda: ("pso", "bayes"))
-    solvers = choose_solvers(algorithms, 5, SearchOptions(evaluations=evaluations))
-    names = [solver.name for solver in solvers]
-    assert ("bayes" in names) == takes_part and {"ipopt", "pso"} <= set(names)
+def test_all_are_the_installed_searches_and_both_gradient_methods(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[choose_solvers.__module__], "list_installed_algorithms", lambda: ("pso", "de"))
+    names = [solver.name for solver in choose_solvers("all,ga", 5, SearchOptions(evaluations=500))]
+    assert names == ["ipopt", "slsqp", "pso", "de", "ga"]
