@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nlp_gait.errors import unknown
-
-if TYPE_CHECKING:
-    from compare.papers.reproduction import Reproduction
 
 # Modules with a REPRODUCTION, by name of the paper.
 REPRODUCTIONS = {
@@ -18,7 +15,7 @@ REPRODUCTIONS = {
 }
 
 
-def load_reproduction(paper: str) -> Reproduction[Any, Any]:
+def load_reproduction(paper: str) -> Any:  # until all are `Paper`
     """Return the reproduction of a paper.
 
     Raises:
@@ -26,5 +23,4 @@ def load_reproduction(paper: str) -> Reproduction[Any, Any]:
     """
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
-    reproduction: Reproduction[Any, Any] = import_module(REPRODUCTIONS[paper]).REPRODUCTION
-    return reproduction
+    return import_module(REPRODUCTIONS[paper]).REPRODUCTION

@@ -25,9 +25,11 @@ Runs = dict[tuple[str, str], list[RunRecord]]
 """Records in the order of their runs, by title of the problem and of the solver."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Effort:
-    """How much a reproduction computes; each one adds its numbers of runs, evaluations and so on."""
+    """How much a reproduction computes; each one adds its numbers of evaluations and so on."""
+
+    runs: int = 0  # of each search; without any, claims on runs have no verdict
 
     @property
     def steps(self) -> int | None:

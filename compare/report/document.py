@@ -76,6 +76,7 @@ class Section:
 
     title: str
     parts: Sequence[Part]
+    folded: bool = False  #: the page shows the heading, which opens the parts
 
 
 Part = str | Prose | Table | Figure | Section

@@ -1,0 +1,68 @@
+"""Rules that decide about claims, and tables that bind them to functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from compare.papers.paper import Book
+from compare.papers.rules import Claim, Found, decide, describe
+
+
+def make_claim(rule: str, printed: str = "", unit: str = "") -> Claim:
+    return Claim(id="one", where="1", claim="it is so", printed=printed, unit=unit, rule=rule, note="")
+
+
+@pytest.mark.parametrize(
+    ("rule", "printed", "unit", "found", "verdict"),
+    [
+        ("within 5 %", "1.0 / 2.0", "W", [1.05, 1.9], "holds"),
+        ("within 5 %", "1.0", "W", 1.051, "does not hold"),
+        ("within 0.2 mm", "30.7", "mm", 30.9, "holds"),
+        ("within 25 %", "+5.0", "mm", 9.0, "size differs"),
+        ("within 25 %", "+5.0", "mm", -5.0, "does not hold"),
+        ("falls", "", "W", [3.0, 2.0, 1.0], "holds"),
+        ("falls", "", "W", [3.0, 1.0, 2.0], "does not hold"),
+        ("rises 1 mm", "", "mm", [[1.0, 2.5], [1.0, 1.5]], "does not hold"),
+        ("rises 10 %", "", "m", [1.0, 1.1], "holds"),
+        ("p < 0.05", "", "mW", Found(2.0, p=0.01), "holds"),
+        ("p < 0.05", "", "mW", Found(-2.0, p=0.01), "does not hold"),
+        ("p < 0.05", "", "mW", Found(2.0, p=0.06), "not shown"),
+        ("at least 50 %", "", "%", [50.0, 70.0], "holds"),
+        ("at most 5 mm", "", "mm", [4.0, 6.0], "does not hold"),
+        ("same order", "1.283 / 1.303", "W", [0.867, 0.892], "holds"),
+        ("rank", "1.283", "W", [1.2, 1.3, 1.25], "holds"),
+        ("rank", "1.35", "W", [1.2, 1.3, 1.25], "not shown"),
+        ("rank", "1.283", "W", [0.86, 0.87], "does not hold"),
+        ("at least 1 W", "", "W", None, "not shown"),
+        ("at least 1 W", "", "W", float("nan"), "not shown"),
+    ],
+)
+def test_a_rule_decides(rule: str, printed: str, unit: str, found: Any, verdict: str) -> None:
+    claim = make_claim(rule, printed, unit)
+    assert decide(claim, found if found is None or isinstance(found, Found) else Found(found)) == verdict
+
+
+@pytest.mark.parametrize("rule", ["near 5 %", "within", "at least 5 kg", "p <"])
+def test_a_rule_that_cannot_decide_is_refused(rule: str) -> None:
+    with pytest.raises(ValueError, match="one"):
+        make_claim(rule, printed="1.0", unit="W")
+
+
+def test_a_cell_shows_numbers_with_their_unit() -> None:
+    assert describe(make_claim("within 5 %", "+1 / +2", "mm"), Found([1.0, 2.25])) == "+1 / +2.25 mm"
+    assert describe(make_claim("rank", "2", "W"), Found([1.0, 3.0])) == "1 to 3 W, rank 1 of 2"
+    assert describe(make_claim("p < 0.05", "", "mW"), Found(0.5, p=0.012)) == "0.5 mW, p = 0.012"
+
+
+def test_an_id_on_one_side_only_is_refused() -> None:
+    book = Book("made-up", {"one": make_claim("falls")}, {})
+    with pytest.raises(KeyError, match="one"):
+        book.check()
+    with pytest.raises(KeyError, match="two"):
+        book.claim("two")
+    book.claim("one")(lambda found: [2.0, 1.0])
+    book.check()
+    with pytest.raises(KeyError, match="twice"):
+        book.claim("one")
