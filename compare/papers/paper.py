@@ -56,7 +56,7 @@ from typing import Any, Generic, TypeVar
 
 from compare.drawing.figures import use_style
 from compare.papers.paper_runs import Effort, Runner
-from compare.papers.rules import Claim, Found, Verdict, decide, describe
+from compare.papers.rules import ClaimRow, Found, Ruling, decide, describe
 from compare.report.document import Document, Figure, Part, Prose, Section, Table, make_text_table
 from compare.report.provenance import TERMS, format_settings, make_reference_table, make_solver_table
 from compare.report.writing import make_citation_section, make_session_section, write_document
@@ -72,7 +72,7 @@ MOST_HEADLINES = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class DifferenceRow:
     """A row of ``differences.csv``."""
 
     id: str
@@ -87,7 +87,7 @@ class Difference:
 class Judgement:
     """The verdict on a claim in one reading, and our numbers."""
 
-    verdict: Verdict
+    verdict: Ruling
     here: str = ""
 
 
@@ -96,8 +96,8 @@ class Book:
     """Claims and differences of a paper, and the functions that compute their numbers."""
 
     name: str  # of the folder
-    claims: Mapping[str, Claim]
-    differences: Mapping[str, Difference]
+    claims: Mapping[str, ClaimRow]
+    differences: Mapping[str, DifferenceRow]
     functions: dict[str, Callable[..., Any]] = field(default_factory=dict)
     on_runs: set[str] = field(default_factory=set)  # ids that a quick run leaves out
 
@@ -130,8 +130,8 @@ class Book:
 
 def read_book(name: str) -> Book:
     """Return the claims and differences of the paper in a folder beside this file."""
-    claims = [Claim(**row) for row in read_table(name, "claims")]
-    differences = [Difference(**row) for row in read_table(name, "differences")]
+    claims = [ClaimRow(**row) for row in read_table(name, "claims")]
+    differences = [DifferenceRow(**row) for row in read_table(name, "differences")]
     book = Book(name, {row.id: row for row in claims}, {row.id: row for row in differences})
     if len({*book.claims, *book.differences}) < len(claims) + len(differences):
         raise ValueError(f"{name}: an id has two rows")
@@ -233,7 +233,7 @@ class Paper(Generic[E, R]):
 
     def _judge(self, id: str, results: Mapping[str, R], reading: str, effort: E) -> Judgement:
         if id in self.book.on_runs and not effort.runs:
-            return Judgement(Verdict.NOT_RUN)
+            return Judgement(Ruling.NOT_RUN)
         claim, found = self.book.claims[id], self.book.functions[id](results[reading])
         if found is not None and not isinstance(found, Found):
             found = Found(found)
@@ -260,9 +260,9 @@ class Paper(Generic[E, R]):
         rows = []
         for id in self.headlines:
             claim, row = self.book.claims[id], found[id]
-            first, held = next(iter(row.values())), [at for at, one in row.items() if one.verdict is Verdict.HOLDS]
+            first, held = next(iter(row.values())), [at for at, one in row.items() if one.verdict is Ruling.HOLDS]
             holds_in = "every reading" if len(held) == len(row) else ", ".join(held) or "no reading"
-            run = first.verdict is not Verdict.NOT_RUN
+            run = first.verdict is not Ruling.NOT_RUN
             rows.append((claim.claim, _add_unit(claim), first.here, str(first.verdict), holds_in if run else ""))
         headings = ("claim", "printed", "here", "verdict", "holds in")
         return Table(name="headlines", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
@@ -284,7 +284,7 @@ class Paper(Generic[E, R]):
         rows = []
         for row in self.book.differences.values():
             run = effort.runs or row.id not in self.book.on_runs
-            effect = row.effect or (self.book.functions[row.id](results) if run else str(Verdict.NOT_RUN))
+            effect = row.effect or (self.book.functions[row.id](results) if run else str(Ruling.NOT_RUN))
             rows.append((row.where, row.printed, row.here, row.option, effect))
         headings = ("where", "printed", "here", "option", "effect")
         return Table(name="differences", columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
@@ -310,5 +310,5 @@ def encode_part(part: Part) -> dict[str, Any]:
     return {"text": part.markdown if isinstance(part, Prose) else str(part)}
 
 
-def _add_unit(claim: Claim) -> str:
+def _add_unit(claim: ClaimRow) -> str:
     return f"{claim.printed} {claim.unit}".strip() if claim.printed else ""

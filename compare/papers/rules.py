@@ -26,7 +26,7 @@ RIPPLE = 1e-3  # of a value: a series that goes back by less between two points 
 RULE = re.compile(r"(within|rises|falls|p <|at least|at most|same order|rank)(?: ([\d.e-]+))?(?: (\S.*))?")
 
 
-class Verdict(StrEnum):
+class Ruling(StrEnum):
     """What the numbers say about a claim."""
 
     HOLDS = "holds"
@@ -45,7 +45,7 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Claim:
+class ClaimRow:
     """A row of ``claims.csv``."""
 
     id: str
@@ -79,14 +79,14 @@ class Claim:
         return np.array([float(value) for value in self.printed.split(" / ")])
 
 
-def decide(claim: Claim, found: Found | None) -> Verdict:
+def decide(claim: ClaimRow, found: Found | None) -> Ruling:
     """Return the verdict on a claim; None if there is no feasible result."""
     if found is None:
-        return Verdict.NOT_SHOWN
+        return Ruling.NOT_SHOWN
     kind, amount, unit = claim.parts
     ours, size = np.asarray(found.values, dtype=float), amount or 0.0
     if not np.isfinite(ours).all():
-        return Verdict.NOT_SHOWN
+        return Ruling.NOT_SHOWN
     if kind == "within":
         return _compare(claim, np.atleast_1d(ours), size, relative=unit == "%")
     if kind in ("rises", "falls"):
@@ -98,7 +98,7 @@ def decide(claim: Claim, found: Found | None) -> Verdict:
     if kind == "p <":
         if found.p is None:
             raise ValueError(f"{claim.id}: its rule needs a p-value")
-        return _say(bool(np.all(ours > 0))) if found.p < size else Verdict.NOT_SHOWN
+        return _say(bool(np.all(ours > 0))) if found.p < size else Ruling.NOT_SHOWN
     if kind == "same order":
         return _say(np.array_equal(np.argsort(ours, kind="stable"), np.argsort(claim.values, kind="stable")))
     if kind == "rank":
@@ -107,29 +107,29 @@ def decide(claim: Claim, found: Found | None) -> Verdict:
     return _say(bool(np.all(ours >= size - slack if kind == "at least" else ours <= size + slack)))
 
 
-def _compare(claim: Claim, ours: np.ndarray[Any, Any], size: float, *, relative: bool) -> Verdict:
+def _compare(claim: ClaimRow, ours: np.ndarray[Any, Any], size: float, *, relative: bool) -> Ruling:
     printed = claim.values
     if ours.shape != printed.shape:
         raise ValueError(f"{claim.id}: {len(printed)} values are printed, {len(ours)} found")
     close = np.abs(ours - printed) <= size * (np.abs(printed) / 100 if relative else 1.0) * (1 + ROUNDING)
     if close.all():
-        return Verdict.HOLDS
+        return Ruling.HOLDS
     signed = all(value[0] in "+-" for value in claim.printed.split(" / "))
-    return Verdict.SIZE_DIFFERS if signed and (np.sign(ours) == np.sign(printed)).all() else Verdict.FAILS
+    return Ruling.SIZE_DIFFERS if signed and (np.sign(ours) == np.sign(printed)).all() else Ruling.FAILS
 
 
-def _judge_rank(printed: float, runs: np.ndarray[Any, Any]) -> Verdict:
+def _judge_rank(printed: float, runs: np.ndarray[Any, Any]) -> Ruling:
     beyond = max(runs.min() - printed, printed - runs.max())
     if beyond <= 0:
-        return Verdict.HOLDS
-    return Verdict.NOT_SHOWN if beyond <= np.ptp(runs) else Verdict.FAILS
+        return Ruling.HOLDS
+    return Ruling.NOT_SHOWN if beyond <= np.ptp(runs) else Ruling.FAILS
 
 
-def _say(holds: bool) -> Verdict:
-    return Verdict.HOLDS if holds else Verdict.FAILS
+def _say(holds: bool) -> Ruling:
+    return Ruling.HOLDS if holds else Ruling.FAILS
 
 
-def describe(claim: Claim, found: Found | None) -> str:
+def describe(claim: ClaimRow, found: Found | None) -> str:
     """Return our numbers as a cell shows them; long series by their ends, runs by the rank of the printed value."""
     if found is None:
         return "no feasible result"

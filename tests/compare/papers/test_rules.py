@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from compare.papers.paper import Book
-from compare.papers.rules import Claim, Found, decide, describe
+from compare.papers.rules import ClaimRow, Found, decide, describe
 
 
-def make_claim(rule: str, printed: str = "", unit: str = "") -> Claim:
-    return Claim(id="one", where="1", claim="it is so", printed=printed, unit=unit, rule=rule, note="")
+def make_claim(rule: str, printed: str = "", unit: str = "") -> ClaimRow:
+    return ClaimRow(id="one", where="1", claim="it is so", printed=printed, unit=unit, rule=rule, note="")
 
 
 @pytest.mark.parametrize(
