@@ -165,6 +165,7 @@ def test_values_and_options_are_kept_and_problems_can_be_pickled() -> None:
 
 def test_a_recorded_motion_has_the_rows_too() -> None:
     from nlp_gait.formulation import Grid
+    from nlp_gait.gaits.biped.body import Support
     from nlp_gait.gaits.biped.recorded_cycle import make_recorded_phase_problem
     from nlp_gait.gaits.biped.recorded_motion import RecordedMotion
     from nlp_gait.gaits.nao.body import make_nao
@@ -173,7 +174,7 @@ def test_a_recorded_motion_has_the_rows_too() -> None:
     signals = problem.signals(problem.check_x(OPTIMUM))
     motion = RecordedMotion(body=make_nao("nao-v5"), t=signals.arrays["t"], q=signals.arrays["q"])
     body = make_nao("nao-v5", limits=",".join(LIMITS))
-    recorded = make_recorded_phase_problem(body, "ssp", replace(motion, body=body), Grid(intervals=10))
+    recorded = make_recorded_phase_problem(body, Support.SINGLE, replace(motion, body=body), Grid(intervals=10))
     rows = build_exact_model(recorded)
     values = dict(zip(rows.row_names, rows.at(np.array([4.0]), recorded.p).g, strict=True))
     planned = nlp_gait.load("nao-ssp", limits=",".join(LIMITS))

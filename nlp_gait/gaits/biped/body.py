@@ -4,8 +4,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
-from typing import Literal, Self, TypeAlias
+from typing import Self, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -16,7 +17,7 @@ from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variab
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.formulation.display import Skeleton
-from nlp_gait.gaits.biped.curves import HIP_CURVES, PhaseTrajectory, Splines
+from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.motors import Motors
@@ -28,14 +29,32 @@ from nlp_gait.symbolic.dynamics import Wrench, newton_euler, tilt_gravity
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
 
-PhaseName: TypeAlias = Literal["ssp", "dsp"]
-TIMES: dict[PhaseName, str] = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
+
+class Support(StrEnum):
+    """Kinds of phases, by the feet on the ground; the right foot swings."""
+
+    SINGLE = "ssp"
+    DOUBLE = "dsp"
+    STAND = "stand"  # double support with both feet side by side
+
+    @property
+    def standing(self) -> tuple[str, ...]:
+        """Sides of the feet on the ground."""
+        return ("L",) if self is Support.SINGLE else ("L", "R")
+
+    @property
+    def words(self) -> str:
+        """The kind in descriptions."""
+        return "feet side by side" if self is Support.STAND else self.upper()
+
+
+TIMES = {Support.SINGLE: "single_support_time_s", Support.DOUBLE: "double_support_time_s"}
 LIFT = "swing_height_m"
 STEEPEST_DEG = 30.0  # slope of the ground
 TIMED_UNITS = ("s", "m/s", "rad/s")  # of variables whose bounds are this package's, not the robot's
 
 
-def read_duration(at: InstantPoint, phase: PhaseName) -> SX:
+def read_duration(at: InstantPoint, phase: Support) -> SX:
     """Return the duration of a phase [s], never zero."""
     return ca.fmax(at[TIMES[phase]], LEAST_DURATION)
 
@@ -203,40 +222,25 @@ class Body(ABC):
                 rows.append((f"hip_v{axis}_{end}_m_s", "m/s", *limits, f"{word} velocity at the {end}"))
         return make_variables(*rows)
 
-    def split_hip(
-        self, splines: Splines, along: tuple[float, float], across: tuple[float, float]
-    ) -> tuple[tuple[Variable, ...], tuple[Parameter, ...]]:
-        """Return the hip's variables, and those of a measured start as parameters, for its places at both ends [m].
-
-        By default the start is that of ``along`` and ``across``, highest, at rest but for 1/s of the distance across.
-        """
-        if not splines.is_measured:
-            return self.hip_variables, ()
-        at_start = [variable for variable in self.hip_variables if "_start_" in variable.name]
-        speeds = {"hip_vy_start_m_s": across[1] - across[0]}
-        rows = [(each.name, each.unit, speeds.get(each.name, 0.0), each.description) for each in at_start]
-        for axis, place in {"x": along[0], "y": across[0], "z": self.hip_height_m[1]}.items():
-            rows.append((f"hip_{axis}_start_m", "m", place, f"{axis} of the {self.hip_name} at the start"))
-        state = (Parameter(name=name, unit=unit, default=value, description=text) for name, unit, value, text in rows)
-        return tuple(variable for variable in self.hip_variables if variable not in at_start), tuple(state)
-
     @property
     def lift_variable(self) -> Variable:
         """Height of the swing."""
         lower, upper = self.scale_length(0.015), self.scale_length(0.03)
         return Variable(name=LIFT, unit="m", lower=lower, upper=upper, description="highest point of the swing foot")
 
-    def make_splines(self, phase: PhaseName, trajectory: PhaseTrajectory) -> Splines:
+    def make_splines(self, phase: Support, trajectory: Trajectory) -> Splines:
         """Return the splines of a phase; a swing foot stays on its line across the walking direction."""
         units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(self.angle_names(phase), "rad")
-        if phase == "ssp":
+        if phase == Support.SINGLE:
             units |= {"foot_x": "m", "foot_z": "m"}
         return Splines(trajectory=trajectory, units=units, length_scale=self.length_scale)
 
-    def make_time_variable(self, phase: PhaseName) -> Variable:
+    def make_time_variable(self, phase: Support) -> Variable:
         """Return the duration of a phase."""
-        least, most = {"ssp": (0.4, 4.0), "dsp": (0.2, 2.0)}[phase]
-        word = {"ssp": "from lift-off to touch-down", "dsp": "from touch-down to the next lift-off"}[phase]
+        least, most = {Support.SINGLE: (0.4, 4.0), Support.DOUBLE: (0.2, 2.0)}[phase]
+        word = {Support.SINGLE: "from lift-off to touch-down", Support.DOUBLE: "from touch-down to the next lift-off"}[
+            phase
+        ]
         lower, upper = self.scale_time(least / self.swing_speed), self.scale_time(most)
         return Variable(name=TIMES[phase], unit="s", lower=lower, upper=upper, description=word)
 
@@ -255,14 +259,14 @@ class Body(ABC):
         return ()
 
     @abstractmethod
-    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+    def angle_names(self, phase: Support) -> tuple[str, ...]:
         """Return the names of the angles that a phase plans besides the hip."""
 
     @abstractmethod
-    def angle_ends(self, phase: PhaseName, at: InstantPoint) -> Mapping[str, tuple[SX, SX]]:
+    def angle_ends(self, phase: Support, at: InstantPoint) -> Mapping[str, tuple[SX, SX]]:
         """Return these angles at the start and the end of a phase [rad]."""
 
-    def angles(self, phase: PhaseName, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
+    def angles(self, phase: Support, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
         """Return the motion of these angles: cubics from rest to rest, and what the splines ``more`` add."""
         still = SX(0)
         return {
@@ -293,7 +297,7 @@ class Body(ABC):
         return lambda zmp, at, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
 
     def make_curve_limits(
-        self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
+        self, phase: Support, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
         """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""
         return ()

@@ -17,9 +17,7 @@ from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.symbolic.trajectories import Motion, add_motions, count_coefficients, cubic, spline, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
-# Or the paper's cubics of the hip from a measured state: place and velocity at the start are parameters.
-PhaseTrajectory = Literal[Trajectory, "measured"]
-SPANS: dict[str, int] = dict(zip(get_args(PhaseTrajectory), (0, 1, 2, 4, 8, 16, 0), strict=True))
+SPANS: dict[str, int] = dict(zip(get_args(Trajectory), (0, 1, 2, 4, 8, 16), strict=True))
 
 SAMPLES, SPLINE_SAMPLES = 1, 4  # default samples in each interval: a cubic cannot bend between 11 samples, a spline can
 # Coefficients of a spline lie within these bounds, wider than any optimum's, and start within a share of them.
@@ -33,7 +31,7 @@ HIP_CURVES = ("hip_x", "hip_y", "hip_z")
 class Splines:
     """Splines that are added to cubics."""
 
-    trajectory: PhaseTrajectory  # their order
+    trajectory: Trajectory  # their order
     units: Mapping[str, str]  # of each curve by name, ``"m"`` or ``"rad"``
     length_scale: float = 1.0  # of the bounds in metres, for a robot of another size than NAO
 
@@ -41,11 +39,6 @@ class Splines:
     def count(self) -> int:
         """Coefficients of each curve."""
         return count_coefficients(SPANS[self.trajectory])
-
-    @property
-    def is_measured(self) -> bool:
-        """Whether the hip starts from a measured state."""
-        return self.trajectory == "measured"
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -92,20 +85,16 @@ def move_hip(
     across: tuple[float, float],
     duration: SX,
     phase: SX,
-    is_measured: bool = False,
 ) -> Motion:
     """Return the hip's motion (3,) [m]: the paper's cubics ``along`` and ``across`` from end to end, and what each curve adds.
 
-    Height and velocities are the variables hip_height_m and hip_v<axis>_<end>_m_s. Measured, the place at the start is that of
-    the parameters hip_<axis>_start_m.
+    Height and velocities are the variables hip_height_m and hip_v<axis>_<end>_m_s.
 
     Source:
         Gupta, Pratihar, Deb (2023), Table 3, rows 3 to 5, and Table 5, rows 1 to 3.
     """
     height = at["hip_height_m"]
     ends = {"x": (SX(along[0]), SX(along[1])), "y": (SX(across[0]), SX(across[1])), "z": (height, height)}
-    if is_measured:
-        ends = {axis: (at[f"hip_{axis}_start_m"], end) for axis, (_, end) in ends.items()}
     paper = (
         cubic(start, end, at[f"hip_v{axis}_start_m_s"], at[f"hip_v{axis}_end_m_s"], duration, phase)
         for axis, (start, end) in ends.items()

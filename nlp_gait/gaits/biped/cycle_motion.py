@@ -12,7 +12,7 @@ from casadi import DM, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.formulation import InstantPoint, Variable
 from nlp_gait.formulation.assembly import make_variables
-from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, PhaseName, read_duration
+from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, Support, read_duration
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
@@ -56,7 +56,13 @@ def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
     found = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
     low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
-    return (*found, body.lift_variable, body.make_time_variable("ssp"), body.make_time_variable("dsp"), step)
+    return (
+        *found,
+        body.lift_variable,
+        body.make_time_variable(Support.SINGLE),
+        body.make_time_variable(Support.DOUBLE),
+        step,
+    )
 
 
 def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
@@ -82,7 +88,7 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     return list(make_variables(*rows))
 
 
-def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
+def make_cycle_planners(body: Body) -> dict[Support, Planner]:
     """Return the plans of both phases."""
     images = DM([c.image for c in body.coordinates])
     mirror = SX([1, -1, 1])
@@ -94,15 +100,15 @@ def make_cycle_planners(body: Body) -> dict[PhaseName, Planner]:
 
     def single(at: InstantPoint) -> PhaseMotion:
         lift_off, touch_down, step = read(at)
-        return PhaseMotion(lift_off, touch_down, read_duration(at, "ssp"), -step, step, at[LIFT])
+        return PhaseMotion(lift_off, touch_down, read_duration(at, Support.SINGLE), -step, step, at[LIFT])
 
     def double(at: InstantPoint) -> PhaseMotion:
         (hip, velocity, others, rates), touch_down, step = read(at)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
         end = SwitchState(place, mirror * velocity, images * others, images * rates)
-        return PhaseMotion(touch_down, end, read_duration(at, "dsp"), step, step)
+        return PhaseMotion(touch_down, end, read_duration(at, Support.DOUBLE), step, step)
 
-    return {"ssp": make_planner(body, single), "dsp": make_planner(body, double)}
+    return {Support.SINGLE: make_planner(body, single), Support.DOUBLE: make_planner(body, double)}
 
 
 def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight: Flight | None = None) -> Planner:

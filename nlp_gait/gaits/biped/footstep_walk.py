@@ -7,30 +7,29 @@ foot that swings from foothold to foothold. The torso's yaw is the mean of both 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from casadi import MX, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point, Signals
+from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, NumericPoint, Parameter, Point
 from nlp_gait.formulation.assembly import Variable, make_parameters
-from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body
-from nlp_gait.gaits.biped.cycle_motion import interpolate_states, make_cycle_variables, make_state_variables, read_state
+from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, Support
+from nlp_gait.gaits.biped.cycle_motion import SWITCHES, interpolate_states, make_cycle_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
-from nlp_gait.gaits.biped.joined_phases import STAND, join_phases
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
 from nlp_gait.gaits.biped.load_sharing import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
+from nlp_gait.gaits.biped.sequence import End, Part
 from nlp_gait.gaits.biped.support_phases import compute_sole_margins, limit_to_sole
 from nlp_gait.gaits.biped.walk import NO_LIMIT, WholeWalk, make_speed_row, make_walk_phases, make_walk_problem
-from nlp_gait.gaits.biped.walk_parts import DURATION, STAND_AT_END, Part, make_phase_variables, make_pose_variables
-from nlp_gait.gaits.several_steps import join_steps
+from nlp_gait.gaits.biped.walk_parts import DURATION, SHIFT, STAND, State, make_phase_variables, make_pose_variables
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic, parabola_lift, stack
 
-SHIFT = "shift_time_s"
+STAND_AT_END = "stand_at_end"
 # Last variables of a phase: the right foot's foothold at both ends, seen from the left foot.
 RIGHT = tuple(f"right_{end}_{what}" for end in ("from", "to") for what in ("x_m", "y_m", "yaw_rad"))
 BESIDE = 1e-6  # [m, rad]; feet this close to their places at the start stand side by side
@@ -44,24 +43,6 @@ class FootstepWalk(WholeWalk):
     """A walk along footholds, sampled over all its phases."""
 
     feet: tuple[Foothold, ...]  # right and left foot at the start, then where each step lands
-
-    @cached_property
-    def parts(self) -> dict[str, Part]:
-        """All phases in the order of time, between the poses in which the robot stands; of these only the limits count."""
-        swings = list_swings(self.feet[2:], self.body.feet_y)
-        first = (swings[0][0],) * 2
-        found = {
-            STAND: Part(STAND, STAND, STAND, first, SHIFT, 1),
-            "shift": Part(STAND, STAND, "step1_lift_off", first, SHIFT, 1),
-        }
-        for k, (lifted, landed) in enumerate(swings, 1):
-            begin, middle = f"step{k}_lift_off", f"step{k}_touch_down"
-            end = f"step{k + 1}_lift_off" if k < self.steps else STAND
-            single, double = (f"step{k}_{time}" for time in TIMES.values())
-            kind = STAND if np.allclose(landed, first[0], atol=BESIDE) else "dsp"
-            found[f"step{k}_ssp"] = Part("ssp", begin, middle, (lifted, landed), single, k)
-            found[f"step{k}_dsp"] = last = Part(kind, middle, end, (landed, landed), double, k)
-        return {**found, STAND_AT_END: last._replace(begin=STAND)}
 
     @property
     def advances(self) -> list[float]:
@@ -92,42 +73,48 @@ class FootstepWalk(WholeWalk):
             rows.append(make_speed_row(f"step{k}_speed", speed, least, greatest))
         return rows, {}
 
-    def limit_phase(self, name: str) -> Phase:
+    def limit_part(self, part: Part) -> Phase:
         """Return the phase with the limits of a part: in double support, the ZMP is limited by the hull of both soles."""
-        part = self.parts[name]
-        if part.kind != "dsp":
-            return self.phases[part.kind]
-        return replace_margins(self.phases["dsp"], make_stance_margins(self.body, part.feet[1]))
+        phase = self.phases[part.kind]
+        if part.kind is not Support.DOUBLE:
+            return phase
+        return replace_margins(phase, make_stance_margins(self.body, part.feet[1]))
 
-    def _place_right_foot(self, part: Part, at: NumericPoint) -> list[MX | float]:
-        return [*part.feet[0], *part.feet[1]]  # ``RIGHT``
+    def place_right_foot(self, part: Part, at: NumericPoint) -> tuple[list[Any], Foothold]:
+        """Return the last variables of a part's phase, ``RIGHT``, and where the right foot is at its end."""
+        begin, end = part.feet
+        return [*begin, *end], end
 
-    def _read_state(self, state: str, part: Part, at: NumericPoint) -> list[MX | float]:
-        """Values of a state in the order of ``make_state_variables``, seen from the standing foot of a part."""
-        coordinates, right, y = self.body.coordinates, part.feet[1], self.body.feet_y[0]
-        if state == STAND:  # between both feet, in the mean of their directions
-            _, _, height, *still = super()._read_state(STAND, part, at)
-            ahead, half = at[f"hip_x_{STAND}_m"], right.yaw / 2
-            return [right.x / 2 + math.cos(half) * ahead, (right.y + y) / 2 + math.sin(half) * ahead, height, *still]
-        names = [variable.name for variable in make_state_variables(self.body, state, "lift_off")]
-        values = [at[name] for name in names]
-        if state.startswith(f"step{part.step}_"):
-            return values
-        hip_x, hip_y, z, vx, vy, vz, *angles = values  # the mirror image, seen from the foot that has landed
-        images = [c.image for c in coordinates for _ in range(2)]
-        (place_x, place_y), velocity = right.turn(hip_x, y - hip_y), right.turn(vx, -vy)
-        mirrored = (i * a for i, a in zip(images, angles, strict=True))
-        return [right.x + place_x, right.y + place_y, z, *velocity, vz, *mirrored]
-
-    def signals(self, at: NumericPoint) -> Signals:
-        """Return time histories of the whole walk at a point of numbers."""
-        steps, places = [], []
+    def place_steps(self, at: NumericPoint) -> Array:
+        """Return the places (K, 4) of the standing feet: x, y, z [m] and yaw [rad]."""
+        places = []
         for k, stance in enumerate(self.feet[1:-1], 1):
-            own = [name for name, part in self.parts.items() if part.step == k and not name.startswith(STAND)]
-            steps.append(join_phases(self.phases[self.parts[n].kind].signals(self.read_part(n, at)) for n in own))
             x, y = stance.turn(0.0, -self.body.feet_y[(k + 1) % 2])
             places.append((stance.x + x, stance.y + y, 0.0, stance.yaw))
-        return join_steps(steps, self.body.robot, np.array(places))
+        return np.array(places)
+
+
+def list_footstep_parts(body: Body, feet: tuple[Foothold, ...]) -> tuple[Part, ...]:
+    """Return all phases of a walk in the order of time; its states are lift-off and touch-down of each step."""
+    swings = list_swings(feet[2:], body.feet_y)
+    first = (swings[0][0],) * 2
+    shift = Part("shift", Support.STAND, End(), End(0), first, SHIFT)
+    parts = [shift._replace(name=STAND, end=End(), occurs=0), shift]
+    for k, (lifted, landed) in enumerate(swings):
+        single, double, lift = (f"step{k + 1}_{name}" for name in (*TIMES.values(), LIFT))
+        lift_off, touch_down, last = End(2 * k), End(2 * k + 1), k + 1 == len(swings)
+        kind = Support.STAND if np.allclose(landed, first[0], atol=BESIDE) else Support.DOUBLE
+        end, stance = End() if last else End(2 * k + 2, mirrored=True), (landed, landed)
+        parts += [
+            Part(f"step{k + 1}_ssp", Support.SINGLE, lift_off, touch_down, (lifted, landed), single, lift, k + 1),
+            Part(f"step{k + 1}_dsp", kind, touch_down, end, stance, double, step=k + 1),
+        ]
+    return (*parts, parts[-1]._replace(name=STAND_AT_END, begin=End(), occurs=0))
+
+
+def list_states(steps: int) -> tuple[State, ...]:
+    """Return the states of a walk of so many steps."""
+    return tuple(State(f"step{k}_{switch}", switch) for k in range(1, steps + 1) for switch in SWITCHES)
 
 
 def name_speed(end: str, step: int) -> str:
@@ -188,11 +175,12 @@ def make_footstep_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     own: Mapping[str, Variable] = {variable.name: variable for variable in make_cycle_variables(body)}
     found = [
         *make_pose_variables(body),
-        replace(own[TIMES["dsp"]], name=SHIFT, description="duration of the phase shift"),
+        replace(own[TIMES[Support.DOUBLE]], name=SHIFT, description="duration of the phase shift"),
     ]
+    states = list_states(steps)
     for k in range(1, steps + 1):
-        for switch in ("lift_off", "touch_down"):
-            found += make_state_variables(body, f"step{k}_{switch}", switch)
+        for state in states[2 * k - 2 : 2 * k]:
+            found += state.make_variables(body)
         others = (own[name] for name in (LIFT, *TIMES.values()))
         found += [replace(v, name=f"step{k}_{v.name}", description=f"{v.description}, step {k}") for v in others]
     return tuple(found)
@@ -210,11 +198,19 @@ def plan_footstep_walk(body: Body, footholds: tuple[Foothold, ...], steps: int, 
     planners = [make_footstep_planner(body, turning, swings) for swings in (False, True)]
     phases = make_walk_phases(body, (*others[:-1], *given), planners, grid, loads)
     least = compute_sole_margins(body.robot.feet["left"], (LEAST_SHARE, LEAST_SHARE))
-    phases["ssp"] = replace_margins(phases["ssp"], limit_to_sole(body, (0.0, body.feet_y[0]), least))
-    phases["dsp"] = replace_margins(phases["dsp"], make_stance_margins(body, feet[0]))
+    phases[Support.SINGLE] = replace_margins(phases[Support.SINGLE], limit_to_sole(body, (0.0, body.feet_y[0]), least))
+    phases[Support.DOUBLE] = replace_margins(phases[Support.DOUBLE], make_stance_margins(body, feet[0]))
     variables = make_footstep_variables(body, steps)
     both_ways = tuple(
         replace(v, lower=min(v.lower, -v.upper)) if v.name.startswith(("hip_x", "hip_vx")) else v for v in variables
     )
-    walk = FootstepWalk(body=body, steps=steps, feet=feet, variables=both_ways, phases=phases)
+    walk = FootstepWalk(
+        body=body,
+        steps=steps,
+        feet=feet,
+        variables=both_ways,
+        phases=phases,
+        parts=list_footstep_parts(body, feet),
+        states=list_states(steps),
+    )
     return make_walk_problem(walk, variables)

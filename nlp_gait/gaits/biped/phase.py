@@ -88,7 +88,6 @@ class Phase:
     limits: Sequence[Limit] = ()  # they add the rows
     goal: Goal = Goal()  # what it minimises
     standing: tuple[str, ...] = ("L", "R")  # sides of the feet on the ground
-    state: tuple[Parameter, ...] = ()  # at the start, if it is measured
     kinks: tuple[float, ...] = ()  # phases at which the motion's formula changes: knots of splines
     start: Start | None = None  # start points; None for any within the bounds
 
@@ -102,7 +101,7 @@ class Phase:
         """Of the goal and of all limits; pairs of bounds are last because there are many."""
         unique: dict[str, Parameter] = {}
         of_limits = (parameter for limit in self.every_limit for parameter in limit.parameters)
-        for parameter in (self.goal.heat, *self.state, *of_limits):
+        for parameter in (self.goal.heat, *of_limits):
             unique.setdefault(parameter.name, parameter)
         return tuple(sorted(unique.values(), key=lambda parameter: parameter.name.endswith((".lower", ".upper"))))
 
@@ -238,15 +237,10 @@ class Phase:
     def _exact_plan(self) -> tuple[list[SX], Instant, InstantPoint]:
         return self._symbolic_plan(Exact())
 
-    @property
-    def known(self) -> tuple[str, ...]:
-        """Names of the parameters that the motion reads."""
-        return (REACH_MARGIN, *(parameter.name for parameter in self.state))
-
     def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant, InstantPoint]:
-        x, known, phase = SX.sym("x", len(self.variables)), SX.sym("margin", len(self.known)), SX.sym("phase")
-        at = InstantPoint.of(x, known, self.names, self.known)
-        return [x, known, phase], self.plan(at, phase, ops), at
+        x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
+        at = InstantPoint.of(x, margin, self.names, (REACH_MARGIN,))
+        return [x, margin, phase], self.plan(at, phase, ops), at
 
     @cached_property
     def _exact_now(self) -> Instant:
@@ -334,7 +328,7 @@ class Phase:
         points = [
             [
                 ca.repmat(at.select(self.names).x, 1, n),
-                ca.repmat(ca.vertcat(*(at[name] for name in self.known)), 1, n),
+                ca.repmat(at[REACH_MARGIN], 1, n),
                 last,
             ]
             for at in ats

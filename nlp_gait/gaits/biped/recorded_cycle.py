@@ -12,7 +12,7 @@ from casadi import DM, MX
 from nlp_gait.formulation import Array, Constraint, GaitProblem, Grid, Parameter, Point, Result, Signals
 from nlp_gait.formulation.assembly import NumericPoint, RowsOverTime, Variable
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
 from nlp_gait.gaits.biped.goals import Goal
@@ -45,12 +45,15 @@ class RecordedPhase(Phase):
         """Return nothing: a recording says nothing about the time between its samples."""
         return ()
 
-    def sample(self, at: Point, ops: Nonsmooth, phases: MX | None = None) -> Samples:
-        """Evaluate the phase at N + 1 equidistant samples.
+    def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
+        """Evaluate the phase at N + 1 equidistant samples, at each of several points.
 
         Quantities besides those of all phases: ``hip_rate`` (3, N + 1) [m/s], ``sides`` (4, N + 1), y of the right sole's
         corners, and ``ground`` (2, N + 1), its place [m].
         """
+        return [self._sample(at) for at in ats]
+
+    def _sample(self, at: Point) -> Samples:
         q, qd, qdd = (MX(part) for part in self._angles(at))
         instant = make_instant_function(self.body, self.loads).map(self.grid.parts + 1)
         torque, zmp, _, hip, hip_rate, ankle, corners, _, left, right = instant(q, qd, qdd)
@@ -224,19 +227,19 @@ def make_refinable(
 
 
 @lru_cache(maxsize=8)  # as many as those of ``make_instant_function``, which finds them again by these loads
-def make_recorded_loads(body: Body, rule: Division) -> dict[PhaseName, Loader]:
+def make_recorded_loads(body: Body, rule: Division) -> dict[Support, Loader]:
     """Return the loads of both phases for any angles, at which no link stays upright."""
     freed = replace(body, upright=frozenset())
-    return {"ssp": make_single_support_loads(freed), "dsp": make_divided_loads(freed, rule)}
+    return {Support.SINGLE: make_single_support_loads(freed), Support.DOUBLE: make_divided_loads(freed, rule)}
 
 
-def make_recorded_phase_problem(body: Body, name: PhaseName, motion: RecordedMotion, grid: Grid) -> GaitProblem:
+def make_recorded_phase_problem(body: Body, name: Support, motion: RecordedMotion, grid: Grid) -> GaitProblem:
     """Return the problem of one recorded phase, whose time is its variable."""
     height, vz0, vz1, vx0, vx1, vy0, vy1 = body.hip_variables
     ends = ({"z": height, "vx": vx0, "vy": vy0, "vz": vz0}, {"z": height, "vx": vx1, "vy": vy1, "vz": vz1})
     left = body.support[:2]
     own: Limit
-    if name == "ssp":
+    if name == Support.SINGLE:
         balance, own = limit_to_sole(body, left), SwingLimits(motion, body.lift_variable)
     else:
         foot = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))
@@ -251,11 +254,11 @@ def make_recorded_phase_problem(body: Body, name: PhaseName, motion: RecordedMot
         grid=grid,
         limits=(*make_phase_limits(body, balance, solved=False), HipLimits(ends, ("start", "end")), own),
         goal=Goal(heat=body.heat),
-        standing=("L",) if name == "ssp" else ("L", "R"),
+        standing=name.standing,
         recorded=motion,
     )
     problem = make_phase_problem(name, "", phase)
-    title = f"A recorded gait of {body.title}, {'single' if name == 'ssp' else 'double'} support"
+    title = f"A recorded gait of {body.title}, {'single' if name == Support.SINGLE else 'double'} support"
     return replace(problem, name=f"recorded-{name}", title=title)
 
 
@@ -281,19 +284,19 @@ class RecordedCycles:
         )
         return Result(problem=problem, x=x)
 
-    def make_problem(self, motions: Mapping[PhaseName, RecordedMotion], grid: Grid, repeats: bool) -> GaitProblem:
+    def make_problem(self, motions: Mapping[Support, RecordedMotion], grid: Grid, repeats: bool) -> GaitProblem:
         """Return the problem of both phases of a motion and the rows that join them; if it repeats, another step can follow."""
         body, margins = self.body, make_cycle_margins(self.body)
         known = {variable.name: variable for variable in make_cycle_variables(body)}
-        variables = (known[TIMES["ssp"]], known[TIMES["dsp"]], known[STEP])
+        variables = (known[TIMES[Support.SINGLE]], known[TIMES[Support.DOUBLE]], known[STEP])
         places = [{axis: known[f"hip_{axis}_{switch}_m"] for axis in "xz"} for switch in SWITCHES]
         rates = [{f"v{axis}": known[f"hip_v{axis}_{switch}_m_s"] for axis in "xyz"} for switch in SWITCHES]
         hip = HipLimits([place | rate for place, rate in zip(places, rates, strict=True)], SWITCHES)
-        own: dict[PhaseName, tuple[Limit, ...]] = {
-            "ssp": (hip, SwingLimits(motions["ssp"], known[LIFT])),
-            "dsp": (StandingLimits(),),
+        own: dict[Support, tuple[Limit, ...]] = {
+            Support.SINGLE: (hip, SwingLimits(motions[Support.SINGLE], known[LIFT])),
+            Support.DOUBLE: (StandingLimits(),),
         }
-        phases: dict[str, Phase] = {
+        phases: dict[Support, Phase] = {
             name: RecordedPhase(
                 body=body,
                 variables=variables,
@@ -302,7 +305,7 @@ class RecordedCycles:
                 grid=grid,
                 limits=(*make_phase_limits(body, margins[name], solved=False), *own[name]),
                 goal=Goal(heat=body.heat),
-                standing=("L",) if name == "ssp" else ("L", "R"),
+                standing=name.standing,
                 recorded=motions[name],
             )
             for name, loads in make_recorded_loads(body, "lever").items()

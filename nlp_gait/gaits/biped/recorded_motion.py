@@ -13,7 +13,7 @@ from casadi import DM, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
-from nlp_gait.gaits.biped.body import Body, PhaseName
+from nlp_gait.gaits.biped.body import Body, Support
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree
@@ -88,20 +88,20 @@ class RecordedMotion:
         """Whether the end is the mirror image of the beginning, so that another step can follow."""
         return bool(np.abs(self.q[-1] - self.mirror_image().q[0]).max() < CLOSED)
 
-    def phases(self, touch_down_s: float | None = None) -> dict[PhaseName, tuple[float, float]]:
-        """Return start and end [s] of single support ``"ssp"`` and double support ``"dsp"``, or of one if there is only one."""
+    def phases(self, touch_down_s: float | None = None) -> dict[Support, tuple[float, float]]:
+        """Return start and end [s] of single and double support, or of one if there is only one."""
         end = self.duration_s
         if touch_down_s is not None:
             if not 0.0 < touch_down_s < end:
                 raise InputError(f"touch-down must be within the motion's {end:g} s, got {touch_down_s:g}")
-            return {"ssp": (0.0, touch_down_s), "dsp": (touch_down_s, end)}
+            return {Support.SINGLE: (0.0, touch_down_s), Support.DOUBLE: (touch_down_s, end)}
         foot = self.right_foot(self.t)
         if foot[:, 2].max() < LIFTED and np.ptp(foot[:, :2], axis=0).max() < LIFTED:
-            return {"dsp": (0.0, end)}
+            return {Support.DOUBLE: (0.0, end)}
         landing = self._landing(np.linalg.norm(foot - foot[-1], axis=1))
         if end - landing < LEAST_SHARE * end:
-            return {"ssp": (0.0, end)}
-        return {"ssp": (0.0, landing), "dsp": (landing, end)}
+            return {Support.SINGLE: (0.0, end)}
+        return {Support.SINGLE: (0.0, landing), Support.DOUBLE: (landing, end)}
 
     def _landing(self, distance: Array) -> float:
         """Estimate when a foot lands from its distance to its last place (T,) [m], a parabola where a swing ends at rest."""

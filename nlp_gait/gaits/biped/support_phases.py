@@ -9,8 +9,8 @@ from typing import NamedTuple, TypeAlias
 from casadi import SX
 
 from nlp_gait.formulation import Grid, InstantPoint
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, PhaseName, State, read_duration
-from nlp_gait.gaits.biped.curves import PhaseTrajectory, move_hip
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State, Support, read_duration
+from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
@@ -96,9 +96,9 @@ def place_hip(body: Body, soles: Mapping[str, Point2]) -> tuple[Point2, Point2]:
 
 def make_support_phase(
     body: Body,
-    name: PhaseName,
+    name: Support,
     step_m: float,
-    trajectory: PhaseTrajectory,
+    trajectory: Trajectory,
     grid: Grid,
     goal: Goal,
     sharing: LoadSharing | None = None,
@@ -109,7 +109,7 @@ def make_support_phase(
     Single support is from rest behind the standing foot to rest in front of it, double support from touch-down of the right foot,
     a step ahead of the left one, to lift-off of the left one.
     """
-    swings, soles, stance = name == "ssp", place_soles(body, step_m), place_stance(body, step_m)
+    swings, soles, stance = name == Support.SINGLE, place_soles(body, step_m), place_stance(body, step_m)
     hip_places = (stance.hip_x, stance.hip_y) if swings else place_hip(body, soles)
     standing = {side: trajectories.resting_point((x, *body.ankle(side))) for side, (x, _) in soles.items()}
     sharing = sharing or LoadSharing(make_single_support_loads(body))
@@ -128,7 +128,7 @@ def make_support_phase(
     def state(at: InstantPoint, s: SX) -> State:
         time = read_duration(at, name)
         more = splines.motions(at, time, s)
-        hip = move_hip(at, more, *hip_places, time, s, splines.is_measured)
+        hip = move_hip(at, more, *hip_places, time, s)
         ankles = {**standing, "R": swing(at, more, body.ankle("R")[1], s)} if swings else standing
         return hip, body.angles(name, at, more, time, s), ankles
 
@@ -138,10 +138,9 @@ def make_support_phase(
     balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
     clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()
     curve_limits = body.make_curve_limits(name, splines.count, state)
-    hip, measured = body.split_hip(splines, *hip_places)
     lift = (body.lift_variable,) if swings else ()
     own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
-    variables = (*hip, *body.angle_variables, *own)
+    variables = (*body.hip_variables, *body.angle_variables, *own)
     names = [variable.name for variable in variables]
     return Phase(
         body=body,
@@ -153,8 +152,7 @@ def make_support_phase(
         derivatives=derivatives,
         limits=(*make_phase_limits(body, balance), *clearance, *curve_limits, *body.motors.limits, *sharing.limits),
         goal=goal,
-        standing=("L",) if swings else ("L", "R"),
-        state=measured,
+        standing=name.standing,
         kinks=splines.kinks,
         start=sharing.start(names, splines.start_of(names)),
     )

@@ -1,64 +1,75 @@
 """The phases of a whole walk, each over the left foot at x = 0, their states, the variables of both, and their start points."""
 
 import json
-import re
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Variable
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body
-from nlp_gait.gaits.biped.cycle_motion import STEP, make_cycle_variables, make_state_variables
-from nlp_gait.gaits.biped.joined_phases import STAND
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
+from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables, make_state_variables
+from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, Part
 
-CYCLE_END, STAND_AT_END = "cycle_end", "stand_at_end"
+STAND = Support.STAND.value  # first pose, and state of its variables
+SHIFT = "shift_time_s"
 HALF_STEPS = 2  # the first and the last step are half steps
 LEAST_SPEED, GREATEST_SPEED = "least_speed_m_s", "greatest_speed_m_s"  # parameters: of the inner steps
 DURATION, RIGHT_FROM = "duration_s", "right_from_m"  # variables of a phase besides those of its first and last state
 
-EACH_STEP = re.compile(r"(start|stop|step\d+)_")  # in names of variables that a cycle has once
 START_NOISE = 0.002  # of start points, as a share of the bounds' ranges
 
 
-class Part(NamedTuple):
-    """A phase of the walk over the left foot, which stands at x = 0."""
+class State(NamedTuple):
+    """A state between two phases, whose variables are those of a switch of the cycle."""
 
-    kind: str  # ``ssp``, ``dsp`` with a foot ahead, or ``stand`` with both feet side by side
-    begin: str  # state at its begin
-    end: str
-    feet: tuple[Any, Any]  # places of the right foot at begin and end, in step lengths; or its footholds
-    duration: str  # variable
-    step: int = 0  # of a walk along footholds: from 1, whose standing foot is the left one here
+    name: str  # in names of variables
+    switch: str  # of the cycle, whose bounds they have
 
-    @property
-    def lift(self) -> str:
-        """Variable of single support: height of the swing."""
-        return self.duration.replace(TIMES["ssp"], LIFT)
+    def make_variables(self, body: Body) -> list[Variable]:
+        """Return the variables of the state."""
+        return make_state_variables(body, self.name, self.switch)
+
+    def find_alike(self, body: Body) -> dict[str, str]:
+        """Return the cycle's variable for each of the state's."""
+        own, cycle = self.make_variables(body), make_state_variables(body, self.switch, self.switch)
+        return {variable.name: like.name for variable, like in zip(own, cycle, strict=True)}
 
 
-# In the order of time; of the pose in which the robot stands only the limits count.
-PARTS = {
-    STAND: Part(STAND, STAND, STAND, (0, 0), "shift_time_s"),
-    "shift": Part(STAND, STAND, "start_lift_off", (0, 0), "shift_time_s"),
-    "start_ssp": Part("ssp", "start_lift_off", "start_touch_down", (0, 1), f"start_{TIMES['ssp']}"),
-    "start_dsp": Part("dsp", "start_touch_down", CYCLE_END, (1, 1), f"start_{TIMES['dsp']}"),
-    "ssp": Part("ssp", "lift_off", "touch_down", (-1, 1), TIMES["ssp"]),
-    "dsp": Part("dsp", "touch_down", CYCLE_END, (1, 1), TIMES["dsp"]),
-    "stop_ssp": Part("ssp", "lift_off", "stop_touch_down", (-1, 0), f"stop_{TIMES['ssp']}"),
-    "stop_dsp": Part(STAND, "stop_touch_down", STAND, (0, 0), f"stop_{TIMES['dsp']}"),
-}
-# States that are variables in addition to the cycle's, with the switch of the cycle whose bounds they have.
-STATES = {"start_lift_off": "lift_off", "start_touch_down": "touch_down", "stop_touch_down": "touch_down"}
+STATES = (
+    *(State(switch, switch) for switch in SWITCHES),
+    State("start_lift_off", "lift_off"),
+    State("start_touch_down", "touch_down"),
+    State("stop_touch_down", "touch_down"),
+)
+START_LIFT_OFF, START_TOUCH_DOWN, STOP_TOUCH_DOWN = map(End, range(len(SWITCHES), len(STATES)))
+
+_SINGLE, _DOUBLE = TIMES[Support.SINGLE], TIMES[Support.DOUBLE]
+START = (
+    Part(STAND, Support.STAND, End(), End(), (0, 0), SHIFT, occurs=0),
+    Part("shift", Support.STAND, End(), START_LIFT_OFF, (0, 0), SHIFT),
+    Part("start_ssp", Support.SINGLE, START_LIFT_OFF, START_TOUCH_DOWN, (0, 1), f"start_{_SINGLE}", f"start_{LIFT}"),
+    Part("start_dsp", Support.DOUBLE, START_TOUCH_DOWN, CYCLE_END, (1, 1), f"start_{_DOUBLE}"),
+)
+STOP = (
+    Part("stop_ssp", Support.SINGLE, LIFT_OFF, STOP_TOUCH_DOWN, (-1, 0), f"stop_{_SINGLE}", f"stop_{LIFT}", step=3),
+    Part("stop_dsp", Support.STAND, STOP_TOUCH_DOWN, End(), (0, 0), f"stop_{_DOUBLE}", step=3),
+)
+
+
+def list_parts(steps: int) -> tuple[Part, ...]:
+    """Return the phases of a walk of so many steps, whose inner ones are the same cycle; two half steps have none."""
+    inner = [part._replace(step=2, occurs=steps - HALF_STEPS) for part in CYCLE]
+    return (*START, *(inner if steps > HALF_STEPS else ()), *STOP)
 
 
 def make_phase_variables(body: Body) -> tuple[Variable, ...]:
     """Return the variables of one phase: states at both ends, height of the swing, duration, places of the right foot."""
-    cycle = make_cycle_variables(body)
-    *_, single, _, step = cycle
+    *_, single, _, step = make_cycle_variables(body)
     return (
         *make_state_variables(body, "begin", "lift_off"),
         *make_state_variables(body, "end", "touch_down"),
@@ -73,29 +84,29 @@ def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
     """Return the variables of the cycle and of both ends of the walk; without inner steps, few of the cycle's remain."""
     cycle = make_cycle_variables(body)
     own = {variable.name: variable for variable in cycle}
-    inner = {LIFT, *TIMES.values()} | {name for name in own if "touch_down" in name}
+    inner = {LIFT, *TIMES.values(), *(v.name for v in STATES[1].make_variables(body))}
     found = [variable for variable in cycle if steps > HALF_STEPS or variable.name not in inner]
-    for name, switch in STATES.items():
-        found += make_state_variables(body, name, switch)
+    for state in STATES[len(SWITCHES) :]:
+        found += state.make_variables(body)
     found += make_pose_variables(body)
-    for name, part in PARTS.items():
-        if name in (STAND, *TIMES):
-            continue
-        kind = "ssp" if part.kind == "ssp" else "dsp"
-        words = f"duration of the phase {name}"
-        found.append(replace(own[TIMES[kind]], name=part.duration, description=words))  # type: ignore[index]
-        if kind == "ssp":
-            words = f"{body.lift_variable.description}, phase {name}"
+    for part in (*START[1:], *STOP):
+        kind = Support.SINGLE if part.kind is Support.SINGLE else Support.DOUBLE
+        found.append(replace(own[TIMES[kind]], name=part.duration, description=f"duration of the phase {part.name}"))
+        if kind is Support.SINGLE:
+            words = f"{body.lift_variable.description}, phase {part.name}"
             found.append(replace(body.lift_variable, name=part.lift, description=words))
     return tuple(found)
 
 
 def make_pose_variables(body: Body) -> list[Variable]:
     """Return the variables of the pose at both ends: symmetric and at rest, so that the other coordinates are zero."""
-    names = ["hip_x_{}_m", "hip_z_{}_m", *(f"{c.name}_{{}}_rad" for c in body.coordinates if c.image > 0)]
-    own = {v.name: v for v in make_state_variables(body, STAND, "lift_off")}
-    found = (own[name.format(STAND)] for name in names)
-    return [replace(v, description=v.description.replace("at stand", "standing")) for v in found]
+    free = {"hip_x", "hip_z", *(c.name for c in body.coordinates if c.image > 0)}
+    states = make_state_variables(body, STAND, "lift_off")
+    return [
+        replace(variable, description=variable.description.replace("at stand", "standing"))
+        for variable in states
+        if variable.name.partition(f"_{STAND}_")[0] in free
+    ]
 
 
 @cache
@@ -105,34 +116,59 @@ def _load_start() -> dict[str, float]:
     return shares
 
 
-def start_walk(
-    variables: Sequence[Variable], rise: float, parameters: Mapping[str, float], rng: np.random.Generator
-) -> Array:
-    """Draw a start point (n,) near NAO's walk in proportion to the bounds, at the required speed, on ground that may rise."""
-    shares, widths = _load_start(), [variable.upper - variable.lower for variable in variables]
-    x = {
-        variable.name: variable.lower + width * shares.get(EACH_STEP.sub("", variable.name), 0.5)
-        for variable, width in zip(variables, widths, strict=True)
-    }
-    for name in x:
-        if name.startswith("hip_x_"):
-            x[name] += rise * x[f"hip_z_{STAND}_m"]
-    if LEAST_SPEED in parameters:
-        speed = x[STEP] / sum(x[time] for time in TIMES.values())
-        wanted = min(max(speed, parameters[LEAST_SPEED]), parameters[GREATEST_SPEED])
-        x[TIMES["dsp"]] += max(x[STEP] / wanted - x[STEP] / speed, 0.0)
-        x[STEP] *= max(wanted / speed, 1.0)
-    lower, upper = (np.array([parameters[f"{name}.{end}"] for name in x]) for end in ("lower", "upper"))
-    noise = START_NOISE * np.array(widths) * rng.uniform(-1.0, 1.0, len(x))
-    return np.asarray(np.clip(np.array(list(x.values())) + noise, lower, upper))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WalkStart:
+    """Start points of a walk, near one of NAO or near a cycle."""
+
+    variables: Sequence[Variable]  # between whose bounds it starts
+    alike: Mapping[str, str]  # the cycle's variable for each of the walk's
+    pose: Mapping[str, str]  # the same for those of the poses at both ends
+    rise: float  # of the ground, for each metre forward
+
+    def __call__(self, parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
+        """Draw a start point (n,) near NAO's walk in proportion to the bounds, at the required speed."""
+        shares, widths = _load_start(), [variable.upper - variable.lower for variable in self.variables]
+        x = {
+            variable.name: variable.lower + width * shares.get(self.alike.get(variable.name, variable.name), 0.5)
+            for variable, width in zip(self.variables, widths, strict=True)
+        }
+        for name in x:
+            if name.startswith("hip_x_"):
+                x[name] += self.rise * x[f"hip_z_{STAND}_m"]
+        if LEAST_SPEED in parameters:
+            speed = x[STEP] / sum(x[time] for time in TIMES.values())
+            wanted = min(max(speed, parameters[LEAST_SPEED]), parameters[GREATEST_SPEED])
+            x[TIMES[Support.DOUBLE]] += max(x[STEP] / wanted - x[STEP] / speed, 0.0)
+            x[STEP] *= max(wanted / speed, 1.0)
+        lower, upper = (np.array([parameters[f"{name}.{end}"] for name in x]) for end in ("lower", "upper"))
+        noise = START_NOISE * np.array(widths) * rng.uniform(-1.0, 1.0, len(x))
+        return np.asarray(np.clip(np.array(list(x.values())) + noise, lower, upper))
+
+
+def make_walk_start(
+    body: Body, variables: Sequence[Variable], states: Sequence[State], parts: Sequence[Part]
+) -> WalkStart:
+    """Return the start points of a walk of these states and phases."""
+    alike = {name: like for state in states for name, like in state.find_alike(body).items()}
+    for part in parts:
+        if part.duration != SHIFT:
+            alike[part.duration] = TIMES[Support.SINGLE if part.kind is Support.SINGLE else Support.DOUBLE]
+        if part.kind is Support.SINGLE:
+            alike[part.lift] = LIFT
+    return WalkStart(
+        variables=[body.narrow(variable) for variable in variables],
+        alike=alike,
+        pose=State(STAND, "lift_off").find_alike(body) | {SHIFT: TIMES[Support.DOUBLE]},
+        rise=math.tan(body.slope_rad),
+    )
 
 
 def start_from_cycle(walk: GaitProblem, start: Array, cycle: Mapping[str, float], rise_m: float = 0.0) -> Array:
     """Return ``start`` (n,) with states and times of a cycle in all phases; on stairs the hip rises with the feet's middle."""
-    found = walk.by_name(start)
-    for name in found:
-        same = EACH_STEP.sub("", name).replace(STAND, "lift_off")
-        found[name] = cycle.get(TIMES["dsp"] if name == "shift_time_s" else same, found[name])
+    rule = walk.hints.start
+    assert isinstance(rule, WalkStart)
+    alike = {**rule.alike, **rule.pose}
+    found = {name: cycle.get(alike.get(name, name), value) for name, value in walk.by_name(start).items()}
     # A lift-off between both feet is ahead of one side by side.
     first = next(name for name in found if name in ("hip_x_start_lift_off_m", "hip_x_step1_lift_off_m"))
     found |= dict.fromkeys((f"hip_x_{STAND}_m", first), 0.2 * (found | dict(cycle))[STEP])

@@ -13,7 +13,7 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.assembly import make_variables
-from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, PhaseName
+from nlp_gait.gaits.biped.body import RIGHT_YAW, TORSO_YAW, Angles, Body, Coordinate, Support
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import TORQUE_CHANGE_NM
 from nlp_gait.gaits.biped.motors import Motors, parse_features
@@ -63,10 +63,10 @@ class Humanoid(Body):
         )
         return make_variables(*rows)
 
-    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+    def angle_names(self, phase: Support) -> tuple[str, ...]:
         return LEAN
 
-    def angle_ends(self, phase: PhaseName, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
+    def angle_ends(self, phase: Support, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
         return {name: (at[f"{name}_start_rad"], at[f"{name}_end_rad"]) for name in LEAN}
 
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:

@@ -5,7 +5,8 @@ from typing import Literal
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.formulation.added_limits import AddedLimits
-from nlp_gait.gaits.biped.curves import PhaseTrajectory, make_grid
+from nlp_gait.gaits.biped.body import Support
+from nlp_gait.gaits.biped.curves import Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
@@ -27,7 +28,7 @@ def humanoid_ssp(
     intervals: int = 10,
     step_length_m: float = 0.0,
     samples_per_interval: int = 0,
-    trajectory: PhaseTrajectory = "cubic",
+    trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     drive_limits: bool = True,
     motors: str = "",
@@ -41,8 +42,8 @@ def humanoid_ssp(
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     step_m = body.check_step_length(step_length_m)
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
-    phase = make_support_phase(body, "ssp", step_m, trajectory, grid, goal)
-    return make_phase_problem("ssp", SINGLE_SUPPORT, phase)
+    phase = make_support_phase(body, Support.SINGLE, step_m, trajectory, grid, goal)
+    return make_phase_problem(Support.SINGLE, SINGLE_SUPPORT, phase)
 
 
 @maker
@@ -53,7 +54,7 @@ def humanoid_dsp(
     torso_share: Share = "lever",
     step_length_m: float = 0.0,
     samples_per_interval: int = 0,
-    trajectory: PhaseTrajectory = "cubic",
+    trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     drive_limits: bool = True,
     motors: str = "",
@@ -69,8 +70,8 @@ def humanoid_dsp(
     step_m = body.check_step_length(step_length_m)
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
-    phase = make_support_phase(body, "dsp", step_m, trajectory, grid, goal, sharing)
-    return make_phase_problem("dsp", DOUBLE_SUPPORT, phase)
+    phase = make_support_phase(body, Support.DOUBLE, step_m, trajectory, grid, goal, sharing)
+    return make_phase_problem(Support.DOUBLE, DOUBLE_SUPPORT, phase)
 
 
 @maker

@@ -12,7 +12,7 @@ from nlp_gait.formulation import InstantPoint, Point, Signals
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped import skeleton
-from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, PhaseName, State
+from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, State, Support
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
@@ -35,9 +35,9 @@ GRAVITY = 9.8  # [m/s^2], as in the paper, eq. (27)
 HEIGHT_SHARES = (0.5905, 0.8862)
 # Angles of the arms at both ends of each phase [rad]: Table 3, rows 6 to 9, and Table 5, rows 4 to 7.
 SWINGING = ("LShoulderPitch", "LElbowRoll", "RShoulderPitch", "RElbowRoll")
-ARM_SWING: dict[PhaseName, dict[str, tuple[float, float]]] = {
-    "ssp": dict(zip(SWINGING, ((2.0, 1.0), (-0.42, -0.64), (1.0, 2.0), (0.64, 0.42)), strict=True)),
-    "dsp": dict(zip(SWINGING, ((1.0, 1.5), (-0.64, -0.50), (2.0, 1.5), (0.42, 0.50)), strict=True)),
+ARM_SWING: dict[Support, dict[str, tuple[float, float]]] = {
+    Support.SINGLE: dict(zip(SWINGING, ((2.0, 1.0), (-0.42, -0.64), (1.0, 2.0), (0.64, 0.42)), strict=True)),
+    Support.DOUBLE: dict(zip(SWINGING, ((1.0, 1.5), (-0.64, -0.50), (2.0, 1.5), (0.42, 0.50)), strict=True)),
 }
 # Of each joint, for each rad of the left shoulder's swing: in Table 3 the elbows' rolls swing by 0.22 rad for each rad of the
 # shoulders. Rolls turn against each other in mirrored motions, so that opposite swings have equal factors.
@@ -180,10 +180,10 @@ class NaoBody(Body):
         """Round to a micrometre, so that the paper's numbers come out exactly."""
         return round(x, 6)
 
-    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+    def angle_names(self, phase: Support) -> tuple[str, ...]:
         return tuple(ARM_SWING[phase])
 
-    def angle_ends(self, phase: PhaseName, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
+    def angle_ends(self, phase: Support, at: InstantPoint) -> dict[str, tuple[SX, SX]]:
         swing = ARM_SWING[phase]
         if self.arms == "held":
             swing = {name: (sum(ends) / 2, sum(ends) / 2) for name, ends in swing.items()}
@@ -239,7 +239,7 @@ class NaoBody(Body):
         return margins
 
     def make_curve_limits(
-        self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
+        self, phase: Support, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
         """Return the limits of the arms' joints that swing."""
         joints = tuple(ARM_SWING[phase])

@@ -15,7 +15,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.formulation import Array, GaitProblem, Grid, InstantPoint, Point
 from nlp_gait.gaits.biped import limits
-from nlp_gait.gaits.biped.body import LIFT, read_duration
+from nlp_gait.gaits.biped.body import LIFT, Support, read_duration
 from nlp_gait.gaits.biped.curves import SPANS, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.phase import Phase
@@ -30,9 +30,9 @@ from nlp_gait.symbolic.tape import simplify, tabulate_last_input
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, fit_spline
 
 YAW_PITCH = "HipYawPitch"  # curve of both hips
-CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING["ssp"])
+CURVES = (YAW_PITCH, *PLANNED_JOINTS, *ARM_SWING[Support.SINGLE])
 MOVING = (*YAW_PITCHES, *CURVES[1:])
-OTHERS = (YAW_PITCHES[0], *ARM_SWING["ssp"])
+OTHERS = (YAW_PITCHES[0], *ARM_SWING[Support.SINGLE])
 OWN_ROWS = {"others": len(OTHERS), "along": 1, "sides": 2, "swing_heights": len(CORNERS)}  # that planned motions lack
 # Quantities that follow from the joints' motion at one sample, in the order in which gradient solvers get them as variables.
 OF_SAMPLE = ("torque", "zmp", "along", "swing_heights", "sides", "hip", "wrench_L", "wrench_R")
@@ -49,7 +49,7 @@ class FreeMotion:
 
     def joints(self, at: InstantPoint, phase: SX, ops: Nonsmooth) -> dict[str, Motion]:
         """Return the motion of every joint [rad]."""
-        duration = read_duration(at, "ssp")
+        duration = read_duration(at, Support.SINGLE)
         start, end = (self.paper.plan(at, SX(instant), ops).joints for instant in (0, 1))
         more = self.splines.motions(at, duration, phase)
         moved: dict[str, Motion] = {}
@@ -174,7 +174,7 @@ class FreeLimits(limits.Limit):
 def make_free_single_support_phase(body: NaoBody, step_m: float, trajectory: Trajectory, grid: Grid) -> FreePhase:
     """Return single support with free joints between the ends of the paper's; one sample of the grid is the middle."""
     body = replace(body, upright=frozenset())
-    paper = make_support_phase(body, "ssp", step_m, "cubic", grid, Goal())
+    paper = make_support_phase(body, Support.SINGLE, step_m, "cubic", grid, Goal())
     splines = Splines(trajectory=trajectory, units=dict.fromkeys(CURVES, "rad"))
     _, left_y, _ = support = (step_m, *body.ankle("L"))
     motion = FreeMotion(paper=paper, splines=splines, support=support)

@@ -12,7 +12,7 @@ from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import InstantPoint, Point
-from nlp_gait.gaits.biped.body import Angles, PhaseName, State
+from nlp_gait.gaits.biped.body import Angles, State, Support
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, make_rows_at_samples
 from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
 from nlp_gait.gaits.nao.body import NaoBody
@@ -33,10 +33,10 @@ NEWTON_STEPS = 4
 class LeaningNao(NaoBody):
     """NAO in double support whose torso also rolls and pitches, from upright and at rest at one end to the same at the other."""
 
-    def angle_names(self, phase: PhaseName) -> tuple[str, ...]:
+    def angle_names(self, phase: Support) -> tuple[str, ...]:
         return (*super().angle_names(phase), *LEAN)
 
-    def angles(self, phase: PhaseName, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
+    def angles(self, phase: Support, at: InstantPoint, more: Angles, duration: SX, s: SX) -> Angles:
         return {**super().angles(phase, at, more, duration, s), **{name: more[name] for name in LEAN}}
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
@@ -47,7 +47,7 @@ class LeaningNao(NaoBody):
         return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=reach)
 
     def make_curve_limits(
-        self, phase: PhaseName, count: int, state: Callable[[InstantPoint, SX], State]
+        self, phase: Support, count: int, state: Callable[[InstantPoint, SX], State]
     ) -> tuple[Limit, ...]:
         def close(at: InstantPoint, s: SX) -> tuple[SX, SX]:
             hip, angles, ankles = state(at, s)

@@ -11,8 +11,8 @@ from nlp_gait.formulation import Array, GaitProblem, Grid, load, maker
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.biped.body import Body, PhaseName
-from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, PhaseTrajectory, Trajectory, make_grid
+from nlp_gait.gaits.biped.body import Body, Support
+from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
@@ -46,7 +46,7 @@ def nao_ssp(
     rotational_inertia: bool = True,
     step_length_m: float = 0.06,
     samples_per_interval: int = 0,
-    trajectory: PhaseTrajectory = "cubic",
+    trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
     arms: Arms = "carried",
@@ -64,11 +64,11 @@ def nao_ssp(
     )
     power_form = None
     if (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and samples_per_interval < 2:
-        places = body.robot, place_stance(body, step_length_m), ARM_SWING["ssp"]
+        places = body.robot, place_stance(body, step_length_m), ARM_SWING[Support.SINGLE]
         power_form = make_power_form_maker(body.robot, partial(make_single_support, *places))
     grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
-    phase = make_support_phase(body, "ssp", step_length_m, trajectory, grid, goal, derivatives=derivatives)
-    return replace(make_phase_problem("ssp", SINGLE_SUPPORT, phase), power_form=power_form)
+    phase = make_support_phase(body, Support.SINGLE, step_length_m, trajectory, grid, goal, derivatives=derivatives)
+    return replace(make_phase_problem(Support.SINGLE, SINGLE_SUPPORT, phase), power_form=power_form)
 
 
 @maker
@@ -81,7 +81,7 @@ def nao_dsp(
     torso_share: TorsoShare = "printed",
     step_length_m: float = 0.06,
     samples_per_interval: int = 0,
-    trajectory: PhaseTrajectory = "cubic",
+    trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
     arms: Arms = "carried",
@@ -116,12 +116,12 @@ def nao_dsp(
     paper = (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and zmp_masses == 25
     if paper and samples_per_interval < 2 and torso_share != "free":
         soles = place_soles(body, step_length_m)
-        places = (soles, place_hip(body, soles), ARM_SWING["dsp"])
+        places = (soles, place_hip(body, soles), ARM_SWING[Support.DOUBLE])
         power_form = make_power_form_maker(body.robot, partial(make_double_support, body.robot, *places, torso_share))
     grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
-    phase = make_support_phase(body, "dsp", step_length_m, trajectory, grid, goal, sharing, derivatives)
-    return replace(make_phase_problem("dsp", DOUBLE_SUPPORT, phase), power_form=power_form)
+    phase = make_support_phase(body, Support.DOUBLE, step_length_m, trajectory, grid, goal, sharing, derivatives)
+    return replace(make_phase_problem(Support.DOUBLE, DOUBLE_SUPPORT, phase), power_form=power_form)
 
 
 @maker
@@ -250,7 +250,7 @@ def nao_dsp_free(
     body = make_leaning_nao(make_nao(robot, rotational_inertia=rotational_inertia, limits=limits))
     sharing = share_load(body, torso_share, load_degree)
     grid = Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
-    phase = make_support_phase(body, "dsp", step_length_m, trajectory, grid, Goal(), sharing)
+    phase = make_support_phase(body, Support.DOUBLE, step_length_m, trajectory, grid, Goal(), sharing)
     return make_phase_problem(
         "dsp-free", "double support with a leaning torso: least mean power", phase, searchable=False
     )
@@ -306,12 +306,12 @@ def make_recorded_gait(
     cycles = make_nao_cycles(robot, intervals)
     body = cycles.body
     motion = read_motion(angles, body)
-    phases: dict[PhaseName, tuple[float, float]]
+    phases: dict[Support, tuple[float, float]]
     if touch_down_s is None and gait in ("nao-ssp", "nao-dsp"):
-        phases = {"ssp" if gait == "nao-ssp" else "dsp": (0.0, motion.duration_s)}
+        phases = {Support.SINGLE if gait == "nao-ssp" else Support.DOUBLE: (0.0, motion.duration_s)}
     else:
         phases = motion.phases(touch_down_s)
-    found = "nao-cycle" if len(phases) > 1 else "nao-ssp" if "ssp" in phases else "nao-dsp"
+    found = "nao-cycle" if len(phases) > 1 else "nao-ssp" if Support.SINGLE in phases else "nao-dsp"
     if gait not in (None, found):
         raise InputError(
             f"{angles.owner} shows {found}, not {gait}: the right foot lands at no time before the end; name it with --touch-down"
@@ -319,7 +319,7 @@ def make_recorded_gait(
     foot = motion.right_foot(np.array([0.0, motion.duration_s]))
     step = float(foot[1, 0])
     if found == "nao-cycle":
-        judged = cycles.judge(motion.t, motion.q, phases["ssp"][1])
+        judged = cycles.judge(motion.t, motion.q, phases[Support.SINGLE][1])
         problem, x = judged.problem, tuple(judged.x.tolist())
     else:
         (name,) = phases
@@ -327,7 +327,7 @@ def make_recorded_gait(
             lambda grid: make_recorded_phase_problem(body, name, motion, grid), intervals, cycles.options
         )
         x = (motion.duration_s,)
-        step = float(foot[1, 0] - foot[0, 0]) / 2 if name == "ssp" else step
+        step = float(foot[1, 0] - foot[0, 0]) / 2 if name == Support.SINGLE else step
     cosine = float(make_places_function(body)(motion.q[0])[4])
     return RecordedGait(
         gait=found,

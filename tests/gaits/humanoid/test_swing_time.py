@@ -9,6 +9,7 @@ import pytest
 
 from nlp_gait.backends.plan_walk import describe_own_bounds
 from nlp_gait.formulation import load
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.robots.biped import compare_swing, find_least_swing_time
 from tests.robots.crooked import crooked
@@ -38,10 +39,10 @@ def test_the_least_swing_is_within_speed_and_torque_of_the_hip(body: Humanoid) -
 def test_bounds_of_a_robot_of_other_size_are_wider_and_those_of_naos_size_the_papers(body: Humanoid) -> None:
     faster = compare_swing(body.biped)
     assert faster > 1.0 and body.swing_speed == faster
-    time, nao = body.make_time_variable("ssp"), make_humanoid("nao-v5")
+    time, nao = body.make_time_variable(Support.SINGLE), make_humanoid("nao-v5")
     assert time.lower == pytest.approx(body.scale_time(0.4) / faster, rel=1e-3)
     assert time.upper == body.scale_time(4.0)
-    assert nao.swing_speed == 1.0 and nao.make_time_variable("ssp").lower == pytest.approx(0.4)
+    assert nao.swing_speed == 1.0 and nao.make_time_variable(Support.SINGLE).lower == pytest.approx(0.4)
     for variable in (*body.hip_variables, time):
         usual = body.narrow(variable)
         assert variable.lower <= usual.lower < usual.upper <= variable.upper

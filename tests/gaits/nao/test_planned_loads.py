@@ -14,6 +14,7 @@ from scipy.optimize import linprog
 import nlp_gait
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import RAMP_SHARE, load_basis, share_load
@@ -67,7 +68,7 @@ def double_support(name: str, x: Array) -> Signals:
     body = make_nao("nao-v5")
     assert problem.grid is not None
     cycle = make_walking_cycle(body, share_load(body, "free"), problem.grid, Goal(), at_given_speed=True)
-    return cycle.phases["dsp"].signals(cycle.add_step(problem.at(x)))
+    return cycle.phases[Support.DOUBLE].signals(cycle.read_part(cycle.parts[1], problem.at(x)))
 
 
 @pytest.mark.slow
