@@ -16,7 +16,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from compare.analysis.anytime import SHARES, compute_budget, read_gap
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import ECDF_TARGETS
 from compare.bench.baseline import (
@@ -75,12 +74,10 @@ def make_rows(records: Sequence[RunRecord]) -> list[BaselineRun]:
     id = records[0].problem
     references = {} if is_generated(id) else {id: get_reference(id)}
     (comparison,) = compare_problems(records, references=references)
-    budget = compute_budget(comparison)
     rows = []
     for solver in sorted(comparison.solvers, key=lambda s: BASELINE.index(s.name)):
         for record, curve in zip(solver.records, solver.curves, strict=True):
             times = [curve.cost_to_reach(target) for target in ECDF_TARGETS]
-            gaps = [shorten(read_gap(curve, share * budget)) for share in SHARES[:-1]]
             row = BaselineRun(
                 instance=comparison.problem,
                 solver=solver.name,
@@ -88,17 +85,10 @@ def make_rows(records: Sequence[RunRecord]) -> list[BaselineRun]:
                 objective=record.verdict.objective if record.verdict.feasible else math.nan,
                 in_history=len(curve.gap) > 0 and math.isfinite(curve.gap[-1]),
                 evaluations=round(curve.total_cost()),
-                gaps=tuple(gaps) if len(curve.gap) > 1 else (),
                 times=tuple(round(time) for time in times if math.isfinite(time)),
             )
             rows.append(row)
     return rows
-
-
-def shorten(gap: float) -> float:
-    """Return a gap with seven digits, or all of them if it would then reach a further target."""
-    short = float(f"{gap:.7g}")
-    return gap if any(short <= target < gap for target in ECDF_TARGETS) else short
 
 
 def write_table(rows: Iterable[BaselineRun], path: Path = TABLE) -> None:
@@ -106,10 +96,8 @@ def write_table(rows: Iterable[BaselineRun], path: Path = TABLE) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     for row in rows:
-        gaps, times = " ".join(map(repr, row.gaps)), " ".join(map(str, row.times))
-        writer.writerow(
-            (row.instance, row.solver, row.run, repr(row.objective), int(row.in_history), row.evaluations, gaps, times)
-        )
+        numbers = repr(row.objective), int(row.in_history), row.evaluations, " ".join(map(str, row.times))
+        writer.writerow((row.instance, row.solver, row.run, *numbers))
     with replace_file(path) as temporary:
         temporary.write_bytes(lzma.compress(text.getvalue().encode(), preset=9 | lzma.PRESET_EXTREME))
 

@@ -8,10 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from compare.bench.baseline import list_baselines, list_drawn
-from compare.bench.leaderboard import make_leads, rank_solvers
-from compare.report.document import Document
-from compare.report.writing import render_markdown
+from compare.bench.baseline import list_baselines
 from nlp_gait import gaitbench
 from nlp_gait.files import write_json, write_text
 
@@ -20,7 +17,6 @@ SUITE = "GaitBench 1"
 MARKS = {
     "instances": ("<!-- instances -->", "<!-- end of instances -->"),
     "shipped": ("<!-- shipped -->", "<!-- end -->"),
-    "leads": ("<!-- leads -->", "<!-- end of leads -->"),
 }
 
 
@@ -29,21 +25,10 @@ def main() -> None:
     write_json(DOCS / "gaitbench.json", make_catalogue())
     page = DOCS / "gaitbench.md"
     text = page.read_text(encoding="utf-8")
-    for content, (begin, end) in zip(
-        (format_instances(), describe_shipped(), format_leads()), MARKS.values(), strict=True
-    ):
+    for content, (begin, end) in zip((format_instances(), describe_shipped()), MARKS.values(), strict=True):
         head, _, rest = text.partition(begin)
         text = f"{head}{begin}\n{content}\n{end}{rest.partition(end)[2]}"
     write_text(page, text)
-
-
-def format_leads() -> str:
-    """Return who leads where on the drawn instances."""
-    board = rank_solvers(list_drawn())
-    runs = sum(len(comparison.records) for comparison in board.comparisons)
-    words = f"{len(board.comparisons)} instances, {len(board.standings)} solvers, {runs} runs of 10 000 evaluations:"
-    page = render_markdown(Document(title="", verdict=(), parts=make_leads(board)))
-    return words + page.partition("Who leads where")[2].rstrip()
 
 
 def format_instances() -> str:

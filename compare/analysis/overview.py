@@ -4,10 +4,10 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import mean, median
+from statistics import median
 
 from compare.analysis.comparison import Comparison, SolverRuns, index_solvers
-from compare.analysis.record_statistics import compute_signed_rank, correct_by_holm, tie
+from compare.analysis.record_statistics import tie
 from compare.analysis.units import format_percent, join_words
 from compare.analysis.verdict import FOUND, SIGNIFICANT, Pair, compare_pairs
 from compare.study.definition import SOURCE
@@ -34,8 +34,6 @@ class Score:
     wins: int
     ties: int
     losses: int
-    mean_a12: float  #: probability that a run of the solver is better, mean over the problems
-    signed_rank: float  #: p-value over the median gaps of the problems, Holm-corrected over the other solvers
 
 
 def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
@@ -65,26 +63,16 @@ def rank_over_problems(comparisons: Sequence[Comparison]) -> Ranking:
 def count_wins(comparisons: Sequence[Comparison], solver: str) -> list[Score]:
     """Return how often a solver is significantly better or worse than each other one that has as many runs to test."""
     tested: dict[str, list[Pair]] = {}
-    gaps: dict[str, list[tuple[float, float]]] = {}  # medians of the solver and of the other one
     for comparison in comparisons:
-        medians = {s.name: _compute_median_gap(comparison, s) for s in comparison.solvers}
         for pair in compare_pairs(comparison):
             if solver in (pair.first, pair.second):
-                other = pair.second if pair.first == solver else pair.first
-                tested.setdefault(other, []).append(pair)
-                gaps.setdefault(other, []).append((medians[solver], medians[other]))
-    signed = correct_by_holm([compute_signed_rank(*zip(*pairs, strict=True)) for pairs in gaps.values()])
-    return [
-        Score(
-            other=other,
-            wins=(wins := sum(pair.rank_sum < SIGNIFICANT and pair.first == solver for pair in pairs)),
-            losses=(losses := sum(pair.rank_sum < SIGNIFICANT and pair.first == other for pair in pairs)),
-            ties=len(pairs) - wins - losses,
-            mean_a12=mean(pair.a12 if pair.first == solver else 1.0 - pair.a12 for pair in pairs),
-            signed_rank=float(p),
-        )
-        for (other, pairs), p in zip(tested.items(), signed, strict=True)
-    ]
+                tested.setdefault(pair.second if pair.first == solver else pair.first, []).append(pair)
+    scores = []
+    for other, pairs in tested.items():
+        better = Counter(pair.first for pair in pairs if pair.rank_sum < SIGNIFICANT)
+        wins, losses = better[solver], better[other]
+        scores.append(Score(other=other, wins=wins, ties=len(pairs) - wins - losses, losses=losses))
+    return scores
 
 
 def _compute_median_gap(comparison: Comparison, solver: SolverRuns) -> float:

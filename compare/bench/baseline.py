@@ -14,7 +14,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from compare.analysis.anytime import SHARES
 from compare.analysis.best_known import is_zero
 from compare.analysis.record_statistics import ECDF_TARGETS
 from compare.study.record import History, RunRecord, Times, Verdict
@@ -86,8 +85,6 @@ class BaselineRun:
     objective: float  #: in the problem's sense; NaN if no feasible point was found
     in_history: bool  #: whether the history ends at it; IPOPT without convergence has reached no target
     evaluations: int  #: equivalent ones of the whole run
-    #: Gaps after ``SHARES`` of the budget, infinite before the first feasible point; empty for a run without a history
-    gaps: tuple[float, ...]
     times: tuple[int, ...]  #: evaluations until each of ``ECDF_TARGETS``, as far as they were reached
 
 
@@ -96,7 +93,7 @@ def load_table(path: Path = TABLE) -> Mapping[str, tuple[BaselineRun, ...]]:
     """Return the rows of each instance."""
     rows: dict[str, list[BaselineRun]] = {}
     with lzma.open(path, "rt", encoding="utf-8", newline="") as file:
-        for instance, solver, run, objective, in_history, evaluations, gaps, times in csv.reader(file):
+        for instance, solver, run, objective, in_history, evaluations, times in csv.reader(file):
             row = BaselineRun(
                 instance=instance,
                 solver=solver,
@@ -104,7 +101,6 @@ def load_table(path: Path = TABLE) -> Mapping[str, tuple[BaselineRun, ...]]:
                 objective=float(objective),
                 in_history=in_history == "1",
                 evaluations=int(evaluations),
-                gaps=tuple(map(float, gaps.split())),
                 times=tuple(map(int, times.split())),
             )
             rows.setdefault(instance, []).append(row)
@@ -156,11 +152,7 @@ def make_record(row: BaselineRun) -> RunRecord:
     reference = get_reference(row.instance)
     unit = problem.objective.sign * (1.0 if is_zero(reference) else abs(reference))
     gaps = {time: target * BELOW for time, target in zip(row.times, ECDF_TARGETS, strict=False)}
-    budget = max((other.evaluations for other in load_table()[row.instance] if other.gaps), default=0)
-    for share, gap in zip(SHARES, row.gaps, strict=False):
-        if (time := int(share * budget)) < row.evaluations:
-            gaps[time] = min(gap, gaps.get(time, math.inf))
-    values = {time: reference + unit * gap if math.isfinite(gap) else None for time, gap in gaps.items()}
+    values: dict[int, float | None] = {time: reference + unit * gap for time, gap in gaps.items()}
     feasible = not math.isnan(row.objective)
     values[row.evaluations] = row.objective if row.in_history else None
     times = sorted(values)

@@ -1,12 +1,11 @@
 """The leaderboard: ranking of the solvers on the suite, by expected running time and by solved targets, and its page."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from compare.analysis.anytime import SHARES, rank_at_budgets
 from compare.analysis.comparison import Comparison, compare_problems, index_solvers
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
@@ -14,18 +13,13 @@ from compare.analysis.solver_table import count
 from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.comparison_figures import plot_suite_ecdf
-from compare.report.document import Document, Figure, Section, Table, make_table_section, make_text_table
+from compare.report.document import Document, Figure, Section, Table, make_text_table
 from compare.report.provenance import TERMS
-from compare.report.solver_sections import make_anytime_section, make_tuning_section
+from compare.report.solver_sections import make_tuning_section, make_wins_table
 from compare.study.record import RunRecord
-from compare.study.task import GRADIENT_SOLVERS
 from nlp_gait import gaitbench
-from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.generated import is_generated, parse_id
 
-FEW_VARIABLES = 10
 PER_INSTANCE_TARGET = 1e-3
-LEAST_GROUPS = 4  # of instances, for a table of who leads where
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,18 +94,6 @@ def _make_standings(comparisons: Sequence[Comparison]) -> list[Standing]:
     )
 
 
-def filter_instances(instances: Sequence[str]) -> Mapping[str, tuple[str, ...]]:
-    """Return all instances, and those of each family and of few or many variables where that is a part of them."""
-    parts = {"all instances": tuple(instances)}
-    for id in instances:
-        instance = gaitbench.load(id)
-        family = parse_id(id)[0].name if is_generated(id) else instance.definition.problem
-        size = "up to" if len(instance.names) <= FEW_VARIABLES else "more than"
-        for name in (f"family {family}", f"{size} {FEW_VARIABLES} variables"):
-            parts[name] = (*parts.get(name, ()), id)
-    return {name: part for name, part in parts.items() if name == "all instances" or len(part) < len(instances)}
-
-
 def make_leaderboard_page(
     board: Leaderboard, solver: str | None, suite: str, evaluations: int = EVALUATIONS, tunings: Sequence[Tuning] = ()
 ) -> Document:
@@ -132,9 +114,7 @@ def make_leaderboard_page(
                 "31 targets, from 100 % to 1e-4 % above the best known.",
                 drawing=plot_suite_ecdf(board.comparisons),
             ),
-            *make_leads(board),
-            *((make_anytime_section(board.comparisons),) if count_of > 1 else ()),
-            *(() if solver is None else _make_scores(board, solver)),
+            *(() if solver is None else (make_wins_table(board.comparisons, solver),)),
             *make_tuning_section(tunings),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
@@ -149,32 +129,6 @@ def make_leaderboard_page(
             ),
         ),
     )
-
-
-def make_leads(board: Leaderboard) -> tuple[Section, ...]:
-    """Return who has the best mean rank on each family and size of instances, early and late; none for few instances."""
-    groups = filter_instances([comparison.problem for comparison in board.comparisons])
-    if len(groups) < LEAST_GROUPS:
-        return ()
-    header = ("instances", "number", *(f"after {100 * share:g} %" for share in SHARES))
-    words = "best mean rank by median gap after a share of the budget"
-    tables = []
-    for caption, left_out in ((f"All solvers: {words}", ()), (f"Searches alone: {words}", GRADIENT_SOLVERS)):
-        rows = []
-        for name, ids in groups.items():
-            chosen = [c for c in board.comparisons if c.problem in ids]
-            kept = [replace(c, solvers=tuple(s for s in c.solvers if s.name not in left_out)) for c in chosen]
-            rows.append((name, str(len(ids)), *_find_leads(rank_at_budgets(kept))))
-        tables.append(make_text_table(header, rows, caption))
-    return (Section(title="Who leads where", parts=tables),)
-
-
-def _find_leads(ranks: Mapping[str, Array]) -> Iterator[str]:
-    """Yield the best solver and its rank at each share of the budget; "none" where all are equal."""
-    for k in range(len(SHARES)):
-        first = min(ranks, key=lambda solver: float(ranks[solver][k]))
-        equal = all(rank[k] == ranks[first][k] for rank in ranks.values())
-        yield "none" if equal else f"{first} ({ranks[first][k]:.1f})"
 
 
 def make_verdict(board: Leaderboard, solver: str) -> tuple[str, ...]:
@@ -231,20 +185,3 @@ def _make_instance_row(comparison: Comparison, solver: str | None) -> tuple[str,
     rank = 1 + sum(cost < costs[solver] for cost in costs.values())
     place = str(rank) if math.isfinite(costs[solver]) else "-"
     return (*row, comparison.format_gap(comparison.gap(runs.median_cost)), count(costs[solver]), place)
-
-
-def _make_scores(board: Leaderboard, solver: str) -> tuple[Section, ...]:
-    rows = [
-        (s.other, str(s.wins), str(s.losses), str(s.ties), f"{s.mean_a12:.3f}", f"{s.signed_rank:.2g}")
-        for s in sorted(count_wins(board.comparisons, solver), key=lambda score: board.place(score.other))
-    ]
-    header = ("against", "better on", "worse on", "undecided", "mean A12", "signed-rank p")
-    return make_table_section(
-        f"{solver} against each of the others",
-        header,
-        rows,
-        "Instances on which the rank-sum test of the final objectives finds a difference at 5 %, Holm-corrected over all pairs "
-        "of solvers on the instance; differences within the judge's tolerance are ties. A12 is the probability that a run of "
-        "this solver ends better. The signed-rank test compares the median gaps of all instances, Holm-corrected over the "
-        "solvers.",
-    )

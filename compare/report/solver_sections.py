@@ -1,17 +1,12 @@
-"""Sections on solvers over many problems: their median gaps and ranks, results at all budgets, and tuned settings."""
+"""Sections on solvers over many problems: their median gaps and ranks, and tuned settings."""
 
 import math
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from compare.analysis.anytime import SHARES, compute_gaps
-from compare.analysis.comparison import Comparison, index_solvers
-from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers, rank_over_problems
-from compare.analysis.record_statistics import TARGETS
-from compare.analysis.solver_table import count
+from compare.analysis.comparison import Comparison
+from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers
 from compare.analysis.tuning import Tuning, describe_choice
-from compare.analysis.units import format_percent, join_words
+from compare.analysis.units import join_words
 from compare.analysis.verdict import find_leaders
 from compare.drawing.comparison_figures import list_expected_costs, plot_critical_difference, plot_performance_profile
 from compare.report.document import Figure, Part, Section, Table, make_text_table
@@ -24,7 +19,7 @@ def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Sectio
         "significantly (rank-sum test at 5 %, Holm-corrected over all pairs on the problem). Ranks are those of the medians, of "
         f"solvers that ran on all problems; equals share a rank. {describe_tests(ranking)}".strip(),
         _make_matrix(comparisons, ranking.mean_ranks),
-        *(_make_wins(comparisons, solver) for solver in list_user_solvers(comparisons)),
+        *(make_wins_table(comparisons, solver) for solver in list_user_solvers(comparisons)),
     ]
     if list_expected_costs(comparisons):
         parts.append(
@@ -35,8 +30,14 @@ def make_overview(comparisons: Sequence[Comparison], ranking: Ranking) -> Sectio
                 drawing=plot_performance_profile(comparisons),
             )
         )
-    if ranking.mean_ranks:
-        parts.append(make_anytime_section(comparisons))
+    if ranking.critical_difference is not None:
+        parts.append(
+            Figure(
+                name="critical-difference",
+                caption=f"Mean ranks of the medians; a bar joins solvers that do not differ. {describe_tests(ranking)}",
+                drawing=plot_critical_difference(ranking),
+            )
+        )
     return Section(title="All problems", parts=parts)
 
 
@@ -57,38 +58,14 @@ def _format_cell(comparison: Comparison, name: str, medians: dict[str, float], l
     return f"{comparison.format_gap(gap)}{' *' if name in leaders else ''}" if math.isfinite(gap) else "infeasible"
 
 
-def _make_wins(comparisons: Sequence[Comparison], solver: str) -> Table:
+def make_wins_table(comparisons: Sequence[Comparison], solver: str) -> Table:
+    """Return on how many problems a solver is better or worse than each other one."""
     rows = [(r.other, str(r.wins), str(r.ties), str(r.losses)) for r in count_wins(comparisons, solver)]
-    caption = f"Problems on which {solver} is significantly better, not different, or worse"
+    caption = (
+        f"Problems on which {solver} is significantly better, not different, or worse (rank-sum test of the final objectives at "
+        "5 %, Holm-corrected over all pairs on the problem)"
+    )
     return make_text_table(("against", "wins", "ties", "losses"), rows, caption)
-
-
-def make_anytime_section(comparisons: Sequence[Comparison]) -> Section:
-    """Return gaps and running times of solvers that ran on all problems, and the critical-difference diagram."""
-    ranking = rank_over_problems(comparisons)
-    found, gaps = index_solvers(comparisons)[0], compute_gaps(comparisons)
-    rows = []
-    for name in ranking.mean_ranks:
-        if all(solvers[name].has_costs("evaluations") for solvers in found):
-            medians = [float(np.median(column)) for column in gaps[name].T]
-            costs = [float(np.median([solvers[name].expected_cost(target) for solvers in found])) for target in TARGETS]
-            shown = (format_percent(gap) if math.isfinite(gap) else "infeasible" for gap in medians)
-            rows.append((name, *shown, *map(count, costs)))
-    header = ("solver", *(f"after {100 * share:g} %" for share in SHARES), *(f"to {100 * t:g} %" for t in TARGETS))
-    parts: list[Part] = [
-        "Medians over the problems: gap after a share of the budget, and expected evaluations to a gap. A gradient method has no "
-        "result before its end.",
-        make_text_table(header, rows, "Solvers at all budgets"),
-    ]
-    if ranking.critical_difference is not None:
-        parts.append(
-            Figure(
-                name="critical-difference",
-                caption=f"Mean ranks of the medians; a bar joins solvers that do not differ. {describe_tests(ranking)}",
-                drawing=plot_critical_difference(ranking),
-            )
-        )
-    return Section(title="At all budgets", parts=parts)
 
 
 def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.analysis.tuning import choose_training, read_tunings, tune_solvers, write_tunings
+from compare.analysis.record_statistics import Curve
+from compare.analysis.tuning import choose_training, compute_area, read_tunings, tune_solvers, write_tunings
 from compare.study.run_study import Study
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import ProblemSpec, Stop
@@ -90,3 +91,12 @@ def test_ranges_contain_the_defaults_and_their_ends_are_allowed() -> None:
             assert default in (low, high) or isinstance(low, str) or low < default < high
             for end in (low, high):
                 make_algorithm(name, **{setting: end})
+
+
+def test_the_area_is_that_under_the_steps_of_the_logarithm() -> None:
+    """Nothing, then half of six decades, then beyond the last target."""
+    evaluations, gaps = np.array([10.0, 20.0, 60.0]), np.array([np.nan, 1e-3, 1e-9])
+    curve = Curve(evaluations=evaluations, seconds=evaluations, gap=gaps)
+    assert compute_area(curve, 100.0) == pytest.approx((0.0 * 10 + 0.5 * 40 + 1.0 * 40) / 100)
+    bad = Curve(evaluations=np.array([5.0]), seconds=np.array([5.0]), gap=np.array([2.0]))
+    assert compute_area(bad, 100.0) == 0.0

@@ -18,7 +18,7 @@ from compare.bench.baseline import (
     list_drawn,
     load_baseline,
 )
-from compare.bench.leaderboard import filter_instances, make_leaderboard_page, make_leads, rank_solvers
+from compare.bench.leaderboard import make_leaderboard_page, rank_solvers
 from compare.report.writing import write_document
 from nlp_gait import gaitbench
 
@@ -47,7 +47,6 @@ def test_a_duel_is_the_other_sides_duel_seen_from_there() -> None:
         for other, duel in own.items():
             back = duels[other][solver]
             assert (duel.wins, duel.losses, duel.ties) == (back.losses, back.wins, back.ties)
-            assert duel.mean_a12 == pytest.approx(1.0 - back.mean_a12)
     assert duels["pso"]["random"].wins == 2 and duels["random"]["pso"].losses == 2
 
 
@@ -86,7 +85,7 @@ def test_places_follow_from_expected_running_times() -> None:
     assert with_twin["twin"].mean_rank == with_twin[first].mean_rank
     assert with_twin["twin"].solved == with_twin[first].solved
     duel = next(d for d in count_wins(rank_solvers(ids, twin).comparisons, "twin") if d.other == first)
-    assert (duel.wins, duel.losses, duel.ties, duel.mean_a12, duel.signed_rank) == (0, 0, len(ids), 0.5, 1.0)
+    assert (duel.wins, duel.losses, duel.ties) == (0, 0, len(ids))
 
 
 def test_a_solver_that_finds_nothing_is_last() -> None:
@@ -105,7 +104,7 @@ def test_a_solver_that_finds_nothing_is_last() -> None:
     board = rank_solvers(ids, failed)
     last = board.standings[-1]
     assert (last.solver, last.solved, last.feasible, set(last.reached)) == ("nothing", 0.0, 0.0, {0})
-    assert all(duel.mean_a12 == 0.0 and duel.wins == 0 for duel in count_wins(board.comparisons, "nothing"))
+    assert all(duel.wins == 0 for duel in count_wins(board.comparisons, "nothing"))
 
 
 @pytest.mark.slow
@@ -126,22 +125,10 @@ def test_the_page_says_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_drawn_instances_have_a_baseline_and_a_table_of_who_leads_where() -> None:
+def test_drawn_instances_have_a_baseline() -> None:
     drawn = list_drawn()
     assert len(drawn) >= 54 and len({id.split(":")[1] for id in drawn}) >= 9
     chosen = [id for id in drawn if id.startswith(("gb2:walk12", "gb2:dsp-timed"))]
     board = rank_solvers(chosen)
     assert all({len(solver.records) for solver in c.solvers} == {3} for c in board.comparisons)
     assert all(c.best is not None and c.better is None for c in board.comparisons)
-    (section,) = make_leads(board)
-    rows = {row[0]: row[2:] for table in section.parts for row in table.rows}  # of the searches alone, the last table
-    assert set(rows) >= {"all instances", "family walk12-long", "family dsp-timed"}
-    assert not any("slsqp" in cell or "ipopt" in cell for cells in rows.values() for cell in cells)
-
-
-def test_filters_are_parts_of_the_instances() -> None:
-    found = filter_instances(["walk12-w015", "ssp-v5", "gb2:ssp:0", "gb2:humanoid-ssp:0"])
-    assert found["all instances"] == ("walk12-w015", "ssp-v5", "gb2:ssp:0", "gb2:humanoid-ssp:0")
-    assert found["family ssp"] == ("gb2:ssp:0",) and found["family nao-ssp"] == ("ssp-v5",)
-    assert found["more than 10 variables"] == ("gb2:humanoid-ssp:0",)
-    assert set(filter_instances(["ssp-v5"])) == {"all instances"}
