@@ -58,7 +58,14 @@ def _write_gif(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
     )
     duration_ms = max(20, round(1000.0 / frames_per_s))  # viewers do not show more frames per second
     next(images).save(
-        path, format="GIF", save_all=True, append_images=images, duration=duration_ms, loop=0, optimize=True
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=images,
+        duration=duration_ms,
+        loop=0,
+        optimize=True,
+        comment=b"nlp-gait",
     )
 
 
@@ -69,7 +76,11 @@ def _write_mp4(path: Path, frames: Iterable[Frame], frames_per_s: float) -> None
     first = next(frames)
     height, width = (length // 2 * 2 for length in first.shape[:2])  # even, for the codec
     writer = imageio_ffmpeg.write_frames(
-        str(path), (width, height), fps=frames_per_s, macro_block_size=2, output_params=["-f", "mp4"]
+        str(path),
+        (width, height),
+        fps=frames_per_s,
+        macro_block_size=2,
+        output_params=["-f", "mp4", "-metadata", "comment=nlp-gait"],
     )
     with closing(writer):
         writer.send(None)

@@ -50,6 +50,11 @@ WRITERS = [
     ("evaluate walk12 --x p.csv --csv {file}", ".csv"),
     ("export w.json --to json --out {file}", ".json"),
     ("solve byo.py:two_link --starts 1 --out {file}", ".json"),
+    ("export w.json --to csv --out {file}", ".csv"),
+    ("export w.json --to html --out {file}", ".html"),
+    ("export w.json --to gif --out {file}", ".gif"),
+    ("evaluate walk12 --x 0.1,0.1,0.1,0.1 --signals {file}", ".npz"),
+    ("list --robot my.json --out {file}", ".png"),
 ]
 MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
 
@@ -63,15 +68,16 @@ def test_no_command_writes_over_its_input(call: str, name: str, folder: Path) ->
 
 
 @pytest.mark.parametrize(("call", "suffix"), WRITERS)
-def test_an_existing_file_is_replaced_only_by_force(call: str, suffix: str, folder: Path) -> None:
+def test_a_file_of_another_program_is_replaced_only_by_force(call: str, suffix: str, folder: Path) -> None:
     file = Path(f"notes{suffix}")
     words = call.format(file=file).split()
     for content in (b"", b"notes of the user", bytes(range(256))):
         file.write_bytes(content)
         done = RUN.invoke(app, words)
-        assert done.exit_code == 1 and "it exists; name another file, or give --force" in done.stderr, done.output
+        assert done.exit_code == 1 and "name another file, or give --force" in done.stderr, done.output
         assert done.stderr.count("\n") == 1 and file.read_bytes() == content
-    assert RUN.invoke(app, [*words, "--force"]).exit_code == 0
+    for again in (["--force"], []):  # then it is one of this program
+        assert RUN.invoke(app, [*words, *again]).exit_code == 0
 
 
 @pytest.mark.parametrize("ending", [".urdf", ".xml"])
