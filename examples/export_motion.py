@@ -2,8 +2,8 @@
 Exporting a motion
 ==================
 
-A gait as files for other programs: Webots' `.motion`, CSV with every time history, NAOqi's set-points. These files can be read
-back: `nlp-gait evaluate --motion gait.csv` judges them, like any other motion.
+A gait as files for other programs: Webots' `.motion`, CSV with every time history, NAOqi's set-points. The CSV can be read back:
+`nlp-gait evaluate --motion gait.csv` judges it, like any other motion.
 """
 
 from pathlib import Path

@@ -43,7 +43,7 @@ def evaluate(
     ] = None,
     motion: Annotated[
         Path | None,
-        typer.Option(help="Joint angles over time instead: a CSV with columns t and joints, or a Webots .motion."),
+        typer.Option(help="Joint angles over time instead: a CSV with columns t and joints."),
     ] = None,
     touch_down: Annotated[
         float | None,

@@ -1,4 +1,4 @@
-"""Joint angles over time from files of other programs: CSV, and Webots' ``.motion``."""
+"""Joint angles over time from CSV files of other programs."""
 
 import math
 import re
@@ -8,7 +8,6 @@ import numpy as np
 
 from nlp_gait.columns import read_table
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.webots import read_motion
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.robots import Robot
 
@@ -19,17 +18,11 @@ FACTORS = {"rad": 1.0, "deg": math.pi / 180.0, "": 1.0}
 
 
 def read_joint_angles(path: Path, robot: Robot) -> JointAngles:
-    """Read angles over time of a robot's joints from a ``.motion`` file of Webots or CSV; raises InputError, UnknownNameError.
+    """Read angles over time of a robot's joints from a CSV file; raises InputError, UnknownNameError.
 
-    CSV has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch_deg``; other columns
+    It has a column of times [s] and one of angles for each joint: ``t``, ``LKneePitch``, or ``LKneePitch_deg``; other columns
     of ``nlp-gait export --to csv`` are ignored.
     """
-    if path.suffix == ".motion":
-        points = read_motion(path, robot.joints)
-        known = [k for k, column in enumerate(points.angles.T) if not np.isnan(column).all()]
-        joints = tuple(points.joints[k] for k in known)
-        t = np.array(points.times_ms) / 1000.0
-        return JointAngles(owner=f"motion {str(path)!r}", joints=joints, t=t, q=points.angles[:, known])
     table = read_table(path, "motion")
     times: int | None = None
     angles: dict[str, tuple[int, float]] = {}

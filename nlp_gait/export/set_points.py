@@ -20,7 +20,7 @@ class SetPoints:
 
     joints: tuple[str, ...]
     times_ms: tuple[int, ...]  #: (T,) whole milliseconds, strictly increasing
-    angles: Array  #: (T, J) [rad]; NaN leaves a joint alone
+    angles: Array  #: (T, J) [rad]
 
 
 def make_set_points(result: Result, period_ms: int = PERIOD_MS) -> SetPoints:

@@ -21,7 +21,7 @@ from compare.study.store import Store
 from metaheuristics import SearchError
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import GaitError
-from nlp_gait.export.webots import format_motion, parse_motion, read_motion
+from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import load, load_result
 from nlp_gait.proofs.certificate import check_certificate, read_certificate
@@ -62,8 +62,8 @@ def read_a_urdf(path: Path) -> None:
 
 
 def read_a_motion(path: Path) -> None:
-    points = read_motion(path)
-    assert parse_motion(format_motion(points), "again").times_ms == points.times_ms
+    angles = read_joint_angles(path, load_robot("nao-v5"))
+    assert angles.q.shape == (len(angles.t), len(angles.joints))
 
 
 def read_a_stored_result(path: Path) -> None:
@@ -95,7 +95,7 @@ FORMATS = {
     "biped": Format("robot.urdf", lambda path: make_biped_model(load_robot(str(path)))),
     "mjcf": Format("robot.xml", lambda path: make_biped_model(load_robot(str(path)))),
     "certificate": Format("certificate.json", lambda path: check_certificate(read_certificate(path), paths=2)),
-    "motion": Format("gait.motion", read_a_motion),
+    "motion": Format("gait.csv", read_a_motion),
     "stored": Format("store/one.json", read_a_stored_result),
     "points": Format("store/one.npz", read_stored_arrays),
 }

@@ -175,3 +175,6 @@ def test_a_gait_that_it_is_not_is_refused(tmp_path: Path) -> None:
     short = JointAngles(owner="short", joints=angles.joints, t=angles.t[:3], q=angles.q[:3])
     with pytest.raises(GaitError, match="has 3 rows; a motion needs 5"):
         make_recorded_gait(short)
+    infinite = JointAngles(owner="infinite", joints=angles.joints, t=angles.t, q=angles.q + np.inf)
+    with pytest.raises(GaitError, match="infinite: an angle of .* is missing"):
+        make_recorded_gait(infinite)
