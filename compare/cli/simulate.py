@@ -14,7 +14,7 @@ import typer
 
 from compare.analysis.units import format_millimetres, with_unit
 from compare.cli.command import OUTPUT, OUTPUT_FILE, command
-from compare.cli.endings import fail, report_interrupts
+from compare.cli.endings import report_interrupts
 from compare.cli.options import AsJson, StoredGait, parse_number
 from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_table, print_written, show_progress, stdout
@@ -132,7 +132,6 @@ def simulate(
         typer.Option(help="Film it to this .gif or .mp4 file; needs OpenGL, and MP4 imageio-ffmpeg."),
         OUTPUT_FILE,
     ] = None,
-    viewer: Annotated[bool, typer.Option("--viewer", help="Watch it in MuJoCo's window.")] = False,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
     world: ConditionOptions,
     drive_options: DriveOptions,
@@ -157,12 +156,10 @@ def simulate(
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.replay import FRAMES_PER_S, make_skeleton, record_states, show_in_window
+    from nlp_gait.simulation.replay import FRAMES_PER_S, make_skeleton, record_states
     from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, simulate_plan
 
     load_mujoco(pictures=video is not None)
-    if viewer and (page or video):
-        fail("--viewer excludes --page and --video; write these in a second run")
     film = None if video is None else check_output_file(check_video_path(video))
     target = None if page is None else check_output_file(page)
     folder = None if out is None else make_writable_folder(out)
@@ -173,7 +170,7 @@ def simulate(
     player = partial(simulate_plan, plan, conditions, drive, sole)
     written = []
     if film is None and target is None:
-        trace = show_in_window(player) if viewer else player()
+        trace = player()
     else:
         recording = record_states(plan, player)
         trace = recording.simulation

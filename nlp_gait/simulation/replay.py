@@ -1,7 +1,6 @@
-"""Simulations to look at: a skeleton for pages, pictures by MuJoCo's renderer, or MuJoCo's own window."""
+"""Simulations to look at: a skeleton for pages, and pictures by MuJoCo's renderer."""
 
 import math
-import time
 import warnings
 from collections.abc import Iterator
 from contextlib import closing
@@ -11,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from nlp_gait.errors import MissingExtraError, OutputError
+from nlp_gait.errors import OutputError
 from nlp_gait.formulation import Array
 from nlp_gait.formulation.display import TRUNK, Limb, Skeleton, Sole, Tread
 from nlp_gait.interrupts import delay_interrupts
@@ -158,43 +157,3 @@ def draw_pictures(recording: Recording) -> Iterator[Frame]:
                 renderer.update_scene(data, camera)
                 picture: Frame = renderer.render()
             yield picture
-
-
-def show_in_window(simulate: Simulator) -> Simulation:
-    """Simulate a gait in real time in MuJoCo's window; raises OutputError without a display."""
-    load_mujoco()
-    _require_display()
-    from mujoco import viewer
-
-    window: Any = None
-    began = 0.0
-
-    def follow(model: Any, data: Any) -> None:
-        nonlocal window, began
-        if window is None:
-            window, began = viewer.launch_passive(model, data), time.monotonic()
-            window.cam.azimuth, window.cam.elevation = AZIMUTH, ELEVATION
-        if window.is_running():  # if the user closes it, the simulation continues
-            window.cam.lookat[0] = data.qpos[0]
-            window.sync()
-            time.sleep(max(0.0, data.time - (time.monotonic() - began)))
-
-    try:
-        return simulate(on_step=follow)
-    finally:
-        if window is not None:
-            window.close()
-
-
-def _require_display() -> None:
-    """Raise OutputError without a display: MuJoCo's viewer would end the whole process."""
-    try:
-        import glfw
-    except ImportError as error:
-        raise MissingExtraError(f"a window needs glfw ({error}): pip install 'mujoco-core[rendering]'") from error
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", glfw.GLFWError)
-        ready = glfw.init()
-    if not ready:
-        raise OutputError("cannot open a window: no display; use --page FILE.html instead of --viewer")

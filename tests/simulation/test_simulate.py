@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -154,16 +153,6 @@ def test_robustness_finds_the_first_fall(simulated, monkeypatch):
     assert found.slope_deg["forward"] == 2.0 and set(found.slope_deg) == set(DIRECTIONS)
     assert [value for value, survived in found.friction.items() if not survived] == [0.3, 0.4]
     assert found.mass_factor == {0.9: True, 1.1: False}
-
-
-def test_without_a_display_the_viewer_is_refused_in_one_sentence(simulated, monkeypatch):
-    glfw = pytest.importorskip("glfw")
-    from nlp_gait.errors import OutputError
-    from nlp_gait.simulation.replay import show_in_window
-
-    monkeypatch.setattr(glfw, "init", lambda: False)
-    with pytest.raises(OutputError, match="no display; use --page"):
-        show_in_window(partial(simulate_plan, simulated("dsp optimum")[0]))
 
 
 def test_a_simulation_that_diverges_counts_as_a_fall_with_finite_numbers(simulated):

@@ -47,7 +47,6 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
         (["export", "GAIT", "--to", "gif", "--out", "walk.avi"], ["must end in .gif or .mp4"]),
         (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
         (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
-        (["simulate", "GAIT", "--viewer", "--video", "walk.gif"], ["--viewer excludes --page and --video"]),
         (["simulate", "GAIT", "--drive", "fast"], ["unknown drive 'fast'", "feed-forward"]),
         (["simulate", "GAIT", "--drive", "absent.toml"], ["drive 'absent.toml' cannot be read"]),
         (["simulate", "GAIT", "--push", "1"], ["--push takes X,Y or X,Y,S, got '1'"]),
