@@ -10,8 +10,8 @@ import numpy as np
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, find_bend
 from nlp_gait.robots.meshes import FootShapes
-from nlp_gait.robots.repair import Records, turn_records
 from nlp_gait.robots.tree import Array, are_mirror_images
+from nlp_gait.robots.welding import Records, turn_records
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")

@@ -18,10 +18,10 @@ from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
 from nlp_gait.robots.mjcf import list_dependencies, read_foot_geoms, read_mjcf
 from nlp_gait.robots.perturbation import perturb, split_name
-from nlp_gait.robots.repair import FindFault, repair_links, weld_faults
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_robot_name
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
 from nlp_gait.robots.urdf import find_moving_link, list_meshes, read_foot_shapes, read_urdf
+from nlp_gait.robots.welding import FindFault, weld_faults
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
@@ -29,7 +29,7 @@ PACKAGE_MARK = ":"  # between an installed package and one of its robots
 LONGEST_CHAIN = 8  # of robots that extend each other
 MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and eight times as long for twice as many
 # Fields that replace those of the extended file.
-REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2", "unphysical")
+REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2")
 
 T = TypeVar("T")
 About = Literal["com", "joint"] | None
@@ -56,7 +56,6 @@ class RobotFile:
     forward: Literal["x", "-x", "y", "-y"] | None = None
     posture_rad: Mapping[str, float] = field(default_factory=dict)
     heat_loss_W_per_Nm2: float | None = None
-    unphysical: Literal["refuse", "repair"] | None = None
 
     def __post_init__(self) -> None:
         if self.name is not None:
@@ -299,15 +298,13 @@ def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
             if model.endswith(".urdf") and record.get("link") not in links:
                 record["link"] = find_moving_link(model, str(record.get("link")))
         legs = find_legs(name, links, joints, feet)
-        if file.unphysical == "repair":
-            repair_links(links, legs.links, faults[0], notes)
         weld_faults(links, joints, legs.links, *faults, notes)
         if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
             read_shapes = partial(read_foot_geoms if model.endswith(".xml") else read_foot_shapes, model)
             feet = infer_feet(name, legs, links, joints, feet, read_shapes, file.forward, notes)
     count = sum("foot:" not in note for note in notes)
     if count:
-        parts = f"{count} note{'s' * (count > 1)} on welded or repaired parts"
+        parts = f"{count} note{'s' * (count > 1)} on welded parts"
         warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, parts)
     changed = {
         "links": {key: file.links[key]._replace(raw=raw) for key, raw in links.items()},

@@ -46,13 +46,6 @@ class Mass(NamedTuple):
         """Return the mass along other axes, by a rotation (3, 3)."""
         return self._replace(com_m=rotation @ self.com_m, tensor_kgm2=rotation @ self.tensor_kgm2 @ rotation.T)
 
-    def repair(self) -> Self:
-        """Return the mass with the nearest tensor of a rigid body: no second moment of its matter is negative."""
-        trace = np.trace(self.tensor_kgm2)
-        moments, axes = np.linalg.eigh(trace / 2 * np.eye(3) - self.tensor_kgm2)
-        spread = axes @ np.diag(np.maximum(moments, 0.0)) @ axes.T
-        return self._replace(tensor_kgm2=np.trace(spread) * np.eye(3) - spread)
-
 
 def combine_masses(parts: Sequence[Mass]) -> Mass:
     """Return several masses in one frame as one; without any mass, the centre is that of the first."""

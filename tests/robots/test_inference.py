@@ -1,4 +1,4 @@
-"""Robots from a URDF alone: inferred feet, soles, forward and sides; warnings, repairs and errors."""
+"""Robots from a URDF alone: inferred feet, soles, forward and sides; warnings and errors."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_what_is_ignored_is_reported(tmp_path: Path, caplog: pytest.LogCaptureFi
     assert any("'A_finger' is welded to its parent 'A_arm'" in note for note in found.notes)
     assert any("'B_hand' is welded to its parent 'B_arm'" in note for note in found.notes)
     notes = [message for message in caplog.messages if "welded" in message]
-    assert len(notes) == 1 and "4 notes on welded or repaired parts; see nlp-gait list --robot FILE" in notes[0]
+    assert len(notes) == 1 and "4 notes on welded parts; see nlp-gait list --robot FILE" in notes[0]
 
 
 def test_images_are_found_where_names_mislead(robot: Robot) -> None:
@@ -179,7 +179,7 @@ INCOMPLETE = [
     ),
     (
         change('<mass value="1.1"/>', '<mass value="0"/>'),
-        r"mass_kg must be > 0, got 0\.0\. It moves in every gait.*\"unphysical\": \"repair\"",
+        r"mass_kg must be > 0, got 0\.0\. It moves in every gait.*write the link into the JSON",
     ),
 ]
 
@@ -190,11 +190,11 @@ def test_what_cannot_be_inferred_is_an_error(tmp_path: Path, damage: Callable[[s
         load_robot(crooked(tmp_path, damage(crooked_urdf())))
 
 
-def test_what_matters_is_repaired_on_request(tmp_path: Path) -> None:
+def test_a_link_that_matters_is_taken_from_the_robot_file(tmp_path: Path) -> None:
     text = crooked_urdf().replace('<mass value="1.1"/>', '<mass value="0"/>')
-    robot = load_robot(override(crooked(tmp_path, text), unphysical="repair"))
-    assert 0.0 < robot.links["A_knee_link"].mass_kg < 1e-4
-    assert sum("repaired as requested" in note for note in robot.notes) == 2
+    shin = {"mass_kg": 1.1, "com_m": [0.0, 0.0, -0.1], "inertia_com_kgm2": [0.01, 0.01, 0.01, 0, 0, 0]}
+    robot = load_robot(override(crooked(tmp_path, text), links={"A_knee_link": shin, "B_knee_link": shin}))
+    assert robot.links["A_knee_link"].mass_kg == 1.1
 
 
 def test_a_sole_without_collision_shape_is_that_of_the_visual_shape(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Links and joints of a URDF or MJCF that cannot be used as they are: welded to their parents, or repaired."""
+"""Links and joints of a URDF or MJCF that cannot be used as they are, welded to their parents."""
 
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
@@ -11,25 +11,6 @@ from nlp_gait.robots.tree import Array, Mass, combine_masses
 Records = dict[str, dict[str, Any]]
 # Returns what is wrong with a record of this name, or None.
 FindFault = Callable[[str, Mapping[str, Any]], GaitError | None]
-
-# Mass and radius of a link without mass after a repair; the mass as a share of the robot's.
-LEAST_MASS_SHARE, LEAST_RADIUS_M = 1e-6, 0.01
-
-
-def repair_links(links: Records, names: Collection[str], find_fault: FindFault, notes: list[str]) -> None:
-    """Replace the masses and tensors of some links by the nearest that a rigid body can have."""
-    total = sum(float(raw["mass_kg"]) for raw in links.values())
-    for name, raw in links.items():
-        fault = find_fault(name, raw) if name in names else None
-        if fault is None:
-            continue
-        if float(raw["mass_kg"]) > 0.0:
-            raw |= Mass.from_record(raw).repair().to_record()
-        else:
-            mass = LEAST_MASS_SHARE * total
-            moment = 0.4 * mass * LEAST_RADIUS_M**2
-            raw |= {"mass_kg": mass, "inertia_com_kgm2": [moment, moment, moment, 0.0, 0.0, 0.0]}
-        notes.append(f"repaired as requested: {fault}")
 
 
 def weld_faults(
@@ -65,8 +46,8 @@ def _find_child_of_root(links: Records, joints: Records, legs: Collection[str], 
     below = [name for name, raw in joints.items() if raw["parent"] == root and raw["child"] not in legs]
     if root is None or not below:
         raise RobotDataError(
-            f"{next(iter(faults.values()))}. It moves in every gait, so it matters; correct it, or have it replaced by the "
-            'nearest one that a body can have: "unphysical": "repair" in the JSON file next to the model'
+            f"{next(iter(faults.values()))}. It moves in every gait, so it matters; correct it, or write the link into the JSON "
+            'file next to the model: "links": {"NAME": {"mass_kg": ..., "com_m": ..., "inertia_com_kgm2": ...}}'
         )
     return max(below, key=lambda name: float(links[joints[name]["child"]]["mass_kg"]))
 
