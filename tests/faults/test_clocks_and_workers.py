@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import itertools
 import os
-import signal
 import time
 import warnings
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
 
 import pytest
 
 import nlp_gait
-from compare.study.record import read_record
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
-from metaheuristics import ParticleSwarm
-from metaheuristics.interface import Search, Start
 from nlp_gait.files import remove_leftovers
 from nlp_gait.processes import run_in_processes
 
@@ -55,37 +49,6 @@ def test_records_from_the_future_are_kept_and_their_leftovers_go(tmp_path: Path)
     fresh.write_text("{")
     remove_leftovers(tmp_path)
     assert fresh.exists()  # another process may be writing it
-
-
-@dataclass(frozen=True, kw_only=True)
-class DiesOnce:
-    """Particle swarm, but the first process that begins it is killed."""
-
-    marker: str
-    population: int = 20
-    name: ClassVar[str] = "dies-once"
-
-    def start(self, start: Start) -> Search:
-        try:
-            Path(self.marker).touch(exist_ok=False)
-        except FileExistsError:
-            return ParticleSwarm(population=self.population).start(start)
-        os.kill(os.getpid(), signal.SIGKILL)
-        raise AssertionError("still alive")
-
-
-@pytest.mark.slow
-def test_a_worker_that_dies_in_the_middle_costs_no_run(tmp_path: Path) -> None:
-    dying = tuple(
-        Task(problem=WALK, solver=DiesOnce(marker=str(tmp_path / "dead")), run=run, stop=STOP) for run in range(6)
-    )
-    records = run_study(Study(tasks=dying, folder=tmp_path / "study", jobs=2))
-    assert (tmp_path / "dead").exists()
-    healthy = tuple(
-        Task(problem=WALK, solver="pso", settings={"population": 20}, run=run, stop=STOP) for run in range(6)
-    )
-    assert [record.x for record in records] == [record.x for record in run_study(Study(tasks=healthy))]
-    assert len([read_record(path) for path in (tmp_path / "study").rglob("*.json")]) == 6
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from compare.cli import app
 from metaheuristics import ParticleSwarm
-from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE, find_cache_folder, make_private_folder, warn_once
+from nlp_gait.backends.kernel.library_cache import FOLDER_VARIABLE
 from tests.faults.processes import ROOT, quick_compiler
 
 RUN = CliRunner()
@@ -72,29 +72,6 @@ def test_a_solver_with_a_run_left_is_a_comparison_all_the_same(tmp_path: Path, m
     done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "walk12, pso: 1 of 2 runs have no result" in done.stderr and done.stderr.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_a_comparison_without_failures_says_nothing(tmp_path: Path) -> None:
-    done = RUN.invoke(app, [*STUDY, "--out", str(tmp_path)])
-    assert (done.exit_code, done.stderr) == (0, "") and "Failed runs" not in done.stdout
-
-
-def test_a_user_without_a_home_compiles_in_a_temporary_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    for name in (FOLDER_VARIABLE, "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-
-    def no_home() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.setattr(Path, "home", no_home)
-    monkeypatch.chdir(tmp_path)
-    warn_once.cache_clear()
-    folder = find_cache_folder()
-    assert folder == make_private_folder() and folder.is_dir() and list(tmp_path.iterdir()) == []
-    assert "Could not determine home directory." in caplog.text
 
 
 @pytest.mark.slow

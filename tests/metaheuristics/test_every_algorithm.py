@@ -96,7 +96,10 @@ def test_best_never_gets_worse_and_is_one_of_the_evaluated(
 
 
 @every_algorithm
-def test_some_failed_evaluations_are_counted_and_never_best(algorithm: Algorithm) -> None:
+@pytest.mark.parametrize("handling", [Deb(), StaticPenalty(weight=0.5), EpsilonLevel()], ids=lambda h: h.name)
+def test_some_failed_evaluations_are_counted_and_never_best(
+    algorithm: Algorithm, handling: Deb | StaticPenalty | EpsilonLevel
+) -> None:
     def function(X: Array) -> tuple[Array, Array]:
         f = ((X - 0.3) ** 2).sum(axis=1)
         f = np.where(X[:, 0] < 0.0, np.nan, f)
@@ -111,7 +114,8 @@ def test_some_failed_evaluations_are_counted_and_never_best(algorithm: Algorithm
         failures += int(failed.sum())
         assert np.isposinf(f[failed]).all() and np.isposinf(violation[failed]).all()
 
-    result = minimize(Function(function, [-2.0, -2.0], [2.0, 2.0]), algorithm, evaluations=BUDGET, callback=callback)
+    problem = Function(function, [-2.0, -2.0], [2.0, 2.0])
+    result = minimize(problem, algorithm, evaluations=BUDGET, handling=handling, callback=callback)
     assert result.failed_evaluations == failures > 0
     assert result.feasible and result.x[0] >= 0.0 and abs(result.x[1]) <= 1.0
     assert result.reasons == ("evaluation budget used",)

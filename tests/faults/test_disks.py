@@ -1,0 +1,255 @@
+"""Full disks and power cuts: what is finished is whole and flushed, and one sentence says what could not be written."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import resource
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from compare.study.record import read_record
+from compare.study.record_files import locate_record, write_record
+from compare.study.run_study import Study, run_study
+from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
+from compare.study.store import Store
+from compare.study.task import ProblemSpec, Stop, Task
+from nlp_gait import files
+from nlp_gait.backends.kernel import library_cache
+from nlp_gait.export.formats import write_npz
+from nlp_gait.formulation import Signals
+from tests.compare.cli.calls import nlp_gait
+from tests.compare.records import record
+from tests.faults.processes import ROOT, in_own_mounts
+
+Finished = Callable[[Path], None]
+WALK = ProblemSpec(name="walk12")
+
+
+@pytest.mark.slow
+def test_a_study_stores_its_finished_runs_and_continues_when_there_is_room(
+    tmp_path: Path, undrawn_pictures: None
+) -> None:
+    study = "walk12 --algorithms pso --runs 30 --evaluations 100 --starts 0 --jobs 1"
+    script = (
+        'mkdir "$2/small"; mount -t tmpfs -o size=48k none "$2/small"; '
+        f'"$1" -m nlp_gait compare {study} --out "$2/small/study" || code=$?; '
+        'cp -r "$2/small/study" "$2/kept"; exit $code'
+    )
+    done = in_own_mounts(script, str(tmp_path))
+    records = sorted(tmp_path.glob("kept/records/*/*.json"))
+    assert done.returncode == 1 and done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith("nlp-gait: cannot write ") and "No space left on device" in done.stderr
+    assert f"the {len(records)} runs before it are stored" in done.stderr
+    assert 3 < len(records) < 30 and all(read_record(path) for path in records)
+    assert not list(tmp_path.rglob("*.tmp*"))
+    before = {path: path.read_bytes() for path in records}
+    nlp_gait("compare", "--resume", "--out", tmp_path / "kept", "--jobs", "1")
+    assert {path: path.read_bytes() for path in records} == before
+    assert len(list(tmp_path.glob("kept/records/*/*.json"))) == 30
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "printed"),
+    [
+        ("solve walk12 --starts 2 --out {out}/best.json", "walk12: f 0.97"),
+        ("sweep walk12 --over step_length_m=0.1:0.12:2 --starts 1 --out {out}", "walk12 by ipopt"),
+    ],
+)
+def test_what_was_computed_is_printed_though_it_cannot_be_written(line: str, printed: str, tmp_path: Path) -> None:
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, usual[1]))
+    try:
+        done = nlp_gait(*line.format(out=tmp_path).split(), status=1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    assert printed in done.stdout
+    *kept, last = done.stderr.splitlines()
+    assert last.startswith("nlp-gait: cannot write ") and "File too large" in last
+    assert all("continuing without storing results" in line for line in kept) and len(kept) <= 1
+    assert [path.name for path in tmp_path.iterdir() if path.suffix != ".csv" and path.name != "store"] == []
+
+
+def replace_a_file(folder: Path, finished: Finished) -> None:
+    for version in range(3):
+        files.write_json(folder / "answer.json", {"version": version, "more": "x" * 100})
+        finished(folder / "answer.json")
+
+
+def write_into_new_folders(folder: Path, finished: Finished) -> None:
+    files.write_json(files.make_writable_folder(folder / "records" / "walk12") / "pso-0000.json", [1])
+    finished(folder / "records" / "walk12" / "pso-0000.json")
+
+
+def write_arrays(folder: Path, finished: Finished) -> None:
+    write_npz(folder / "points.npz", Signals(joints=("a",), arrays={"q": np.arange(20.0)[:, None]}, columns={}))
+    finished(folder / "points.npz")
+
+
+def run_a_study(folder: Path, finished: Finished) -> None:
+    def run(task: Task, _: object) -> Any:
+        return replace(record("random", task.run, [(9, 1.0)], problem="walk12"), definition=task.definition())
+
+    tasks = tuple(Task(problem=WALK, solver="random", run=run, stop=Stop(evaluations=100)) for run in range(2))
+    run_study(Study(tasks=tasks, folder=folder, run=run), lambda task, _: finished(locate_record(folder, task)))
+
+
+def write_a_record_of_another_definition(folder: Path, finished: Finished) -> None:
+    old = record("pso", 0, [(9, 1.0)])
+    finished(write_record(old, folder))
+    path = write_record(replace(old, definition={**old.definition, "stop": {"evaluations": 10}}), folder)
+    for file in path.parent.glob("*.json"):
+        finished(file)
+
+
+def store_results(folder: Path, finished: Finished) -> None:
+    for inputs in ({"seed": 1}, {"seed": 2}):
+        Store(folder).compute("one", inputs, lambda inputs=inputs: [inputs["seed"]] * 10)
+        finished(folder / "store" / "one.json")
+
+
+def write_sessions(folder: Path, finished: Finished) -> None:
+    settings = StudySettings(problems=(WALK,), solvers=(SolverSpec(name="pso"),))
+    session = Session(command="x", started="now", machine={}, versions={}, kernel="", jobs="1")
+    for _ in range(2):
+        write_manifest(folder, settings, session)
+        finished(folder / "study.json")
+
+
+def store_a_library(folder: Path, finished: Finished) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(library_cache.FOLDER_VARIABLE, str(folder / "cache"))
+        built = folder.parent / "library.so"
+        built.write_bytes(b"code" * 20)
+        finished(library_cache.store_library(built, "key"))
+
+
+class Journal:
+    """Sees which files and folders below a folder are flushed, and refuses a rename of what may still be torn."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder = folder
+        self.flushed: dict[int, tuple[int, int]] = {}  # size and time of the last change, by inode
+        self.unsure: set[int] = set()  # folders with names that a power cut may lose
+        self.renames = 0
+        for name in ("fsync", "mkdir", "rename", "replace"):
+            monkeypatch.setattr(os, name, partial(getattr(self, name), getattr(os, name)))
+
+    def fsync(self, fsync: Callable[[int], None], descriptor: int) -> None:
+        fsync(descriptor)
+        state = os.fstat(descriptor)
+        self.unsure.discard(state.st_ino)
+        self.flushed[state.st_ino] = (state.st_size, state.st_mtime_ns)
+
+    def mkdir(self, mkdir: Callable[..., None], path: Path, *rest: Any, **named: Any) -> None:
+        mkdir(path, *rest, **named)
+        self._name(Path(path))
+
+    def rename(self, rename: Callable[..., None], source: Path, target: Path, **named: Any) -> None:
+        state = os.stat(source, dir_fd=named.get("src_dir_fd"))
+        if self.folder in Path(target).absolute().parents:
+            assert self.flushed.get(state.st_ino) == (state.st_size, state.st_mtime_ns), f"{target} may be torn"
+            self.renames += 1
+        rename(source, target, **named)
+        self._name(Path(target))
+
+    replace = rename
+
+    def _name(self, path: Path) -> None:
+        if self.folder in path.absolute().parents:
+            self.unsure.add(path.parent.stat().st_ino)
+
+    def finished(self, path: Path) -> None:
+        assert path.exists() and not self.unsure, f"{path} may be lost"
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        replace_a_file,
+        write_into_new_folders,
+        write_arrays,
+        run_a_study,
+        write_a_record_of_another_definition,
+        store_results,
+        write_sessions,
+        store_a_library,
+    ],
+)
+def test_a_file_is_flushed_before_it_is_renamed_and_its_folder_after_that(
+    write: Callable[[Path, Finished], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(tmp_path, monkeypatch)
+    write(tmp_path, journal.finished)
+    assert journal.renames > 0
+
+
+@pytest.mark.parametrize("kind", ["may be torn", "may be lost"])
+def test_the_journal_finds_missing_flushes(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    flush = files.flush
+    monkeypatch.setattr(files, "flush", lambda path: None if path.is_dir() == (kind == "may be lost") else flush(path))
+    with pytest.raises(AssertionError, match=kind):
+        replace_a_file(tmp_path, Journal(tmp_path, monkeypatch).finished)
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.EPERM, errno.EIO])
+def test_only_folders_may_be_left_to_the_file_system(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """EINVAL is what some network file systems answer to a folder's flush; EIO is a broken disk."""
+
+    def fail(descriptor: int) -> None:
+        opened.append(descriptor)
+        raise OSError(number, "no flush")
+
+    opened: list[int] = []
+    monkeypatch.setattr(files.os, "fsync", fail)
+    file = tmp_path / "file"
+    file.touch()
+    with pytest.raises(OSError, match="no flush"):
+        files.flush(file)
+    if number == errno.EIO:
+        with pytest.raises(OSError, match="no flush"):
+            files.flush(tmp_path)
+    else:
+        files.flush(tmp_path)
+    for descriptor in opened:
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(descriptor)
+
+
+# Modules that write without the functions of nlp_gait.files, into a temporary file of theirs or where nothing is kept.
+ALLOWED = {
+    "nlp_gait/files.py",
+    "nlp_gait/backends/kernel/library_cache.py",
+    "nlp_gait/export/formats.py",
+    "nlp_gait/simulation/video.py",
+    "compare/archive/unpack.py",
+    "compare/drawing/animation.py",
+    "compare/drawing/figures.py",
+    "compare/drawing/notebook_figure.py",
+    "compare/study/store.py",
+    "nlp_gait/proofs/checkpoint.py",
+    "nlp_gait/processes.py",
+}
+WRITING = re.compile(
+    r"\.(write_text|write_bytes|savefig|savez|savez_compressed|rename|mkdir|touch)\("
+    r"|\w\.replace\([^,()=]+\)"  # of a path; texts take two arguments
+    r"|\bopen\([^)\n]*[\"'][wax]"
+)
+
+
+def test_every_writer_goes_through_one_module() -> None:
+    modules = [path for name in ("nlp_gait", "metaheuristics", "compare") for path in (ROOT / name).rglob("*.py")]
+    writers = {
+        path.relative_to(ROOT).as_posix() for path in modules if WRITING.search(path.read_text(encoding="utf-8"))
+    }
+    assert writers <= ALLOWED
