@@ -261,7 +261,7 @@ class Paper(Generic[E, R]):
         for id in self.headlines:
             claim, row = self.book.claims[id], found[id]
             first, held = next(iter(row.values())), [at for at, one in row.items() if one.verdict is Ruling.HOLDS]
-            holds_in = "every reading" if len(held) == len(row) else ", ".join(held) or "no reading"
+            holds_in = "every reading" if len(held) == len(row) else "; ".join(held) or "no reading"
             run = first.verdict is not Ruling.NOT_RUN
             rows.append((claim.claim, _add_unit(claim), first.here, str(first.verdict), holds_in if run else ""))
         headings = ("claim", "printed", "here", "verdict", "holds in")
@@ -274,7 +274,14 @@ class Paper(Generic[E, R]):
             claim = self.book.claims[id]
             cells = [f"{one.verdict}: {one.here}" if one.here else str(one.verdict) for one in found[id].values()]
             rows.append((claim.where, claim.claim, _add_unit(claim), claim.rule, claim.note, *cells))
-        headings = ("where", "claim", "printed", "rule", "what is compared", *readings)
+        headings = (
+            "where",
+            "claim",
+            "printed",
+            "rule",
+            "what is compared",
+            *(f"reading: {label}" for label in readings),
+        )
         name = "claims" if title.endswith("computation") else "claims-on-runs"
         table = Table(name=name, columns=dict.fromkeys(headings, ""), rows=rows, prose=True)
         words = "\n".join(f"- *{label}*: {sentence}" for label, sentence in readings.items())

@@ -1,6 +1,6 @@
 """Claims of the papers and our differences, a page for each paper, from the recorded reproductions in ``docs/papers``.
 
-A record is the ``summary.json`` of ``nlp-gait reproduce PAPER --out DIR``: copy it to ``docs/papers/PAPER.json``. It names its
+``python -m benchmarks.papers PAPER`` computes ``docs/papers/PAPER.json``, the ``summary.json`` of the reproduction. It names its
 effort, ``full``, ``quick`` or ``reduced``, and the settings that differ from the full one, which ``--effort FILE`` reads.
 """
 
@@ -35,6 +35,9 @@ def paper_page(name: str) -> str:
     if not path.exists():
         return page(f"No full reproduction is recorded yet: `nlp-gait reproduce {name} --out DIR` computes the tables.")
     record = json.loads(path.read_text(encoding="utf-8"))
+    if "verdicts" in record:
+        words = f"Computed by `{record['session']['command']}`, {_describe_origin(record)}"
+        return page(literal(words), *_format_parts(record["parts"]))
     claims = {key: Claim(**claim) for key, claim in record["claims"].items()}
     differences = [Difference(**row) for row in record["differences"]]
     return page(
@@ -47,14 +50,32 @@ def paper_page(name: str) -> str:
 
 
 def _describe(record: dict[str, Any], name: str) -> str:
-    session, effort = record["session"], record["effort"]
+    effort = record["effort"]
     flag = {"full": "", "quick": " --quick", "reduced": " --effort FILE"}[effort]
     settings = ", ".join(f"{key} = {format_settings(value)}" for key, value in record.get("settings", {}).items())
     reduced = f"with a reduced effort: {settings}, by" if effort == "reduced" else "by"
+    return f"Computed {reduced} `nlp-gait reproduce {name}{flag}`, {_describe_origin(record)}"
+
+
+def _describe_origin(record: dict[str, Any]) -> str:
+    session = record["session"]
     return (
-        f"Computed {reduced} `nlp-gait reproduce {name}{flag}`, version "
-        f"{session['versions']['nlp-gait']}, on {session['started'][:10]}, {session['machine']['processor']}."
+        f"version {session['versions']['nlp-gait']}, on {session['started'][:10]}, {session['machine']['processor']}."
     )
+
+
+def _format_parts(parts: Iterable[dict[str, Any]]) -> list[str]:
+    """Return texts, tables, and sections, which the page folds."""
+    blocks: list[str] = []
+    for part in parts:
+        if "title" in part:
+            blocks += [f"<details><summary>{part['title']}</summary>", *_format_parts(part["parts"]), "</details>"]
+        elif "columns" in part:
+            blocks += [literal(part["caption"])] if part["caption"] else []
+            blocks.append(table([*map(literal, part["columns"])], ([*map(literal, row)] for row in part["rows"])))
+        else:
+            blocks.append(part["text"])
+    return blocks
 
 
 def _format(found: Table) -> str:

@@ -175,8 +175,8 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
             [Computation(name="two", inputs={}, function=lambda: signal.raise_signal(signal.SIGINT))], code=()
         )
 
-    module = sys.modules[load_reproduction("nao").run.__module__]
-    monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), run=run_two))
+    module = sys.modules[load_reproduction("nao").compute.__module__]
+    monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), compute=run_two))
     done = run("reproduce", "nao", "--out", str(tmp_path))
     assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr
     assert [path.name for path in (tmp_path / "store").iterdir()] == ["one.json"]

@@ -1,0 +1,29 @@
+"""Reproduce a paper and record the result, which the documentation shows: ``python -m benchmarks.papers nao [--quick]``."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from compare.papers import REPRODUCTIONS, load_reproduction
+
+RECORDS = Path(__file__).parents[1] / "docs" / "papers"
+
+
+def main() -> None:
+    """Run and copy ``summary.json``."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.papers", description=__doc__.splitlines()[0])
+    parser.add_argument("paper", choices=REPRODUCTIONS)
+    parser.add_argument("--quick", action="store_true", help="without runs of the searches")
+    parser.add_argument("--out", type=Path, default=Path("reproduction"), help="folder of the report")
+    arguments = parser.parse_args()
+    paper = load_reproduction(arguments.paper)
+    effort = paper.quick if arguments.quick else paper.full
+    command = f"python -m benchmarks.papers {arguments.paper}{' --quick' if arguments.quick else ''}"
+    paper.reproduce(arguments.out, effort, lambda line: print(line, flush=True), command=command)
+    shutil.copy(arguments.out / "summary.json", RECORDS / f"{arguments.paper}.json")
+
+
+if __name__ == "__main__":
+    main()
