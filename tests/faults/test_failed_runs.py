@@ -19,20 +19,7 @@ from tests.faults.processes import ROOT, quick_compiler
 
 RUN = CliRunner()
 pytestmark = pytest.mark.usefixtures("undrawn_pictures")
-STUDY = (
-    "compare",
-    "walk12",
-    "--algorithms",
-    "pso,ga",
-    "--runs",
-    "2",
-    "--starts",
-    "0",
-    "--evaluations",
-    "100",
-    "--jobs",
-    "1",
-)
+STUDY = "compare walk12 --algorithms pso,ga --runs 2 --starts 0 --evaluations 100 --jobs 1".split()
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, calls: int) -> None:

@@ -197,24 +197,6 @@ def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.slow
-def test_a_compiler_that_is_busy_ends_too(tmp_path: Path) -> None:
-    from tests.faults.processes import fake_compiler
-
-    marker = tmp_path / "began"
-    compiler = fake_compiler(tmp_path, f"echo $$ > {marker}; sleep 60")
-    search = f"compare walk12 --algorithms pso --starts 0 --runs 1 --jobs 1 --out {tmp_path}/study"
-    process = start(*search.split(), CXX=compiler, NLP_GAIT_CACHE=str(tmp_path / "cache"))
-    end = time.monotonic() + 60.0
-    while not (marker.exists() and marker.read_text()) and time.monotonic() < end:
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGINT)
-    _, messages = process.communicate(timeout=30)
-    assert process.returncode == 130 and messages.startswith("nlp-gait: interrupted after 0 of 1 runs; ")
-    state = subprocess.run(["ps", "-o", "stat=", "-p", marker.read_text().strip()], capture_output=True, text=True)
-    assert state.stdout.strip()[:1] in ("", "Z")  # a Z has ended, but is not yet reaped
-
-
-@pytest.mark.slow
 def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = ("sweep", "walk12", "--over", "foot_lift_m=0.01,0.02", "--starts", "1", "--out", str(tmp_path))
     with monkeypatch.context() as patch:

@@ -135,7 +135,10 @@ def read_command(number: int) -> str:
 @reads_proc
 @pytest.mark.parametrize(
     ("name", "started"),
-    [("SIGHUP", "loky"), ("SIGKILL", "loky"), ("SIGTERM", "sleep 600"), ("SIGKILL", "sleep 600")],
+    [
+        *(("SIGHUP", "loky"), ("SIGKILL", "loky")),
+        *((name, "sleep 600") for name in ("SIGINT", "SIGTERM", "SIGKILL")),
+    ],
 )
 def test_workers_and_compilers_end_with_what_started_them(name: str, started: str, tmp_path: Path) -> None:
     if started == "loky":
