@@ -8,8 +8,6 @@ from nlp_gait.errors import describe_shortage
 from nlp_gait.interrupts import exit_on_interrupt
 from nlp_gait.processes import hide_working_folder, kill_children
 
-LEAST_BYTES = 2**30  # of address space; a study in one process or a worker takes up to half of it
-
 
 def fix_environment() -> None:
     """Replace values with which libraries fail or print nothing: no width of the terminal, an unknown backend of matplotlib."""
@@ -19,31 +17,11 @@ def fix_environment() -> None:
     os.environ["MPLBACKEND"] = "agg"  # figures are only written to files
 
 
-def check_memory() -> None:
-    """Exit with a sentence if a process may use less than 1 GiB: with too little, BLAS and joblib may wait without end.
-
-    Under any limit BLAS has one thread in each process, because every thread takes address space.
-    """
-    if sys.platform != "linux":
-        return
-    import resource
-
-    most = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if most != resource.RLIM_INFINITY:
-        os.environ["OPENBLAS_NUM_THREADS"] = "1"
-        if most < LEAST_BYTES:
-            sys.exit(
-                f"nlp-gait: there is not enough memory: a process may use {most >> 20} MiB (ulimit -v), and needs "
-                f"{LEAST_BYTES >> 20} MiB; raise the limit"
-            )
-
-
 def main() -> None:
     """Run the command line."""
     exit_on_interrupt()
     hide_working_folder()
     fix_environment()
-    check_memory()
     try:
         gc.disable()  # while modules are imported, every collection would find nothing
         from compare.cli import main as run

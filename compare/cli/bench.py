@@ -10,7 +10,7 @@ from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
-from compare.cli.options import AsJson, Evaluations, Jobs, parse_names
+from compare.cli.options import AsJson, Evaluations, Jobs, Scheduler, Tune, parse_names
 from compare.cli.printing import describe_command, print_result, print_table, show_progress, stdout
 from compare.study.settings import SolverSpec
 from compare.study.task import check_task
@@ -66,9 +66,7 @@ class BenchEffort:
         Path, typer.Option(help="Folder for the page and the records; finished runs in it are reused."), OUTPUT
     ] = Path("bench")
     jobs: Jobs = None
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
-    ] = None
+    scheduler: Scheduler = None
 
 
 @command
@@ -81,16 +79,7 @@ def bench(
     ] = None,
     *,
     chosen: InstanceOptions,
-    tune: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            min=0,
-            max=1000,
-            help="Tune the settings of each search by N trials on training instances first, with "
-            "Optuna, and show NAME-tuned beside NAME.",
-        ),
-    ] = 0,
+    tune: Tune = 0,
     audit: Annotated[
         bool,
         typer.Option(

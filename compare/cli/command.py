@@ -4,7 +4,6 @@ Options of several commands form a group: a frozen dataclass whose fields are an
 command with a parameter of that type has every field as an option, and receives the dataclass.
 """
 
-import codecs
 import errno
 import functools
 import inspect
@@ -12,7 +11,6 @@ import io
 import os
 import select
 import sys
-import unicodedata
 from collections.abc import Callable, Container, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -29,9 +27,9 @@ from nlp_gait.interrupts import raise_interrupts
 
 R = TypeVar("R")
 
-PLAIN = "nlp-gait-plain"  # error handler for characters that an output cannot encode
 # In the annotation of a parameter that names the folder, or the file, that the command writes.
 OUTPUT, OUTPUT_FILE = "output", "output file"
+SESSION = "session"  # of one that decides how and where a study runs, not what it computes
 FORCE = inspect.Parameter(
     "force",
     inspect.Parameter.KEYWORD_ONLY,
@@ -66,8 +64,8 @@ def command(function: Callable[..., R]) -> Callable[..., R]:
             raise typer.Exit(1) from None
 
     options = list(_list_options(function))
-    outputs = {option.name for option in options if _get_marks(option) & {OUTPUT, OUTPUT_FILE}}
-    if any(OUTPUT_FILE in _get_marks(option) for option in options):
+    outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE}}
+    if any(OUTPUT_FILE in get_marks(option) for option in options):
         options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
@@ -95,7 +93,8 @@ def _list_options(function: Callable[..., Any]) -> Iterator[inspect.Parameter]:
             yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
 
 
-def _get_marks(option: inspect.Parameter) -> set[object]:
+def get_marks(option: inspect.Parameter) -> set[object]:
+    """Return the marks in the annotation of an option."""
     return {mark for mark in getattr(option.annotation, "__metadata__", ()) if isinstance(mark, str)}
 
 
@@ -130,7 +129,7 @@ def _is_output_closed() -> bool:
 
 
 def _open_outputs() -> None:
-    """Open the outputs and make them write every character, in ASCII where necessary.
+    """Open the outputs and make them write a question mark for a character that they cannot encode.
 
     A closed standard output is rejected: the next file opened would get its descriptor and the printed text. A closed
     standard error is opened on the null device.
@@ -144,16 +143,6 @@ def _open_outputs() -> None:
         sys.stdout = sys.stderr  # for the interpreter's exit
         say_error("standard output is closed; send it to a file or to /dev/null")
         sys.exit(1)
-    codecs.register_error(PLAIN, _encode_plainly)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors=PLAIN)
-
-
-def _encode_plainly(error: UnicodeError) -> tuple[str, int]:
-    """Return the nearest ASCII characters, such as a space for a narrow one, or else an escape."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    text = error.object[error.start : error.end]
-    near = (unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode() for sign in text)
-    return "".join(found or ascii(sign)[1:-1] for found, sign in zip(near, text, strict=True)), error.end
+            stream.reconfigure(errors="replace")

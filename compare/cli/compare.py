@@ -1,5 +1,6 @@
 """``nlp-gait compare``."""
 
+import inspect
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -12,9 +13,20 @@ from compare.analysis.solver_table import HEADER, describe_unknown, find_failure
 from compare.analysis.tuning import tune_solvers, write_tunings
 from compare.analysis.units import with_unit
 from compare.analysis.verdict import describe_best_known
-from compare.cli.command import OUTPUT, command
+from compare.cli.command import OUTPUT, SESSION, command, get_marks
 from compare.cli.endings import end_if_excluded, end_interrupted, fail, report_interrupts, say_error
-from compare.cli.options import RESULTS, AsJson, Code, Jobs, ProblemOptions, SearchOptions, name_all, parse_names
+from compare.cli.options import (
+    RESULTS,
+    AsJson,
+    Code,
+    Jobs,
+    ProblemOptions,
+    Scheduler,
+    SearchOptions,
+    Tune,
+    name_all,
+    parse_names,
+)
 from compare.cli.printing import (
     describe_command,
     print_result,
@@ -47,8 +59,6 @@ DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
 DEFAULT_ALGORITHMS = "pso,ga,aco"
 MOST_RUNS = 12  # of a problem whose runs are printed one by one
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
-# Options for how and where a study runs; all others decide what it computes and are part of a study file.
-SESSION_OPTIONS = ("config", "out", "resume", "jobs", "scheduler", "code", "engine", "as_csv", "as_json")
 
 
 @command
@@ -71,26 +81,15 @@ def compare(
     ] = 20,
     searches: SearchOptions,
     options: ProblemOptions,
-    tune: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            min=0,
-            max=1000,
-            help="Tune the settings of each search by N trials on training instances first, with "
-            "Optuna, and show NAME-tuned beside NAME.",
-        ),
-    ] = 0,
-    config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead.")] = None,
+    tune: Tune = 0,
+    config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead."), SESSION] = None,
     out: Annotated[
         Path, typer.Option(help="Folder for records, report and figures; finished runs in it are reused."), OUTPUT
     ] = RESULTS,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out."), SESSION] = False,
     jobs: Jobs = None,
     code: Code = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
-    ] = None,
+    scheduler: Scheduler = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
@@ -222,7 +221,7 @@ def print_runs(records: Sequence[RunRecord]) -> None:
             print_table(f"{comparison.problem}: runs", header, rows)
 
 
-# First columns on a narrow terminal, in reading order.
+# Columns that are printed, in reading order; the report has all.
 READ_FIRST = ("solver", "feasible", "median gap", "median", "evaluations", "time per run")
 HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best known, costs."
 
@@ -231,9 +230,8 @@ def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
     """Print the table of solvers for each problem, titled by the problem unless a title is given."""
     for comparison in compare_problems(records):
         cells = [dict(zip(HEADER, format_cells(s, comparison), strict=True)) for s in summarise(comparison)]
-        header = [*READ_FIRST, *(name for name in HEADER if name not in READ_FIRST)]
-        rows = [[row[name] for name in header] for row in cells]
-        print_table(title or f"{comparison.problem}: judged by the exact functions", header, rows)
+        rows = [[row[name] for name in READ_FIRST] for row in cells]
+        print_table(title or f"{comparison.problem}: judged by the exact functions", READ_FIRST, rows)
         failures = find_failures(comparison.records)
         if failures:
             cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
@@ -258,10 +256,11 @@ def choose_solvers(algorithms: str, starts: int, searches: SearchOptions) -> lis
 
 
 def _reject_study_options(context: typer.Context, flag: str) -> None:
+    session = {o.name for o in inspect.signature(compare).parameters.values() if get_marks(o) & {OUTPUT, SESSION}}
     for parameter in context.command.params:
         name = str(parameter.name)
         source = context.get_parameter_source(name)
         given = source is not None and source.name == "COMMANDLINE"
-        if name not in SESSION_OPTIONS and given and context.params.get(name) not in (None, [], ()):
+        if name not in session and given and context.params.get(name) not in (None, [], ()):
             option = parameter.metavar if parameter.param_type_name == "argument" else parameter.opts[0]
             raise InputError(f"{flag} determines what the study computes; omit {option}")

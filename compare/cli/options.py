@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from compare.cli.command import OUTPUT
+from compare.cli.command import OUTPUT, SESSION
 from compare.study.settings import SolverSpec, StudySettings
 from compare.study.task import Handling, ProblemSpec, Stop
 from nlp_gait.errors import InputError, describe_type, unknown
@@ -21,17 +21,33 @@ from nlp_gait.user_code import allow_code, is_reference
 RESULTS = Path("results")
 # Options of several commands.
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
-Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors).")]
+Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors)."), SESSION]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead."),
+    SESSION,
+]
+Tune = Annotated[
+    int,
+    typer.Option(
+        metavar="N",
+        min=0,
+        max=1000,
+        help="Tune the settings of each search by N trials on training instances first, with Optuna, and show "
+        "NAME-tuned beside NAME.",
+    ),
+]
 Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
 OutFolder = Annotated[Path, typer.Option(help="Folder for report, tables, figures, data and stored results."), OUTPUT]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Write all runs and all judged points as CSV files too.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object."), SESSION]
 Code = Annotated[
     list[str] | None,
     typer.Option(
         metavar="FILE.py:NAME",
         help="Your code that the file refers to; it runs only if named here; repeatable.",
     ),
+    SESSION,
 ]
 ProblemName = Annotated[
     str,

@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -20,10 +20,8 @@ from nlp_gait.files import replace_nan
 
 T = TypeVar("T")
 
-STACKED_WIDTH = 60  # of terminals on which tables are stacked: a block of lines per row
-LONGEST_CELL = 24  # characters of a cell on one line
+LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
-GAP = 2  # characters between two columns of a table
 
 
 class PlainConsole(Console):
@@ -68,53 +66,25 @@ def print_json(data: Any) -> None:
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table on stdout, not wider than the terminal; numbers are right-aligned, except in the first column.
 
-    Columns that do not fit follow in another table; narrow terminals get a block of lines per row.
+    A table whose columns do not fit has a block of lines per row.
     """
-    if stdout.width <= STACKED_WIDTH and len(header) > 2:
-        _print_stacked(title, header, rows)
-        return
-    header, rows = [escape_controls(name) for name in header], [[escape_controls(text) for text in row] for row in rows]
-    needs = [_measure_column(name, [row[i] for row in rows]) for i, name in enumerate(header)]
-    groups: list[list[int]] = [[0]]
-    space = stdout.width - needs[0] - 2
-    left = space
-    for i in range(1, len(header)):
-        if needs[i] + GAP > left and len(groups[-1]) > 1:
-            groups.append([0])
-            left = space
-        groups[-1].append(i)
-        left -= needs[i] + GAP
-    for k, group in enumerate(groups):
-        stdout.print(title if k == 0 else f"{title}, continued")
-        table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, GAP - 1, 0, 0))
-        for i in group:
-            need = min(needs[i], space - GAP)
-            justify: Literal["left", "right"] = "right" if i and all(_is_number(row[i]) for row in rows) else "left"
-            flexible = any(len(row[i]) > LONGEST_CELL for row in rows)
-            table.add_column(
-                header[i], justify=justify, overflow="fold", min_width=need, width=None if flexible else need
-            )
-        for row in rows:
-            table.add_row(*(row[i] for i in group))
-        stdout.print(table)
-
-
-def _is_number(text: str) -> bool:
-    return len(text) <= LONGEST_CELL and (not text or text[0] in "+-.0123456789")
-
-
-def _measure_column(name: str, column: Sequence[str]) -> int:
-    """Return the width of a column whose heading and long cells are wrapped at spaces."""
-    words = [name.split(), *([text] if len(text) <= LONGEST_CELL else text.split() for text in column)]
-    return max((len(word) for line in words for word in line), default=1)
-
-
-def _print_stacked(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     stdout.print(title)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for i, name in enumerate(header):
+        texts = [row[i] for row in rows]
+        is_number = i > 0 and all(not text or text[0] in "+-.0123456789" for text in texts)
+        words = (word for text in (name, *texts) for word in text.split())
+        width = min(max((len(word) for word in words), default=1), LONGEST_CELL)
+        table.add_column(name, justify="right" if is_number else "left", overflow="fold", min_width=width)
     for row in rows:
-        stdout.print(f"{header[0]} {row[0]}".strip())
+        table.add_row(*row)
+    if table.__rich_measure__(stdout, stdout.options).minimum <= stdout.width:
+        stdout.print(table)
+        return
+    for row in rows:
+        stdout.print(f"{header[0]} {row[0]}".strip(), soft_wrap=False)
         for name, text in zip(header[1:], row[1:], strict=True):
-            stdout.print(f"  {name}: {text}")
+            stdout.print(f"  {name}: {text}", soft_wrap=False)
 
 
 def print_rows(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> None:

@@ -15,7 +15,7 @@ from compare.analysis.record_statistics import Weighting
 from compare.analysis.solver_table import describe_unknown
 from compare.cli.command import OUTPUT, command
 from compare.cli.endings import end_if_excluded, report_interrupts
-from compare.cli.options import AsCsv, AsJson, Code, name_all, parse_number
+from compare.cli.options import AsCsv, AsJson, Code, Scheduler, name_all, parse_number
 from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
@@ -124,10 +124,7 @@ def reproduce(
         Path | None,
         typer.Option(help="JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Perform the runs on the workers of this Dask scheduler instead."),
-    ] = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 

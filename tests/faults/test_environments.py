@@ -6,7 +6,6 @@ import errno
 import os
 import subprocess
 import sys
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
-from compare.__main__ import check_memory, fix_environment
+from compare.__main__ import fix_environment
 from metaheuristics.errors import SearchError
 from metaheuristics.settings import check_installed
 from nlp_gait.errors import NoWorkersError, WorkerError
@@ -29,17 +28,6 @@ def test_a_terminal_without_a_width_has_the_usual_one(width: str, monkeypatch: p
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     fix_environment()
     assert os.environ.get("COLUMNS") == ("80" if width == "80" else None) and os.environ["MPLBACKEND"] == "agg"
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="memory can be limited on Linux only")
-@pytest.mark.parametrize("mib", [1, 301, 1023, 1024])
-def test_too_little_memory_is_rejected_before_anything_is_imported(mib: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """BLAS and joblib may wait without end for memory."""
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "8")
-    monkeypatch.setattr("resource.getrlimit", lambda kind: (mib * 2**20, 2**40))
-    with nullcontext() if mib == 1024 else pytest.raises(SystemExit, match=f"may use {mib} MiB"):
-        check_memory()
-    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
 
 
 def test_pycma_without_docstrings_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
