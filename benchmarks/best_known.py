@@ -63,7 +63,7 @@ def from_difficulty() -> Iterator[Found]:
 
 
 def from_files() -> Iterator[Found]:
-    """Yield the contributed points, see ``compare.analysis.published``."""
+    """Yield the contributed points, see ``compare.analysis.better_points``."""
     for path in sys.argv[1:]:
         result, found_by = load_result(Path(path)), read_json(Path(path), "result")["found_by"]
         yield Found(result.problem, result.x.tolist(), f"{found_by['solver']}, seed {found_by['seed']}")

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from compare.drawing import STYLE
-from nlp_gait.errors import InputError
-from nlp_gait.files import convert_errors, replace_file, write_text
+from compare.drawing import PAPER_STYLE, STYLE
+from nlp_gait.files import replace_file, write_text
 from nlp_gait.interrupts import delay_interrupts
 
 if TYPE_CHECKING:
@@ -63,41 +62,28 @@ def assign_looks(names: Collection[str]) -> dict[str, Look]:
     return {name: found[name] for name in names}
 
 
-# Style files that ``use_style`` uses after the project's own one.
-_FURTHER: ContextVar[tuple[Path, ...]] = ContextVar("further styles", default=())
+_PRINTED: ContextVar[bool] = ContextVar("figures for a printed column", default=False)
 
 
 @contextmanager
 def use_style() -> Iterator[None]:
-    """Use the project's matplotlib style, and those of ``add_styles``, within the context."""
+    """Use the project's matplotlib style within the context, and that of printed columns within ``use_paper_style``."""
     import matplotlib
 
     with matplotlib.rc_context(fname=STYLE):
-        for file in _FURTHER.get():
-            matplotlib.rcParams.update(matplotlib.rc_params_from_file(file, use_default_template=False))
+        if _PRINTED.get():
+            matplotlib.rcParams.update(matplotlib.rc_params_from_file(PAPER_STYLE, use_default_template=False))
         yield
 
 
 @contextmanager
-def add_styles(*files: Path) -> Iterator[None]:
-    """Draw within the context with further style files; the last one wins."""
-    token = _FURTHER.set(files)
+def use_paper_style() -> Iterator[None]:
+    """Draw figures for a printed column within the context."""
+    token = _PRINTED.set(True)
     try:
         yield
     finally:
-        _FURTHER.reset(token)
-
-
-def check_style(file: Path) -> None:
-    """Raise InputError if a style file cannot be read or contains what Matplotlib does not know."""
-    import matplotlib
-
-    with convert_errors(f"style file {str(file)!r}", InputError):
-        lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.partition("#")[0].strip()]
-        for key in (line.partition(":")[0].strip() for line in lines):
-            if key not in matplotlib.rcParams:
-                raise ValueError(f"{key!r} is no setting of Matplotlib")
-        matplotlib.rc_params_from_file(file, fail_on_error=True, use_default_template=False)
+        _PRINTED.reset(token)
 
 
 def make_figure(width_in: float | None = 6.3, height_in: float = 3.0) -> Figure:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 
 from compare.analysis.comparison import Comparison
-from compare.analysis.published import make_published_rows
 from compare.analysis.record_statistics import TARGETS
 from compare.analysis.simulated_gaits import GAIT_HEADER, describe_drive, make_engine_rows, measure_agreement
 from compare.analysis.solver_table import HEADER, SolverSummary, count, describe_unknown, format_cells, summarise
@@ -63,7 +62,6 @@ def make_problem_section(comparison: Comparison, simulated: Sequence[SimulatedGa
         for name, (plot, caption, _) in FIGURES.items()
     ]
     gaits = make_gaits_part(comparison)
-    published = make_published_rows(comparison)
     return Section(
         title=f"{comparison.problem}: {make_heading(objective.name, objective.unit)}, to {objective.sense}",
         parts=(
@@ -77,7 +75,6 @@ def make_problem_section(comparison: Comparison, simulated: Sequence[SimulatedGa
             *make_engine_section(simulated),
             *_make_tests(comparison),
             *_list_active(comparison),
-            *(() if published is None else make_table_section("The paper's values and ours", *published)),
             *_list_failures(comparison),
             *_list_violated_between(comparison),
         ),
@@ -118,23 +115,7 @@ def _make_costs(comparison: Comparison, summaries: list[SolverSummary]) -> Secti
         f"Uncertainty of the median [{unit}] (feasible runs, bootstrap), and times; build and compile are "
         "the longest, needed once per process",
     )
-    calls = make_text_table(
-        ("solver", "f", "g", "gradient", "Jacobian", "Hessian", "failed"),
-        [(solver.name, *_average_calls(solver.records)) for solver in comparison.solvers],
-        "Mean calls per run",
-    )
-    return Section(title="Costs", parts=(*describe_unknown(comparison), runtime, times, calls))
-
-
-def _average_calls(records: tuple[RunRecord, ...]) -> list[str]:
-    if not all(r.evaluations for r in records):
-        return ["-"] * 6
-    means = [
-        sum(r.evaluations.get(kind, 0) for r in records) / len(records)
-        for kind in ("f", "g", "gradient", "jacobian", "hessian")
-    ]
-    failed = sum(r.failed_evaluations for r in records) / len(records)
-    return [f"{value:.1f}" if value % 1 else f"{value:.0f}" for value in (*means, failed)]
+    return Section(title="Costs", parts=(*describe_unknown(comparison), runtime, times))
 
 
 def _make_tests(comparison: Comparison) -> tuple[Section, ...]:

@@ -11,8 +11,7 @@ from compare.analysis.record_statistics import TARGETS
 from compare.analysis.solver_table import summarise
 from compare.analysis.units import join_words, make_heading, with_unit
 from compare.analysis.verdict import SIGNIFICANT, compare_pairs, find_leaders
-from compare.drawing import PAPER_STYLE
-from compare.drawing.figures import add_styles, check_style, save_pdf
+from compare.drawing.figures import save_pdf, use_paper_style
 from compare.report.problem_section import FIGURES
 from compare.study.record import HEADER, JUDGED, make_judged_cells, make_row
 from nlp_gait.files import format_csv, make_file_name, replace_nan, write_text
@@ -31,17 +30,9 @@ class FurtherFiles:
     csv: bool = False  #: all runs, and the points of each problem; written again, too, where they exist already
     latex: bool = False  #: a table of each problem
     pdf: bool = False  #: figures of each problem one column wide, and their captions in LaTeX
-    style: Path | None = None  #: matplotlib style file of the PDF figures, on top of ``paper.mplstyle``
 
     def write(self, folder: Path, comparisons: Sequence[Comparison]) -> list[Path]:
-        """Write the files and return their paths.
-
-        Raises:
-            InputError: Matplotlib cannot read the style file.
-            OutputError: a file cannot be written.
-        """
-        if self.style is not None:
-            check_style(self.style)
+        """Write the files and return their paths; raises OutputError."""
         written = []
         if self.csv or (folder / "runs.csv").exists():
             tables = {"runs": make_runs_table(comparisons), **_make_point_tables(comparisons)}
@@ -52,7 +43,7 @@ class FurtherFiles:
             if self.latex:
                 written.append(write_text(stem.with_name(f"{stem.name}-table.tex"), format_latex_table(comparison)))
             if self.pdf:
-                written += _write_figures(stem, comparison, self.style)
+                written += _write_figures(stem, comparison)
         return written
 
 
@@ -89,10 +80,10 @@ def _make_point_tables(comparisons: Sequence[Comparison]) -> dict[str, TableRows
     return tables
 
 
-def _write_figures(stem: Path, comparison: Comparison, style: Path | None) -> list[Path]:
+def _write_figures(stem: Path, comparison: Comparison) -> list[Path]:
     """Write ``<problem>-<figure>.pdf`` for each figure, and ``<problem>-figures.tex`` with their captions."""
     written, text = [], ""
-    with add_styles(PAPER_STYLE, *(() if style is None else (style,))):
+    with use_paper_style():
         for name, (plot, _, words) in FIGURES.items():
             figure = f"{stem.name}-{name}"
             written.append(save_pdf(plot(comparison, column=True), stem.with_name(f"{figure}.pdf")))

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args, get_origin, get_type_hints
 
-from compare.analysis.published import load_published
 from compare.analysis.units import with_unit
 from compare.drawing.gait_figure import plot_gait
 from docs.difficulty import Best, Difficulty, Reached, difficulties
@@ -121,7 +120,6 @@ def problem_page(problem: GaitProblem, found: Difficulty | None, folder: Path) -
         _difficulty(problem, found),
         "## Source",
         literal(_source(problem)),
-        _published(problem),
         _use(problem),
     )
 
@@ -298,11 +296,6 @@ def _source(problem: GaitProblem) -> str:
     if text is None:
         raise ValueError(f"the docstring of the maker of {problem.name!r} has no section 'Source:'")
     return " ".join(text[1].split())
-
-
-def _published(problem: GaitProblem) -> str:
-    entry = load_published().get(problem.name)
-    return "" if entry is None else literal(entry["note"])
 
 
 def _use(problem: GaitProblem) -> str:

@@ -11,8 +11,8 @@ import pytest
 import nlp_gait
 from compare.analysis import comparison as comparisons
 from compare.analysis.best_known import describe_value
+from compare.analysis.better_points import write_better_points
 from compare.analysis.comparison import Comparison, compare_problems
-from compare.analysis.published import write_better_points
 from compare.analysis.record_statistics import find_best_known
 from compare.analysis.verdict import describe_best_known, describe_better, write_verdict
 from compare.study.record import RunRecord

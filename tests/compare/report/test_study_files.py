@@ -17,7 +17,6 @@ from compare.report.study_files import format_latex_table
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, run_study
 from compare.study.task import ProblemSpec, Stop, Task
-from nlp_gait.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -68,26 +67,13 @@ def test_runs_csv_is_written_again_where_it_exists(records: list[RunRecord], tmp
     assert (tmp_path / "runs.csv").read_text().startswith("problem,solver,run,")
 
 
-@pytest.mark.parametrize(
-    ("style", "message"), [("figur.figsize: 3, 2", "'figur.figsize' is no setting"), ("font.size: big", "font.size")]
-)
-def test_a_wrong_style_file_is_refused(style: str, message: str, tmp_path: Path) -> None:
-    file = tmp_path / "my.mplstyle"
-    file.write_text(style)
-    with pytest.raises(InputError, match=message):
-        FurtherFiles(pdf=True, style=file).write(tmp_path, [])
-
-
 @pytest.mark.slow
 def test_figures_are_one_column_wide_with_embedded_fonts(records: list[RunRecord], tmp_path: Path) -> None:
-    style = tmp_path / "my.mplstyle"
-    style.write_text("figure.figsize: 3.0, 2.0  # a narrow column\n")
-    for further, width in ((FurtherFiles(pdf=True), 244.8), (FurtherFiles(pdf=True, style=style), 216.0)):
-        *figures, captions = further.write(tmp_path, compare_problems(records))
-        for figure in figures:
-            content = figure.read_bytes()
-            box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", content)
-            assert box and float(box[1]) == pytest.approx(width) and b"/FontFile2" in content
+    *figures, captions = FurtherFiles(pdf=True).write(tmp_path, compare_problems(records))
+    for figure in figures:
+        content = figure.read_bytes()
+        box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", content)
+        assert box and float(box[1]) == pytest.approx(244.8) and b"/FontFile2" in content
     assert "n = 6 runs of each solver, at most 1,000 evaluations" in captions.read_text()
 
 
