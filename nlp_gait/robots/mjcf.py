@@ -4,9 +4,6 @@ import json
 import logging
 import math
 import os
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import lru_cache, partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -25,7 +22,6 @@ from nlp_gait.robots.tree import Array, Mass, combine_masses
 LOG = logging.getLogger("nlp_gait")
 UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits
 IGNORED = {"armature": "kg m^2", "damping": "Nm s/rad", "frictionloss": "Nm"}  # of a joint
-_READING = threading.Lock()  # MuJoCo has one warning handler for all threads
 
 
 def read_mjcf(path: str) -> dict[str, Any]:
@@ -117,8 +113,7 @@ def _read(place: str, path: str) -> Any:
     for file in files:
         protect_input(Path(file))
     try:
-        with log_warnings(mujoco, path):
-            model = mujoco.MjModel.from_binary_path("robot.mjb", {"robot.mjb": data})
+        model = mujoco.MjModel.from_binary_path("robot.mjb", {"robot.mjb": data})
         for name in ("body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_range", "qpos0"):
             if not are_plausible(getattr(model, name)):
                 raise ValueError(f"{name} must hold finite numbers within {LARGEST_NUMBER:g}")
@@ -130,6 +125,7 @@ def _read(place: str, path: str) -> Any:
 def _compile_binary(mujoco: Any, path: str) -> bytes:
     """Return MuJoCo's warnings and the files read as a line of JSON, and the model in binary form; for a child process."""
     warnings: list[str] = []
+    earlier = mujoco.get_mju_user_warning()  # restored where this is no child process
     mujoco.set_mju_user_warning(warnings.append)
     try:
         model = mujoco.MjModel.from_xml_path(path)
@@ -142,6 +138,8 @@ def _compile_binary(mujoco: Any, path: str) -> bytes:
         if "unknown exception" in str(error):  # of C++: no memory
             raise MemoryError from error
         raise _convert(path, error) from error
+    finally:
+        mujoco.set_mju_user_warning(earlier)
     return json.dumps([warnings, files]).encode() + b"\n" + data.tobytes()
 
 
@@ -149,18 +147,6 @@ def _convert(path: str, error: Exception) -> RobotDataError:
     reason = " ".join(str(error).split())[:300] or type(error).__name__
     remedy = "; meshes must be where the file names them (its meshdir)" if "opening file" in reason else ""
     return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
-
-
-@contextmanager
-def log_warnings(mujoco: Any, path: str) -> Iterator[None]:
-    """Write MuJoCo's warnings to this package's log instead of a file in the user's folder; restore its handler at the end."""
-    with _READING:
-        earlier = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(lambda text: LOG.warning("robot file %r: %s", path, text))
-        try:
-            yield
-        finally:
-            mujoco.set_mju_user_warning(earlier)
 
 
 def _find_tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.robots.robot import Foot, Link, Robot
+from nlp_gait.robots.robot import Foot, Robot
 
 MARK = "@"
 MASS = "mass"
@@ -82,12 +82,12 @@ def _change(robot: Robot, name: str, value: float) -> Robot:
     changed = [link for link in robot.links if name in (MASS, f"{link}.{MASS}")]
     if not changed:
         raise unknown(f"quantity of robot {robot.name}", name, list_quantities(robot))
-    return replace(robot, links={**robot.links, **{link: _scale_mass(robot.links[link], value) for link in changed}})
-
-
-def _scale_mass(link: Link, factor: float) -> Link:
-    ixx, iyy, izz, ixy, ixz, iyz = (factor * value for value in link.inertia_com_kgm2)
-    return replace(link, mass_kg=factor * link.mass_kg, inertia_com_kgm2=(ixx, iyy, izz, ixy, ixz, iyz))
+    links = dict(robot.links)
+    for link in changed:
+        ixx, iyy, izz, ixy, ixz, iyz = (value * moment for moment in links[link].inertia_com_kgm2)
+        moments = ixx, iyy, izz, ixy, ixz, iyz
+        links[link] = replace(links[link], mass_kg=value * links[link].mass_kg, inertia_com_kgm2=moments)
+    return replace(robot, links=links)
 
 
 def _with_length(robot: Robot, above_foot: int, metres: float) -> Robot:

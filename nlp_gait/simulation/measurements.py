@@ -243,7 +243,8 @@ class Walk:
 def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -> Walk:
     """Compute the numbers of a simulated walk."""
     measurements = measure(plan, simulation, drive)
-    planned, (walked, drift) = measure_planned_distance(plan), measure_walked_distance(simulation, plan_way(plan))
+    way = _find_planned_way(plan)
+    planned, (walked, drift) = math.hypot(*way), _measure_walked_distance(simulation, way)
     energy = measurements.measured.total_W * plan.duration_s
     fell = simulation.fell_at_s
     return Walk(
@@ -262,19 +263,14 @@ def measure_walk(plan: Plan, simulation: Simulation, drive: Drive, steps: int) -
     )
 
 
-def measure_planned_distance(plan: Plan) -> float:
-    """Return the planned distance of the point halfway between the feet, from its start straight to its end [m]."""
-    return math.hypot(*plan_way(plan))
-
-
-def plan_way(plan: Plan) -> tuple[float, float]:
+def _find_planned_way(plan: Plan) -> tuple[float, float]:
     """Return the planned way (x, y) of the point halfway between the feet [m]; zero if it is shorter than a micrometre."""
     feet = plan.signals.arrays["left_foot"] + plan.signals.arrays["right_foot"]
     x, y = ((feet[-1] - feet[0])[:2] / 2).tolist()
     return (x, y) if math.hypot(x, y) > ON_GROUND else (0.0, 0.0)
 
 
-def measure_walked_distance(simulation: Simulation, way: tuple[float, float] = (1.0, 0.0)) -> tuple[float, float]:
+def _measure_walked_distance(simulation: Simulation, way: tuple[float, float]) -> tuple[float, float]:
     """Return the distances of the point halfway between the feet along a way (x, y) and to its left, from start to rest [m]."""
     middle = simulation.feet.mean(axis=1)
     x, y = (middle[-1] - middle[0])[:2].tolist()

@@ -2,11 +2,11 @@
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from nlp_gait.simulation.measurements import average_pressure
 from nlp_gait.simulation.mjcf import TIME_STEP, find_sides, make_plan_shapes
 from nlp_gait.simulation.plan import SIDES, Plan
 from nlp_gait.simulation.shapes import Capsule
-from nlp_gait.simulation.simulate import LEAST_LOAD, OnStep, Simulation
+from nlp_gait.simulation.simulate import LEAST_LOAD, Simulation
 from nlp_gait.simulation.video import Frame
 
 FRAMES_PER_S = 25.0
@@ -28,13 +28,6 @@ PRESSURE_WINDOW_S = 0.02  # over which the centre of pressure is averaged
 ROUNDING = 1e-9  # [s]
 AZIMUTH, ELEVATION = 125.0, -12.0  # of the camera [degrees]
 SEEN = 1.5  # height that the camera shows, in heights of the robot
-
-
-class Simulator(Protocol):
-    """Function that simulates one gait."""
-
-    def __call__(self, *, on_step: OnStep | None = None) -> Simulation:
-        """Simulate it; call ``on_step`` before every step."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,8 +41,8 @@ class Recording:
     states: Array  #: (F, Q) coordinates
 
 
-def record_states(plan: Plan, simulate: Simulator) -> Recording:
-    """Simulate a gait and record its states, ``FRAMES_PER_S`` of them for each simulated second."""
+def record_states(plan: Plan, simulate: Callable[..., Simulation]) -> Recording:
+    """Record ``FRAMES_PER_S`` states for each second of a simulation; ``simulate`` has the argument ``on_step``."""
     models: list[Any] = []
     states: list[Array] = []
     steps: list[int] = []
