@@ -314,11 +314,6 @@ def make_temporary_folder(prefix: str, error: type[GaitError] = OutputError) -> 
         yield Path(name)
 
 
-def check_output_name(path: Path) -> None:
-    """Check that records and messages can contain an output path; raises OutputError if it is not valid UTF-8."""
-    check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
-
-
 def check_path(path: str, owner: str, error: type[GaitError]) -> None:
     """Check that records can contain a path; raises ``error``, with ``owner`` in front, if it is not valid UTF-8."""
     if any("\ud800" <= sign <= "\udfff" for sign in path):
@@ -327,7 +322,7 @@ def check_path(path: str, owner: str, error: type[GaitError]) -> None:
 
 def make_writable_folder(path: Path) -> Path:
     """Make a folder and check, before the work, that files can be written there; raises OutputError."""
-    check_output_name(path)
+    check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
     with convert_errors(f"cannot write to {str(path)!r}", OutputError, "choose another folder with --out"):
         make_folder(path)
         tempfile.TemporaryFile(dir=path).close()

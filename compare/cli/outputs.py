@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from nlp_gait.errors import InputError, OutputError
-from nlp_gait.files import check_output, check_output_name, is_forced, make_writable_folder
+from nlp_gait.files import check_output, check_path, is_forced, make_writable_folder
 
 # What is in the first or last bytes of a file that a command wrote, by suffix.
 OWN_CONTENT = {
@@ -24,7 +24,7 @@ EXAMINED = 4096  # bytes at each end
 
 def check_output_file(path: Path) -> Path:
     """Check before the work that a file can be written and, if it exists, replaced; return its path; raises OutputError."""
-    check_output_name(path)
+    check_path(str(path), f"cannot write to {str(path)!r}", OutputError)
     check_output(path)
     make_writable_folder(path.parent)
     try:

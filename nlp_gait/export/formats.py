@@ -9,8 +9,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.set_points import COUPLED, make_set_points, to_naoqi
-from nlp_gait.export.webots import write_motion
+from nlp_gait.export.set_points import COUPLED, format_motion, make_set_points, to_naoqi
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
 from nlp_gait.formulation import Result, Signals, sample_signals
 from nlp_gait.formulation.result import SCHEMA, sample_at_period
@@ -41,7 +40,7 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     if name in ("webots", "naoqi", "ros"):
         _check_motors(result)
     if name == "webots":
-        write_motion(path, make_set_points(result, period_ms))
+        write_text(path, format_motion(make_set_points(result, period_ms)))
     elif name == "naoqi":
         points = make_set_points(result, period_ms)
         if not set(COUPLED) <= set(points.joints):

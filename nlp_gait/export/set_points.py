@@ -1,4 +1,4 @@
-"""Set-points of joint angles for a robot or a simulator, and the arguments of NAOqi."""
+"""Set-points of joint angles for a robot or a simulator: `.motion` files of Webots, and the arguments of NAOqi."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +11,7 @@ from nlp_gait.formulation.result import count_periods
 
 PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
 APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
+LONGEST_LINE = 4095  # characters with the line's end: size of the buffer of Webots' parser
 COUPLED = ("RHipYawPitch",)  # both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name
 
 
@@ -46,3 +47,25 @@ def to_naoqi(points: SetPoints) -> dict[str, Any]:
     times = [round(APPROACH_S + time / 1000.0, 3) for time in points.times_ms]
     keys = [points.angles[:, points.joints.index(name)].tolist() for name in names]
     return {"names": names, "keys": keys, "times": [times for _ in names], "isAbsolute": True}
+
+
+def format_motion(points: SetPoints) -> str:
+    """Return the content of a `.motion` file of Webots; raises InputError if it cannot express the joints' names or number.
+
+    The grammar is that of Webots' own parser (`src/controller/c/motion.c`): a header with the motors; then rows
+    ``MM:SS:mmm,<pose name>,<radians>,...``, between which it interpolates linearly.
+    """
+    lines = [",".join(("#WEBOTS_MOTION", "V1.0", *points.joints))]
+    if lines[0].count(",") != len(points.joints) + 1:
+        raise InputError("joints of a .motion file must have names without commas; rename them in the robot's file")
+    for number, (time, row) in enumerate(zip(points.times_ms, points.angles.tolist(), strict=True), start=1):
+        seconds, milliseconds = divmod(time, 1000)
+        values = ",".join(f"{value:.9f}" for value in row)
+        lines.append(f"{seconds // 60:02d}:{seconds % 60:02d}:{milliseconds:03d},Pose{number},{values}")
+    longest = max(map(len, lines))
+    if longest >= LONGEST_LINE:
+        raise InputError(
+            f"a line of the .motion file has {longest} characters for {len(points.joints)} joints; Webots' parser needs fewer "
+            f"than {LONGEST_LINE}: export as csv"
+        )
+    return "\n".join(lines) + "\n"
