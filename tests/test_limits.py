@@ -16,7 +16,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.errors import GaitError
-from nlp_gait.formulation import GaitProblem
+from nlp_gait.formulation import GaitProblem, Grid
 from nlp_gait.formulation.result import load_result
 from nlp_gait.limits import FootClearance, FrictionCone, Limit, Point, Samples
 from nlp_gait.proofs.guarantee import guarantee
@@ -76,7 +76,7 @@ def test_every_limit_has_rows_in_every_kind_of_phase(problems: Callable[[str], G
 
 def evaluate_rows(limit: Limit, **samples: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return values (m,) of a limit's rows and its indexes on samples by hand."""
-    found = Samples(joints=(), moving=(), per_interval=1, duration=MX(1.0), **samples)
+    found = Samples(joints=(), moving=(), duration=MX(1.0), grid=Grid(intervals=4), **samples)
     names = [parameter.name for parameter in limit.parameters]
     at = Point.of(MX(0, 1), MX(DM([parameter.default for parameter in limit.parameters])), (), names)
     rows, indexes = limit.add(at, found, Exact())
@@ -164,7 +164,6 @@ def test_values_and_options_are_kept_and_problems_can_be_pickled() -> None:
 
 
 def test_a_recorded_motion_has_the_rows_too() -> None:
-    from nlp_gait.formulation import Grid
     from nlp_gait.gaits.biped.body import Support
     from nlp_gait.gaits.biped.recorded_cycle import make_recorded_phase_problem
     from nlp_gait.gaits.biped.recorded_motion import RecordedMotion

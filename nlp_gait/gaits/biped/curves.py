@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Grid, InstantPoint, Start, Variable
-from nlp_gait.formulation.assembly import make_variables
+from nlp_gait.formulation.assembly import Quadrature, make_variables
 from nlp_gait.symbolic.trajectories import Motion, add_motions, count_coefficients, cubic, spline, stack
 
 Trajectory = Literal["cubic", "quintic", "spline-2", "spline-4", "spline-8", "spline-16"]
@@ -102,8 +102,20 @@ def move_hip(
     return add_motions(stack(*paper), stack(*(more[curve] for curve in HIP_CURVES)))
 
 
-def make_grid(trajectory: str, intervals: int, samples_per_interval: int, *, planned_loads: bool = False) -> Grid:
+def make_grid(
+    trajectory: str,
+    intervals: int,
+    samples_per_interval: int,
+    *,
+    planned_loads: bool = False,
+    rule: Quadrature = "trapezoid",
+) -> Grid:
     """Return the samples of a phase; 0 in an interval stands for as many as suit the trajectory and the loads."""
     if samples_per_interval == 0 and not isinstance(samples_per_interval, bool):
         samples_per_interval = SPLINE_SAMPLES if planned_loads or trajectory != "cubic" else SAMPLES
-    return Grid(intervals=intervals, samples_per_interval=samples_per_interval, refined_by="samples_per_interval")
+    return Grid(
+        intervals=intervals,
+        samples_per_interval=samples_per_interval,
+        refined_by="samples_per_interval",
+        rule=rule,
+    )

@@ -8,7 +8,7 @@ import casadi as ca
 from casadi import MX
 
 from nlp_gait.formulation import Objective, Parameter, Point
-from nlp_gait.gaits.biped.samples import Samples, average_over_time
+from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 POWER = Objective(name="power", unit="W")
@@ -21,9 +21,9 @@ PowerModel: TypeAlias = Callable[[Point, Samples, Nonsmooth], MX]
 
 
 def compute_paper_power(at: Point, samples: Samples, ops: Nonsmooth) -> MX:
-    """Compute the mean electrical power by the trapezoidal rule [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
+    """Compute the mean electrical power over time [W]: braking costs like driving, one K (eq. 32; (P.1), (P.2))."""
     mechanical = ca.reshape(ops.abs(ca.vec(samples.power)), *samples.power.shape)
-    return average_over_time(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
+    return samples.average(ca.sum1(mechanical) + at[HEAT_LOSS.name] * ca.sum1(samples.torque**2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +57,7 @@ INSTEAD = {
     ),
     "torque": Goal(
         objective=Objective(name="squared_torque", unit="(Nm)^2"),
-        figure=lambda samples: average_over_time(ca.sum1(samples.torque**2)),
+        figure=lambda samples: samples.average(ca.sum1(samples.torque**2)),
     ),
     "torque-smoothness": Goal(
         objective=Objective(name="torque_rate", unit="(Nm/s)^2"),

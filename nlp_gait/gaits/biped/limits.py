@@ -136,7 +136,7 @@ class TorqueChange(Limit):
         )
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        step = samples.per_interval
+        step = samples.grid.samples_per_interval
         change = samples.torque[:, step:] - samples.torque[:, :-step]
         limit = at["torque_change_limit_Nm"]
         names = make_labels(samples.joints, range(change.shape[1]))
@@ -178,7 +178,7 @@ class BalanceMargins(Limit):
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n = samples.steps + 1
         margins = dict(zip("xy", self._margins(samples.zmp, at, ops), strict=True))
-        means = {axis: ca.sum2(margin) / n for axis, margin in margins.items()}
+        means = {axis: samples.average_margins(margin) for axis, margin in margins.items()}
         names = [str(k) for k in range(n)]
         each = [
             make_rows(f"dbm_{axis}", "m", margin.T, at[f"dbm_{axis}_min_limit_m"], labels=names, over="instant")

@@ -25,7 +25,7 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.formulation import Parameter, Point
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, PowerModel
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
-from nlp_gait.gaits.biped.samples import Samples, average_over_time
+from nlp_gait.gaits.biped.samples import Samples
 from nlp_gait.robots import Robot
 from nlp_gait.robots.robot import Motor
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
@@ -110,7 +110,7 @@ class Motors:
             heat = constants.T @ self.sum_by_motor(samples.torque) ** 2
         else:
             heat = at[HEAT_LOSS.name] * ca.sum1(samples.torque**2)
-        return average_over_time(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
+        return samples.average(ca.sum1(ca.reshape(mechanical, *samples.power.shape)) + heat)
 
     @cached_property
     def _ratings(self) -> tuple[Motor, ...]:
@@ -168,6 +168,6 @@ class MotorLimits(Limit):
             for kind, turned in (("forwards", loads + drop), ("backwards", loads - drop))
         ]
         continuous = MX(DM([rating.continuous_torque_Nm for rating in ratings]))
-        rms = ca.sqrt(average_over_time(loads**2))
+        rms = ca.sqrt(samples.average(loads**2))
         too_hot = make_rows("continuous_torque", "Nm", rms, None, continuous, names, "root-mean-square")
         return (too_fast, *too_weak, too_hot), {}

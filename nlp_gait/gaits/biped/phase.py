@@ -135,7 +135,7 @@ class Phase:
                 joints=self.body.joints,
                 moving=self.moving,
                 standing=self.standing,
-                per_interval=self.grid.samples_per_interval if phases is None else 1,
+                grid=self.grid if phases is None else Grid(intervals=int(phases.shape[1]) - 1),
                 duration=at[self.duration],
                 progress=self.grid.progress if phases is None else phases,
                 values={name: part[k] for name, part in zip((*names, *traces), split, strict=True)},
@@ -163,12 +163,11 @@ class Phase:
             joints=self.body.joints,
             moving=self.moving,
             standing=self.standing,
-            per_interval=self.grid.samples_per_interval,
+            grid=self.grid,
             duration=at[self.duration],
             progress=self.grid.progress,
             rows=self.count_rows,
             trace_rows=self._count_trace_rows,
-            count=self.grid.parts + 1,
         )
         for limit in self.every_limit:
             limit.add(at, symbols, Exact())

@@ -63,7 +63,7 @@ class RecordedPhase(Phase):
             joints=self.body.joints,
             moving=self.moving,
             standing=self.standing,
-            per_interval=self.grid.samples_per_interval,
+            grid=self.grid,
             duration=at[self.duration],
             progress=self.grid.progress,
             values={

@@ -5,11 +5,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
 import casadi as ca
-import numpy as np
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import unknown
-from nlp_gait.formulation import InstantPoint
+from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -49,7 +48,7 @@ class Samples:
     joints: tuple[str, ...]  # rows of torque
     moving: tuple[str, ...]  # rows of power and of the motion
     standing: tuple[str, ...]  # sides of the feet on the ground, ``"L"`` and ``"R"``
-    per_interval: int  # samples in each interval over which changes are limited
+    grid: Grid  # of the N + 1 samples
     duration: MX  # of the phase [s]
     progress: MX  # (1, N + 1) shares of the phase's time, from 0 to 1
     values: Mapping[str, MX]  # (k, N + 1) by name of the quantity
@@ -68,6 +67,14 @@ class Samples:
     def steps(self) -> int:
         """N, one less than the number of samples."""
         return int(self.torque.shape[1]) - 1
+
+    def average(self, values: MX) -> MX:
+        """Compute the means of rows (m, N + 1) over time by the grid's rule."""
+        return values @ DM(self.grid.weights)
+
+    def average_margins(self, values: MX) -> MX:
+        """Compute the mean of balance margins (1, N + 1), by default over samples, all alike, as the paper does."""
+        return ca.sum2(values) / (self.steps + 1) if self.grid.rule == "trapezoid" else self.average(values)
 
     @property
     def step_s(self) -> MX:
@@ -135,7 +142,6 @@ class Placeholders(Samples):
 
     rows: Callable[[str], int]  # number of rows of a quantity by name; raises UnknownNameError
     trace_rows: Callable[[Trace], int]
-    count: int  # N + 1
     names: list[str] = field(default_factory=list)  # quantities that were read
     traces: dict[str, Trace] = field(default_factory=dict)
     values: Mapping[str, MX] = field(default_factory=dict)
@@ -144,17 +150,9 @@ class Placeholders(Samples):
         """Return symbols, and record the name."""
         if name not in self.names:
             self.names.append(name)
-        return MX.sym(name, self.rows(name), self.count)
+        return MX.sym(name, self.rows(name), self.grid.parts + 1)
 
     def trace(self, name: str, column: Trace) -> MX:
         """Return symbols, and record the definition."""
         self.traces[name] = column
-        return MX.sym(name, self.trace_rows(column), self.count)
-
-
-def average_over_time(values: MX) -> MX:
-    """Compute the means of rows (m, N + 1) over equidistant samples by the trapezoidal rule."""
-    n = values.shape[1]
-    weights = np.full(n, 1.0 / (n - 1))
-    weights[[0, -1]] /= 2
-    return values @ DM(weights)
+        return MX.sym(name, self.trace_rows(column), self.grid.parts + 1)

@@ -16,6 +16,7 @@ Options that the problems share:
     drive_limits           whether torques and speeds must be within the limits of the robot's file
     trajectory             of hip, swing foot and torso: cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory
+    rule                   of means over time: trapezoid, with the mean margins over samples; or simpson
     objective              what is minimised: power, joint jerk, or the rate of torques; of a cycle energy per metre, or power
     motors                 features of the real motors, see ``gaits.biped.motors``, if the file has their data
     torso_share            in double support: lever shares the torso's mass by the lever rule, free plans the ground's wrench

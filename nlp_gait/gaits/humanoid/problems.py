@@ -5,6 +5,7 @@ from typing import Literal
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.formulation.added_limits import AddedLimits
+from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.curves import Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
@@ -28,6 +29,7 @@ def humanoid_ssp(
     intervals: int = 10,
     step_length_m: float = 0.0,
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     drive_limits: bool = True,
@@ -41,7 +43,7 @@ def humanoid_ssp(
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     step_m = body.check_step_length(step_length_m)
-    grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
+    grid, goal = make_grid(trajectory, intervals, samples_per_interval, rule=rule), make_goal(body, objective)
     phase = make_support_phase(body, Support.SINGLE, step_m, trajectory, grid, goal)
     return make_phase_problem(Support.SINGLE, SINGLE_SUPPORT, phase)
 
@@ -54,6 +56,7 @@ def humanoid_dsp(
     torso_share: Share = "lever",
     step_length_m: float = 0.0,
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     drive_limits: bool = True,
@@ -68,7 +71,7 @@ def humanoid_dsp(
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     step_m = body.check_step_length(step_length_m)
-    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
+    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free", rule=rule)
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
     phase = make_support_phase(body, Support.DOUBLE, step_m, trajectory, grid, goal, sharing)
     return make_phase_problem(Support.DOUBLE, DOUBLE_SUPPORT, phase)
@@ -82,6 +85,7 @@ def humanoid_cycle(
     intervals: int = 10,
     torso_share: Share = "lever",
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     drive_limits: bool = True,
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
@@ -97,7 +101,7 @@ def humanoid_cycle(
         cycle are this package's own.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
-    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free", rule=rule)
     return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
 
 
@@ -108,6 +112,7 @@ def humanoid_walk(
     steps: int = 10,
     intervals: int = 10,
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     slope_deg: float = 0.0,
     stair_rise_m: float = 0.0,
     stair_run_m: float = 0.0,
@@ -128,7 +133,7 @@ def humanoid_walk(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits).tilt_ground(slope_deg)
-    grid = make_grid("cubic", intervals, samples_per_interval)
+    grid = make_grid("cubic", intervals, samples_per_interval, rule=rule)
     if footholds:
         if slope_deg or stair_rise_m or stair_run_m:
             raise InputError("footholds are on a level floor; leave out slope_deg and the sizes of stairs")

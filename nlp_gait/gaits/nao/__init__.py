@@ -16,6 +16,7 @@ Options that the problems share:
     trajectory             of hip, swing foot and arms, or of every free joint: the paper's cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with
                            cubics, 4 with splines and with planned loads, which would otherwise bend between the samples
+    rule                   of means over time: trapezoid, with the mean margins over samples, as in the paper; or simpson
     objective              what is minimised: power as in the paper, joint jerk, or the rate of torques
     arms                   carried by the legs, or separate: in the torques the legs carry a torso without arms, and each arm
                            moves on a torso at rest, the ZMP is that of all links; shared: likewise, but in double

@@ -133,7 +133,7 @@ class FreePhase(Phase):
             joints=JOINTS,
             moving=MOVING,
             standing=self.standing,
-            per_interval=self.grid.samples_per_interval if phases is None else 1,
+            grid=self.grid if phases is None else Grid(intervals=n - 1),
             duration=at[self.duration],
             progress=self.grid.progress if phases is None else phases,
             values={

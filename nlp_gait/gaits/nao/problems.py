@@ -9,6 +9,7 @@ import numpy as np
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, Grid, load, maker
 from nlp_gait.formulation.added_limits import AddedLimits
+from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, Support
@@ -46,6 +47,7 @@ def nao_ssp(
     rotational_inertia: bool = True,
     step_length_m: float = 0.06,
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
@@ -63,10 +65,18 @@ def nao_ssp(
         robot, rotational_inertia=rotational_inertia, motors=motors, arms=arms, zmp_gravity=zmp_gravity, limits=limits
     )
     power_form = None
-    if (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and samples_per_interval < 2:
+    if (
+        derivatives,
+        trajectory,
+        objective,
+        motors,
+        arms,
+        zmp_gravity,
+        rule,
+    ) == FORM_OPTIONS and samples_per_interval < 2:
         places = body.robot, place_stance(body, step_length_m), ARM_SWING[Support.SINGLE]
         power_form = make_power_form_maker(body.robot, partial(make_single_support, *places))
-    grid, goal = make_grid(trajectory, intervals, samples_per_interval), make_goal(body, objective)
+    grid, goal = make_grid(trajectory, intervals, samples_per_interval, rule=rule), make_goal(body, objective)
     phase = make_support_phase(body, Support.SINGLE, step_length_m, trajectory, grid, goal, derivatives=derivatives)
     return replace(make_phase_problem(Support.SINGLE, SINGLE_SUPPORT, phase), power_form=power_form)
 
@@ -81,6 +91,7 @@ def nao_dsp(
     torso_share: TorsoShare = "printed",
     step_length_m: float = 0.06,
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     trajectory: Trajectory = "cubic",
     objective: Criterion = "power",
     motors: str = "",
@@ -113,12 +124,12 @@ def nao_dsp(
         limits=limits,
     )
     power_form = None
-    paper = (derivatives, trajectory, objective, motors, arms, zmp_gravity) == FORM_OPTIONS and zmp_masses == 25
+    paper = (derivatives, trajectory, objective, motors, arms, zmp_gravity, rule) == FORM_OPTIONS and zmp_masses == 25
     if paper and samples_per_interval < 2 and torso_share != "free":
         soles = place_soles(body, step_length_m)
         places = (soles, place_hip(body, soles), ARM_SWING[Support.DOUBLE])
         power_form = make_power_form_maker(body.robot, partial(make_double_support, body.robot, *places, torso_share))
-    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free")
+    grid = make_grid(trajectory, intervals, samples_per_interval, planned_loads=torso_share == "free", rule=rule)
     goal, sharing = make_goal(body, objective), share_load(body, torso_share, load_degree)
     phase = make_support_phase(body, Support.DOUBLE, step_length_m, trajectory, grid, goal, sharing, derivatives)
     return replace(make_phase_problem(Support.DOUBLE, DOUBLE_SUPPORT, phase), power_form=power_form)
@@ -133,6 +144,7 @@ def nao_cycle(
     rotational_inertia: bool = True,
     torso_share: TorsoShare = "lever",
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
     limits: str | AddedLimits = "",
@@ -151,7 +163,7 @@ def nao_cycle(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, limits=limits)
-    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free")
+    grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free", rule=rule)
     return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
 
 
@@ -163,6 +175,7 @@ def nao_walk(
     intervals: int = 10,
     rotational_inertia: bool = True,
     samples_per_interval: int = 0,
+    rule: Quadrature = "trapezoid",
     slope_deg: float = 0.0,
     footholds: str = "",
     motors: str = "",
@@ -181,7 +194,7 @@ def nao_walk(
         Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, limits=limits).tilt_ground(slope_deg)
-    grid = make_grid("cubic", intervals, samples_per_interval)
+    grid = make_grid("cubic", intervals, samples_per_interval, rule=rule)
     if not footholds:
         return plan_whole_walk(body, steps, grid)
     places = parse_footholds(footholds)

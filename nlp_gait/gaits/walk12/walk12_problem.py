@@ -149,11 +149,8 @@ def _measure_stability(zmp: MX, robot: walk12_model.PointMassBiped) -> dict[str,
     x, y = zmp[0, :], zmp[1, :]
     half = robot.foot_width_m / 2
     margin = ca.fmin(ca.fmin(x + robot.foot_back_m, robot.foot_front_m - x), ca.fmin(y + half, half - y))
-    intervals = zmp.shape[1] - 1
-    trapezoid = np.full(intervals + 1, 1 / intervals)
-    trapezoid[[0, -1]] /= 2
     return {
-        "stable_share": (margin >= 0) @ DM(trapezoid),
+        "stable_share": (margin >= 0) @ DM(Grid(intervals=zmp.shape[1] - 1).weights),
         "zmp_margin_min_m": ca.mmin(margin),
         "zmp_x_min_m": ca.mmin(x),
         "zmp_x_max_m": ca.mmax(x),

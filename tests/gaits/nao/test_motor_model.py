@@ -12,7 +12,7 @@ import pytest
 from casadi import DM, MX
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import Array, Constraint
+from nlp_gait.formulation import Array, Constraint, Grid
 from nlp_gait.gaits.biped.limits import Limit
 from nlp_gait.gaits.biped.motors import SUPPLY, Motors
 from nlp_gait.gaits.biped.samples import Samples
@@ -34,7 +34,7 @@ SAMPLES = Samples(
     joints=JOINTS,
     moving=MOVING,
     standing=("L",),
-    per_interval=1,
+    grid=Grid(intervals=COUNT - 1),
     duration=MX(1.0),
     progress=MX(DM(np.linspace(0.0, 1.0, COUNT)).T),
     values={

@@ -20,8 +20,8 @@ from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.gaits.nao.least_power.power_instants import PAIRS, PowerInstant, PowerPhase
 from nlp_gait.robots import Robot
 
-# Derivatives, trajectory, objective, motors, arms and sign of g of these formulas, with one sample in each interval.
-FORM_OPTIONS = ("analytic", "cubic", "power", "", "carried", "physical")
+# Derivatives, trajectory, objective, motors, arms, sign of g and rule of these formulas, with one sample in each interval.
+FORM_OPTIONS = ("analytic", "cubic", "power", "", "carried", "physical", "trapezoid")
 # Up to this angle its tangent is monotone; slack for angles that break their limits within the judge's tolerance [rad].
 STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 
