@@ -17,8 +17,7 @@ from compare.cli.exchange import import_results, verify
 from compare.cli.export import export
 from compare.cli.list import list_problems
 from compare.cli.old_names import Commands
-from compare.cli.questions.optima import certainty, prices, robust, sweep, variants
-from compare.cli.questions.pareto import pareto
+from compare.cli.questions.optima import certainty, pareto, prices, robust, sweep, variants
 from compare.cli.report import report, reproduce
 from compare.cli.simulate import simulate
 from compare.cli.solve import plan, solve

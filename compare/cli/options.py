@@ -216,11 +216,6 @@ def parse_x(text: str) -> list[float]:
     return [parse_number("x", part, "--x") for part in text.split(",")]
 
 
-def parse_values(items: Sequence[str] | None, flag: str) -> dict[str, float]:
-    """Return the numbers of an option NAME=VALUE by name; raises as ``parse_number``."""
-    return {name: parse_number(name, text, flag) for name, text in parse_pairs(items, flag)}
-
-
 def parse_number(name: str, text: str, flag: str) -> float:
     """Return a number; InputError if the text is not one."""
     try:

@@ -18,7 +18,8 @@ from compare.cli.options import (
     Seed,
     parse_names,
     parse_number,
-    parse_values,
+    parse_options,
+    parse_pairs,
     parse_x,
 )
 from compare.cli.outputs import check_output_file
@@ -163,11 +164,12 @@ def plan(
             help="CSV file with columns x_m,y_m,z_m,yaw_deg: where the right foot, the left foot and so on land."
         ),
     ] = None,
-    intervals: Annotated[int, typer.Option(min=1, max=10000, help="Equal intervals of each phase.")] = 10,
     values: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="NAME=VALUE", help="Parameter or bound of nao-walk or humanoid-walk; repeatable."
+            "--set",
+            metavar="NAME=VALUE",
+            help="intervals (of each phase), or a parameter or bound of nao-walk or humanoid-walk; repeatable.",
         ),
     ] = None,
     starts: Annotated[int, typer.Option(min=1, max=100, help="Most start points, until one converges.")] = 3,
@@ -180,6 +182,8 @@ def plan(
     `nlp-gait export walk.json --to csv --period-ms 1`
     """
     target = None if out is None else check_output_file(out)
+    given = dict(parse_pairs(values, "--set"))
+    options = parse_options("nao-walk", [("intervals", given.pop("intervals", "10"))])
     found = nlp_gait.plan_walk(
         robot,
         steps,
@@ -190,10 +194,10 @@ def plan(
         stairs=stairs,
         turn_deg=turn_deg,
         footholds=footholds,
-        intervals=intervals,
-        values=parse_values(values, "--set"),
+        values={name: parse_number(name, text, "--set") for name, text in given.items()},
         starts=starts,
         progress=say,
+        **options,
     )
     if target is not None:
         found.save(target)

@@ -113,7 +113,7 @@ def test_energy_and_duration_count_every_inner_step(x: np.ndarray) -> None:
 def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     path = tmp_path / "walk.json"
-    data = as_json("plan", "--steps", "3", "--distance", "0.1", "--intervals", "2", "--starts", "1", "--out", path)
+    data = as_json("plan", "--steps", "3", "--distance", "0.1", "--set", "intervals=2", "--starts", "1", "--out", path)
     assert data["feasible"] and data["claimed"] and data["steps"] == 3 and not data["obstacles"]
     assert data["distance_m"] == pytest.approx(0.1, abs=1e-7)
     again = load_result(path)

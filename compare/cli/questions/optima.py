@@ -34,6 +34,7 @@ from nlp_gait.gaits.biped.cycle import SPEED
 if TYPE_CHECKING:
     from compare.questions.variants import Variant
 
+FRONT_SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
 CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the objective is the power
 
 
@@ -178,6 +179,37 @@ def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] 
             "name at least two variants by --over or --variant; the problem itself is one of those of --variant"
         )
     return found
+
+
+@command
+def pareto(
+    *,
+    against: Annotated[str, typer.Option(help="dbm_y_mean or dbm_x_mean [m], or speed [m/s].")] = "dbm_y_mean",
+    points: Annotated[int, typer.Option(min=5, max=10000, help="Points of the front.")] = 40,
+    starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts at every third point.")] = 5,
+    search: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=BUDGET,BUDGET",
+            show_default=False,
+            help="NSGA2 or CMOPSO; repeatable. 'none' for no search.",
+        ),
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, max=100000, help="Runs of each search.")] = 11,
+    seed: Seed = 0,
+    problem: NamedProblem,
+    out: OutFolder = Path("pareto"),
+    as_json: AsJson = False,
+) -> None:
+    """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
+
+    Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --against speed`
+    """
+    from compare.questions.pareto.pareto import Pareto, parse_searches
+
+    output, searches = Output(out=out, as_json=as_json), parse_searches(search or FRONT_SEARCHES)
+    effort = {"points": points, "starts": starts, "seed": seed, "runs": runs}
+    output.answer(Pareto(problem=problem.load(), against=against, searches=searches, **effort))
 
 
 @command
