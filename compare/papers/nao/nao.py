@@ -44,7 +44,7 @@ OPTIONS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 SWARMS = {"constant": "pso-constant", "damped": "pso"}
 TIMES = {"ssp": "single_support_time_s", "dsp": "double_support_time_s"}
 HIPS_M = (0.31, 0.29, 0.27, 0.256)  # heights of a sweep, from the optimum on
-DURATIONS_S = {"ssp": (4.0, 2.0, 1.0, 0.5), "dsp": (2.0, 1.0, 0.5, 0.3)}
+DURATIONS_S = {"ssp": (4.0, 2.0, 1.0, 0.7), "dsp": (2.0, 1.0, 0.5, 0.3)}
 SWINGS_M = (0.024, 0.028)
 PACES = 9  # durations at which a printed gait is evaluated
 STRAIGHT = {"hip_vz_start_m_s": 0.0, "hip_vz_end_m_s": 0.0}
@@ -157,13 +157,12 @@ def _change(phase: str, search: str, changes: Mapping[str, float]) -> list[float
     return list({**dict(zip(names, PRINTED[phase, search].x, strict=True)), **changes}.values())
 
 
-def solve_path(spec: ProblemSpec, fixed: Sequence[Mapping[str, float]], starts: int) -> list[dict[str, Any]]:
-    """Return optima with variables fixed one after the other, each from the one before."""
+def solve_path(spec: ProblemSpec, fixed: Sequence[Mapping[str, float]], starts: int, x0: Any) -> list[dict[str, Any]]:
+    """Return optima with variables fixed one after the other, each from the one before; first from ``x0`` and random points."""
     found: list[dict[str, Any]] = []
-    x0: Any = None
     for values in fixed:
         problem = spec.load().fix(**values) if values else spec.load()
-        solution = solve(problem, starts=starts if x0 is None else 1, x0=x0, workers=1)
+        solution = solve(problem, starts=1 if found else starts, x0=x0, workers=1)
         point = {"x": dict(solution.x), "power_W": float(solution.objective), "feasible": bool(solution.converged)}
         found.append(point if point["feasible"] else {**point, "power_W": 0.0})
         x0 = solution.x if solution.converged else x0
@@ -189,7 +188,14 @@ def _make_computations(effort: NaoEffort) -> list[Any]:
         spec = ProblemSpec(name=spec.name, options=spec.options, values={"dbm_y_mean_limit_m": mean})
         paths[f"printed/share-{share}-{arms}"] = spec, [{"hip_height_m": 0.31, TIMES["dsp"]: 2.0}]
     return [
-        make_computation(name.replace("/", "-"), spec, partial(solve_path, spec), fixed=fixed, starts=effort.starts)
+        make_computation(
+            name.replace("/", "-"),
+            spec,
+            partial(solve_path, spec),
+            fixed=fixed,
+            starts=effort.starts if "optimum" in name else 1,
+            x0=list(PRINTED[spec.address.removeprefix("nao-"), "PSO"].x),
+        )
         for name, (spec, fixed) in paths.items()
     ]
 
