@@ -10,7 +10,7 @@ from nlp_gait.errors import unknown
 # Modules with a REPRODUCTION, by name of the paper.
 REPRODUCTIONS = {
     "nao": "compare.papers.nao.nao",
-    "walk12": "compare.papers.walk12.walk12_reproduction",
+    "walk12": "compare.papers.walk12.walk12",
     "stairs": "compare.papers.stairs.stairs_reproduction",
 }
 

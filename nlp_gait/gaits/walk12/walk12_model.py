@@ -67,8 +67,10 @@ def load_point_mass_biped() -> PointMassBiped:
 
 
 # Definition of the ZMP: (14) with exact forward kinematics; the same with the appendix's approximate positions, misprints
-# corrected or (A1) as printed; or the point about which the moment of gravity and inertia vanishes.
-Zmp = Literal["exact", "appendix", "appendix-as-printed", "moment-free"]
+# corrected or (A1) as printed; (14) on a ground below the ankle, whose height the paper does not print; or the point about which
+# the moment of gravity and inertia vanishes.
+Zmp = Literal["exact", "appendix", "appendix-as-printed", "raised-ankle", "moment-free"]
+ANKLE_HEIGHT_M = 0.025  # of "raised-ankle"; with 20 to 25 mm most of the paper's f are met
 
 
 class Walk12Leg(NamedTuple):
@@ -163,7 +165,7 @@ def place_on_appendix_shank(leg: Walk12Leg, heights: DM) -> Motion:
 
 
 def compute_zmp(stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, reading: Zmp) -> SX:
-    """Return (2,) the zero-moment point relative to the stance ankle, on the height of that ankle [m].
+    """Return (2,) the zero-moment point relative to the stance ankle, on the height of that ankle or as ``reading`` says [m].
 
     Source:
         Eqs. (12)-(14), (A1)-(A6). As printed, (A1) sums the swing leg with the angles of the stance leg, from x_r.
@@ -173,7 +175,9 @@ def compute_zmp(stance: Walk12Leg, swing: Walk12Leg, robot: PointMassBiped, read
         stance, swing, robot, place_on_appendix_shank if reading.startswith("appendix") else place_on_exact_shank
     )
     static_load = reading != "moment-free"
-    point = zmp_of_point_masses(m, motion.position, motion.acceleration, GRAVITY, static_load=static_load)
+    above = DM([0.0, 0.0, ANKLE_HEIGHT_M]) if reading == "raised-ankle" else DM.zeros(3)
+    position = motion.position if above.is_zero() else motion.position + above
+    point = zmp_of_point_masses(m, position, motion.acceleration, GRAVITY, static_load=static_load)
     if reading != "appendix-as-printed":
         return point
     foot, knee, *hips_and_waist = ca.horzsplit(motion.position[:2, :])[:5]

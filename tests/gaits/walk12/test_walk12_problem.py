@@ -14,7 +14,7 @@ import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
-from nlp_gait.gaits.walk12.walk12_model import load_point_mass_biped
+from nlp_gait.gaits.walk12.walk12_model import ANKLE_HEIGHT_M, load_point_mass_biped
 from nlp_gait.gaits.walk12.walk12_steps import compute_steps
 from tests.gaits.walk12 import walk12_oracle as oracle
 
@@ -202,3 +202,15 @@ def test_options_that_are_not_allowed(options: dict[str, Any], message: str) -> 
 def test_a_turn_is_at_most_eight_degrees() -> None:
     with pytest.raises(InputError, match="turn_rad"):
         DEFAULT.with_values(turn_rad=math.radians(8.1))
+
+
+def test_an_ankle_above_the_ground_shifts_the_zmp_by_the_horizontal_inertia() -> None:
+    for x in random_gaits(3, seed=5):
+        low, high = (
+            compute_steps(load_point_mass_biped(), x, steps=1, zmp=reading).arrays
+            for reading in ("exact", "raised-ankle")
+        )
+        for t, before, after in zip(low["t"], low["zmp"], high["zmp"], strict=True):
+            inertia = oracle.MASSES @ oracle.accelerations(x, t)[:, :2]
+            shift = -ANKLE_HEIGHT_M * inertia / (oracle.GRAVITY * oracle.MASSES.sum())
+            assert after - before == pytest.approx(shift, abs=MOMENT_TOLERANCE)
