@@ -70,22 +70,6 @@ def rows_of(limit: Limit) -> dict[str, Constraint]:
     return {row.name: row for row in limit.add(AT, SAMPLES, Exact())[0]}  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("heat", ["", "heat"])
-@pytest.mark.parametrize("braking", ["", "free-braking", "regeneration"])
-def test_power(braking: str, heat: str) -> None:
-    draw = parse_nao_motors(f" {braking} ,{heat}, limits", ROBOT).power
-    if not braking and not heat:
-        assert draw is None  # the paper's way
-        return
-    assert draw is not None
-    driven = {"": np.abs, "free-braking": lambda p: np.maximum(p, 0.0), "regeneration": np.asarray}[braking](POWER)
-    warm = 0.03 * (TORQUE**2).sum(axis=0)
-    if heat:
-        warm = ratings("heat_W_per_Nm2") @ at_motors() ** 2
-    (found,) = number(draw(AT, SAMPLES, Exact()))  # type: ignore[arg-type]
-    np.testing.assert_allclose(found, mean(driven.sum(axis=0) + warm), rtol=1e-12)
-
-
 def test_limits() -> None:
     (limit,) = parse_nao_motors("limits, rotor", ROBOT).limits
     assert limit.parameters == (SUPPLY,)

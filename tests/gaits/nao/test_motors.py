@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from casadi import MX, Function
 from scipy.integrate import trapezoid
 
 from nlp_gait import IpoptSettings, load, solve
-from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.gaits.nao.body import ANKLE_ROLL, limit_ankle_roll
+from nlp_gait.errors import InputError
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 
@@ -57,25 +55,6 @@ def test_power_is_that_of_the_time_histories(features: str) -> None:
 
 
 @pytest.mark.slow
-def test_limits_are_those_of_the_data_sheet() -> None:
-    problem = load("nao-ssp", motors="limits")
-    signals = problem.signals(X)
-    knee = signals.joints.index("LKneePitch")
-    torque, rate = signals.arrays["tau"][:, knee], signals.arrays["qd"][:, knee]
-    motor = load_robot("nao-v5").joint("LKneePitch").motor
-    assert motor is not None
-    assert motor.stall_torque_Nm == pytest.approx(8.5053, abs=1e-4)
-    assert motor.no_load_rad_s == pytest.approx(6.9626, abs=1e-4)
-    rows = evaluated(problem, X).rows
-    slope = motor.stall_torque_Nm / motor.no_load_rad_s
-    for k in (0, 5, 10):
-        assert rows[f"joint_speed[LKneePitch, {k}]"] == pytest.approx(rate[k], abs=1e-12)
-        assert rows[f"torque_forwards[LKneePitch, {k}]"] == pytest.approx(torque[k] + slope * rate[k])
-        assert rows[f"torque_backwards[LKneePitch, {k}]"] == pytest.approx(torque[k] - slope * rate[k])
-    assert rows["continuous_torque[LKneePitch]"] == pytest.approx(math.sqrt(mean(torque**2)))
-
-
-@pytest.mark.slow
 def test_a_flat_battery_binds() -> None:
     """At a fifth of the voltage the knee's torque at the optimum is beyond what its motor gives."""
     problem = load("nao-dsp", motors="limits", intervals=5)
@@ -86,42 +65,11 @@ def test_a_flat_battery_binds() -> None:
     assert weak.objective > solve(problem, solver=solver).objective + 1e-4
 
 
-def test_the_ankles_roll_follows_the_table() -> None:
-    pitch = MX.sym("pitch")
-    for column in (1, 2):
-        line = Function("line", [pitch], [limit_ankle_roll(pitch, column)])
-        for row in ANKLE_ROLL:
-            assert float(line(row[0])) == pytest.approx(row[column], abs=1e-9)
-        middle = (ANKLE_ROLL[2][0] + ANKLE_ROLL[3][0]) / 2
-        expected = (ANKLE_ROLL[2][column] + ANKLE_ROLL[3][column]) / 2
-        assert float(line(middle)) == pytest.approx(expected, abs=1e-9)
-        assert float(line(-3.0)) == pytest.approx(ANKLE_ROLL[0][column])
-
-
-def test_ankle_rows_mirror() -> None:
-    rows = evaluated(load("nao-ssp", motors="ankle"), X).rows
-    for side in "LR":
-        assert all(rows[f"{side}AnkleRoll_least[{k}]"] > 0.0 for k in range(11))
-        assert all(rows[f"{side}AnkleRoll_greatest[{k}]"] < 0.0 for k in range(11))
-
-
 def test_an_index_keeps_the_papers_power() -> None:
     problem = load("nao-ssp", motors="heat")
     found = evaluated(problem, X)
     assert found.indexes["paper_power_W"] == pytest.approx(evaluated(load("nao-ssp"), X).cost)
     assert found.indexes["power_W"] == found.cost
-
-
-@pytest.mark.parametrize(
-    ("features", "error", "said"),
-    [
-        ("limit", UnknownNameError, "limits"),
-        ("regeneration,free-braking", InputError, "either"),
-    ],
-)
-def test_nonsense_is_refused(features: str, error: type[Exception], said: str) -> None:
-    with pytest.raises(error, match=said):
-        load("nao-ssp", motors=features)
 
 
 def test_both_are_simulated_with_the_rotors_of_the_plan() -> None:

@@ -91,10 +91,3 @@ def accelerations(x: Array, t: float, T: float = 1.0, shank: Any = shank, step: 
     """(7, 3) by the five-point central difference."""
     p = [points(x, t + k * step, T, shank) for k in (-2, -1, 0, 1, 2)]
     return np.asarray((-p[0] + 16 * p[1] - 30 * p[2] + 16 * p[3] - p[4]) / (12 * step**2))
-
-
-def moment(x: Array, t: float, about: Array, T: float = 1.0) -> Array:
-    """(3,) moment of gravity and inertia of all masses about a point of the ground [Nm]."""
-    forces = -MASSES[:, None] * (accelerations(x, t, T) + np.array([0.0, 0.0, GRAVITY]))
-    arms = points(x, t, T) - np.array([*about, 0.0])
-    return np.asarray(np.cross(arms, forces).sum(axis=0))
