@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import GaitProblem, list_problems, load
+from nlp_gait.formulation import GaitProblem, load
 from tests.backends.toys import corner, toy
 
 SINGLE_SUPPORT_NAMES = (
@@ -85,11 +85,6 @@ def test_values_that_are_not_allowed_are_refused(values: dict[str, Any], message
         toy(corner).with_values(**values)
 
 
-def test_inverted_joint_limits_are_refused() -> None:
-    with pytest.raises(InputError, match=r"bounds of 'LKneePitch_rad' are inverted: lower 2\.5 is above upper 2\.11"):
-        load("nao-ssp").with_values(**{"LKneePitch_rad.lower": 2.5})
-
-
 def test_both_ends_of_a_range_may_move_at_once() -> None:
     moved = toy(corner).with_values(**{"x.lower": 3.0, "x.upper": 4.0})
     assert (moved.lower[0], moved.upper[0]) == (3.0, 4.0)
@@ -162,7 +157,3 @@ def test_parameter_arrays_cannot_be_written() -> None:
     for array in (problem.p, problem.lower, problem.upper, problem.scale):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
-
-
-def test_both_nao_phases_can_be_loaded_by_name() -> None:
-    assert {"nao-ssp", "nao-dsp"} <= set(list_problems())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -62,11 +61,6 @@ def test_a_solution_of_many_variables_displays_twenty(solution: nlp_gait.Solutio
     shown = long._repr_html_()
     assert "first_19<" in shown and "first_20<" not in shown
     assert "; 10 more in .x and .active_constraints" in shown and " more in " not in solution._repr_html_()
-
-
-def test_a_start_without_a_violation_ranks_last(solution: nlp_gait.Solution) -> None:
-    (start,) = solution.starts
-    assert replace(start, violation=0.5).rank == (2.0, 0.5) < replace(start, violation=math.nan).rank == (2.0, math.inf)
 
 
 @pytest.mark.slow

@@ -98,15 +98,6 @@ def test_every_option_is_recorded(name: str) -> None:
         assert (again.names, again.grid, again.parameters) == (problem.names, problem.grid, problem.parameters)
 
 
-@pytest.mark.parametrize("option", others("walk12"))
-def test_definitions_of_tasks_depend_on_each_option(option: str) -> None:
-    """Equal tasks of a study have equal definitions, and this one is not the default's."""
-    asked = make_task("walk12", {option: others("walk12")[option]})
-    problem = asked.problem.load()
-    recorded = make_task(problem.name, problem.options)
-    assert recorded.definition() == asked.definition() != make_task("walk12", {}).definition()
-
-
 # The cycle stands for the humanoid's other problems, which take the same bodies and phases.
 RELOADED = [name for name in PROBLEMS if name == "humanoid-cycle" or not name.startswith("humanoid-")]
 
@@ -140,11 +131,6 @@ def test_the_judge_counts_the_intervals_of_its_grid() -> None:
     assert verdict.dense_intervals == 34 * 30
     assert len(dense.signals(middle).arrays["t"]) == 2 * verdict.dense_intervals + 1  # of each phase
     assert verdict.dense == evaluated(dense, middle).indexes
-
-
-@pytest.mark.parametrize("name", ["nao-ssp", "nao-dsp", "walk12"])
-def test_all_options_are_recorded_in_the_order_of_the_signature(name: str) -> None:
-    assert list(load(name).options) == list(defaults(name))
 
 
 def test_the_samples_of_a_trajectory_are_recorded() -> None:

@@ -38,18 +38,13 @@ def load(name: str) -> GaitProblem:
     return nlp_gait.load(name, **get_definition(INSTANCES[name]).options)
 
 
-def narrow_bounds(problem: GaitProblem, lower: Array, upper: Array) -> GaitProblem:
-    """Return a problem with other bounds of its variables."""
-    named = (("lower", lower), ("upper", upper))
-    return problem.with_values(
-        **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
-    )
-
-
 def narrow_around(problem: GaitProblem, x: Array, part: float) -> GaitProblem:
     """Return a problem with bounds that are this part of the ranges around a point, and nowhere wider."""
     half = part * (problem.upper - problem.lower) / 2
-    return narrow_bounds(problem, np.maximum(problem.lower, x - half), np.minimum(problem.upper, x + half))
+    named = (("lower", np.maximum(problem.lower, x - half)), ("upper", np.minimum(problem.upper, x + half)))
+    return problem.with_values(
+        **{f"{n}.{end}": float(v) for end, values in named for n, v in zip(problem.names, values, strict=True)}
+    )
 
 
 def feasible_gaits(problem: GaitProblem, best: Array, count: int, rng: np.random.Generator) -> list[Array]:

@@ -9,7 +9,7 @@ from casadi import SX
 
 import nlp_gait
 from nlp_gait.backends.kernel.kernel_source import build_kernel
-from nlp_gait.errors import CompilerError, InputError
+from nlp_gait.errors import InputError
 from nlp_gait.proofs.affine import AffineFunction
 from tests.proofs.enclosed_operations import AFFINE, QUADRATIC, find_lost_values
 
@@ -94,16 +94,3 @@ def test_boxes_of_the_wrong_shape_and_unknown_operations_are_refused() -> None:
         function(np.zeros((1, 2, 2)), np.array([0]))
     with pytest.raises(InputError, match="cannot be enclosed"):
         AffineFunction(ca.Function("f", [x], [ca.erf(x)]))
-
-
-def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from nlp_gait.proofs import affine
-
-    def missing() -> None:
-        raise CompilerError("no C++ compiler")
-
-    affine._library.cache_clear()
-    monkeypatch.setattr(affine, "find_compiler", missing)
-    x = SX.sym("x")
-    with pytest.raises(CompilerError, match=r"no C\+\+ compiler"):
-        AffineFunction(ca.Function("f", [x], [x + 1]))

@@ -117,6 +117,15 @@ def test_a_damaged_or_forged_checkpoint_is_one_sentence(name: str, written: byte
     assert "\n" not in text and text.endswith("delete it to start the proof again") and len(text) < 400
 
 
+def test_a_killed_proof_continues_to_the_same_end(written: bytes, tmp_path: Path) -> None:
+    (tmp_path / "open").write_bytes(written)
+    resumed, whole = (
+        certify(PROBLEM, BEST, tolerance=1e-4, checkpoint=tmp_path / "open"),
+        certify(PROBLEM, BEST, tolerance=1e-4),
+    )
+    assert resumed.closed and (resumed.boxes, resumed.bound) == (whole.boxes, whole.bound)
+
+
 def test_a_pipe_is_not_a_checkpoint(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "open")
     with pytest.raises(InputError, match="not a regular file"):

@@ -90,6 +90,8 @@ FORGERIES: dict[str, tuple[Callable[[Raw], None], str]] = {
     "incumbent too short": (lambda raw: raw["certificate"]["x"].pop(), "must have 4 values"),
     "incumbent outside": (lambda raw: raw["certificate"]["x"].__setitem__(0, -1.0), "outside the bounds"),
     "incumbent infeasible": (change("certificate", x=[0.05, 0.13, 0.001, 0.001]), "incumbent is infeasible"),
+    "parameters a number": (change("problem", parameters=0), r"problem\.parameters must be an object, got 0"),
+    "no options": (change("problem", options=None), r"problem\.options must be an object"),
     "another lambda": (change("problem", parameters={"lambda": 1.0}), "has changed since"),
     "another problem": (change("problem", name="nao-dsp"), "unknown option"),
     "formulas of another version": (change("problem", mathematics=2), "formulas are of version 1, not 2"),

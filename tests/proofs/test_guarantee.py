@@ -17,7 +17,7 @@ from nlp_gait.formulation import Assembly, Constraint, GaitProblem, Over, Point,
 from nlp_gait.gaitbench.facts import load_facts
 from nlp_gait.proofs import affine
 from nlp_gait.proofs.guarantee import guarantee
-from nlp_gait.proofs.time_search import bound_violation, make_time_functions
+from nlp_gait.proofs.time_search import bound_violation
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
 from tests.proofs.soundness import feasible_gaits, find_contradictions
@@ -115,25 +115,6 @@ def test_a_mean_is_that_over_time() -> None:
     (violation,) = found.violations
     assert found.satisfied is False and (violation.from_s, violation.to_s) == (1.0, 3.0)
     assert 0.0 < violation.least <= 1e-3 <= violation.most
-
-
-@pytest.mark.slow
-def test_rows_of_one_name_alone_are_the_same_for_less_work() -> None:
-    problem, x = nlp_gait.load("nao-dsp"), best("dsp-v5")
-    rows = make_time_functions(problem, problem.rows_over_time[0]).instants
-    assert rows is not None
-    groups = {rows.names[group[0]].partition("[")[0]: k for k, group in enumerate(rows.groups)}
-    assert set(groups) == {"joint_angle", "reach", "dbm_x", "dbm_y"}
-    part = rows.part(groups["reach"])
-    assert part.work < 0.1
-    given = np.concatenate([x, problem.p, [0.0]])
-    boxes = np.stack([given, given], axis=-1)[None]
-    boxes[:, -1] = 0.3, 0.31
-    symbols = np.where(np.arange(len(given)) == len(given) - 1, 0, -1)
-    alone, whole = (function(boxes, symbols) for function in (part.function, rows.whole))
-    columns = rows.groups[groups["reach"]]
-    for ends, all_ends in ((alone.lower, whole.lower), (alone.upper, whole.upper)):
-        np.testing.assert_allclose(ends[:, part.columns], all_ends[:, columns], rtol=1e-9)
 
 
 def test_rows_that_say_nothing_of_time_are_named_as_sampled() -> None:
