@@ -597,8 +597,10 @@ def make_tables(results: Mapping[str, Results]) -> list[Table]:
     by_reading = {f"{name}: f of the paper's gait": ".4f" for name in (LITERAL, RAISED)}
     variables = {f"{who} {name} [mm]": ".1f" for name in NAMES for who in ("paper", "IPOPT")}
     third: list[list[Value]] = [
-        [row.weight, row.f, *(compute_f(row, F1MAX, **results[name].options) for name in (LITERAL, RAISED))]
-        + [_get_median(ours, row), best.verdict.objective, *_pair(row, best)]
+        [
+            *(row.weight, row.f, *(compute_f(row, F1MAX, **results[name].options) for name in (LITERAL, RAISED))),
+            *(_get_median(ours, row), best.verdict.objective, *_pair(row, best)),
+        ]
         for row, best in zip(TABLE_3, ours.optima, strict=True)
     ]
     columns = {"λ": ".2f", "paper: f": ".3f", **by_reading, "GA, median f": ".4f", "IPOPT: f": ".4f", **variables}
