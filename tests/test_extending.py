@@ -37,6 +37,7 @@ from nlp_gait.formulation import (
     Variable,
     maker,
 )
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes
 from nlp_gait.gaits.biped.phase_problem import make_phase_problem
@@ -136,7 +137,7 @@ class MostHipSpeed(Limit):
 def test_a_limit_of_a_gait_is_one_class() -> None:
     """It is added to those of single support, limits the motion there, and has a parameter."""
     body, grid = make_nao("nao-v5"), Grid(intervals=4)
-    paper = make_support_phase(body, "ssp", 0.06, "cubic", grid, Goal())
+    paper = make_support_phase(body, Support.SINGLE, 0.06, "cubic", grid, Goal())
     phase = replace(paper, limits=(*paper.limits, MostHipSpeed()))
     problem = make_phase_problem("ssp", "single support with a limit on a hip's speed", phase)
     solution = nlp_gait.solve(problem)
