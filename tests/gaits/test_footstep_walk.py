@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,9 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import describe_violation, list_speeds, plan_walk
+from nlp_gait.backends.plan_walk import list_speeds, plan_walk
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaits.biped.body import TIMES
 from nlp_gait.gaits.biped.footholds import (
     Foothold,
@@ -144,17 +142,6 @@ def test_energy_and_distance_are_those_of_all_phases(problem: GaitProblem, plan:
     assert indexes["energy_J_per_m"] == pytest.approx(indexes["energy_J"] / indexes["distance_m"])
 
 
-@pytest.mark.slow
-def test_the_drawing_turns_with_the_feet(problem: GaitProblem, plan: Plan) -> None:
-    assert problem.display.skeleton is not None
-    drawn, arrays = problem.display.skeleton(plan.signals, problem.parameter_values), plan.signals.arrays
-    for foot, limb, sole in zip(("left_foot", "right_foot"), drawn.limbs, drawn.soles, strict=False):
-        np.testing.assert_allclose(limb.points[:, -1], arrays[foot], atol=1e-9)
-        np.testing.assert_allclose(limb.points[:, 0], arrays["hip"], atol=1e-9)
-        toes = sole.corners[-1, 0] - sole.corners[-1, 1]
-        assert math.degrees(math.atan2(toes[1], toes[0])) == pytest.approx(TURN_DEG)
-
-
 def test_a_start_from_a_cycle_has_its_states_in_all_steps(problem: GaitProblem) -> None:
     start = problem.start_point(np.random.default_rng(0))
     cycle = {"hip_z_lift_off_m": 0.2, "double_support_time_s": 0.7, "step_length_m": 0.04}
@@ -229,18 +216,6 @@ def test_footholds_that_cannot_be_walked_are_refused(footholds: str, words: str)
 def test_turns_that_cannot_be_planned_are_refused(options: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
         plan_walk("nao-v5", **options)  # type: ignore[arg-type]
-
-
-def test_a_violation_names_its_step() -> None:
-    row = "step3_ssp_joint_angle[RKneePitch, 3]"
-    value = ConstraintValue(name=row, value=1.0, lower=None, upper=0.9, violation=0.1, unit="rad")
-    assert describe_violation(value, 5).startswith("step 3, single support: RKneePitch exceeds its limit by 0.1 rad")
-    value = replace(value, name="step3_speed", unit="m/s")
-    assert describe_violation(value, 5).startswith("step 3: speed of the inner steps is not reached by 0.1 m/s")
-    told = describe_violation(replace(value, name="stand_effort[LAnkleRoll, 0]", unit="Nm"), 5)
-    assert (
-        told.startswith("standing: LAnkleRoll torque exceeds its limit by 0.1 Nm") and "raise the joint's limit" in told
-    )
 
 
 @pytest.mark.slow

@@ -11,11 +11,10 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, find_walk, plan_walk
+from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, plan_walk
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
-from nlp_gait.gaits.biped.walk_parts import start_from_cycle
 from nlp_gait.simulation.plan import make_plan
 from nlp_gait.simulation.simulate import Conditions
 from nlp_gait.symbolic.dynamics import tilt_gravity
@@ -125,18 +124,6 @@ def test_a_plan_is_feasible_and_walks_in_the_engine(tmp_path: Path) -> None:
     assert simulated["walked_m"] > 0.98 * simulated["planned_m"]
     # Three samples a phase are too few for the energy of the plan; the model's is computed on a dense grid.
     assert simulated["energy_J"] == pytest.approx(simulated["walk"]["model_J_per_m"] * 0.1, rel=0.1)
-
-
-def test_a_start_from_a_cycle_has_its_states_and_times_in_all_phases(problem: GaitProblem, x: np.ndarray) -> None:
-    cycle = {"hip_z_lift_off_m": 0.3, "double_support_time_s": 0.7, "hip_y_touch_down_m": 0.02}
-    found = problem.by_name(start_from_cycle(problem, x, cycle))
-    assert found["hip_z_stand_m"] == found["hip_z_start_lift_off_m"] == 0.3
-    assert found["shift_time_s"] == found["stop_double_support_time_s"] == 0.7
-    assert found["hip_y_stop_touch_down_m"] == 0.02 and found["step_length_m"] == problem.by_name(x)["step_length_m"]
-
-
-def test_the_robot_decides_which_problem_is_solved() -> None:
-    assert find_walk("nao-v6") == "nao-walk"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The generated model: masses, limits, shapes."""
 
 import sys
-import xml.etree.ElementTree as Xml
 from dataclasses import replace
 
 import numpy as np
@@ -21,14 +20,6 @@ from nlp_gait.simulation.simulate import Conditions
 
 HEAD_JOINTS = ("HeadYaw", "HeadPitch")
 NAO = load_robot("nao-v5")
-
-
-def test_stall_and_continuous_limits_come_from_motor_and_gear():
-    knee = NAO.joint("LKneePitch")
-    assert Drive(torque_limits="urdf").torque_limit(knee) == 3.023
-    assert Drive(torque_limits="stall").torque_limit(knee) == pytest.approx(130.85 * 0.065)
-    assert Drive(torque_limits="continuous").torque_limit(knee) == pytest.approx(130.85 * 0.0178)
-    assert Drive(full_error_rad=0.1).stiffness(knee) == pytest.approx(85.05, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -79,13 +70,6 @@ def test_the_engine_reads_our_masses_to_the_last_digit():
     for name, joint in robot.joints.items():
         assert tuple(model.joint(name).range) == joint.limits_rad
     assert model.opt.gravity.tolist() == [0.0, 0.0, -9.8]
-
-
-def test_the_document_is_well_formed_without_the_engine():
-    root = Xml.fromstring(make_plan_model(plan_of(NAO), Drive(), friction=0.5))
-    assert len(root.findall(".//joint")) == len(NAO.joints) and len(root.findall(".//freejoint")) == 1
-    assert len(root.findall("./actuator/position")) == len(NAO.joints)
-    assert root.find("./default/geom").get("friction").startswith("0.5 ")
 
 
 def test_slope_tilts_gravity():

@@ -1,7 +1,6 @@
 """Recorded simulations: states at the times of pictures, and the robot as a skeleton."""
 
 from functools import partial
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
@@ -10,9 +9,7 @@ from nlp_gait.errors import OutputError
 
 pytest.importorskip("mujoco")
 
-from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import load_mujoco  # noqa: E402
-from nlp_gait.simulation.mjcf import make_plan_model  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
 from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, make_skeleton, record_states  # noqa: E402
 from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
@@ -48,15 +45,6 @@ def test_the_skeleton_is_where_the_engine_has_the_robot(recording):
     assert np.abs(skeleton.com[-1, :2] - skeleton.zmp[-1, :2]).max() < 0.005  # at rest
     assert (skeleton.margin()[5:] > 0.0).all()
     np.testing.assert_array_equal(skeleton.ground[:, 1], 0.0)
-
-
-def test_legs_have_a_colour_for_each_side(gait):
-    plan = make_plan(gait("dsp optimum"))
-    root = Xml.fromstring(make_plan_model(plan, Drive()))
-    colours = {body.get("name"): {geom.get("rgba") for geom in body.findall("geom")} for body in root.iter("body")}
-    left, right = colours["l_ankle"], colours["r_ankle"]
-    assert colours["LThigh"] == left != right == colours["RTibia"]
-    assert colours["torso"] == colours["LBicep"] and not colours["torso"] & (left | right)
 
 
 @pytest.mark.slow

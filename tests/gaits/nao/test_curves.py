@@ -11,7 +11,6 @@ import pytest
 
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem, load
 from nlp_gait.gaits.biped.curves import SPANS
 from nlp_gait.symbolic.trajectories import refine_spline
@@ -154,16 +153,3 @@ def test_squared_torques_are_their_mean_over_time() -> None:
     arrays = problem.signals(padded(problem)).arrays
     mean = np.trapezoid((arrays["tau"] ** 2).sum(axis=1), arrays["t"]) / arrays["t"][-1]
     assert evaluated(problem, padded(problem)).cost == pytest.approx(mean, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"trajectory": "septic"}, "trajectory must be one of cubic, quintic, spline-2, .* got 'septic'"),
-        ({"objective": "speed"}, "objective must be one of power, jerk, torque, torque-smoothness, got 'speed'"),
-    ],
-)
-@pytest.mark.parametrize("name", NAMES)
-def test_unknown_motions_are_refused(name: str, options: dict[str, str], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        load(name, **options)

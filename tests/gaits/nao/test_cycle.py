@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import Array, GaitProblem, Signals, load
 from nlp_gait.gaits.biped.cycle import make_walking_cycle
 from nlp_gait.gaits.biped.goals import Goal
@@ -24,8 +23,6 @@ CONTINUITY = 1e-8
 TORQUE_TOLERANCE_NM = ZMP_TOLERANCE_M = 1e-8
 # The same sums in another order.
 ROUNDING = 1e-12
-# Joint rates are compared with differences on a grid of 1,000 intervals.
-DIFFERENCE_TOLERANCE = 1e-4
 SEEDS = range(3)
 # Least power at 0.03 m/s.
 OPTIMUM = {
@@ -117,38 +114,6 @@ def test_the_end_is_the_mirror_image_of_the_beginning_a_step_further(
 
 
 @pytest.mark.slow
-def test_the_velocities_of_hip_and_feet_are_continuous_at_both_switches(at_speed: GaitProblem) -> None:
-    """By one-sided differences of second order on a dense grid, for the time histories hold no such velocities."""
-    dense = at_speed.dense(100)
-    assert dense is not None
-    x = candidates(at_speed)[0]
-    single, double = phases(dense, x)
-
-    def rate(signals: Signals, name: str, end: int) -> Array:
-        t, y = signals.arrays["t"], signals.arrays[name]
-        a, b, c = (0, 1, 2) if end == 0 else (-1, -2, -3)
-        return np.asarray((-3 * y[a] + 4 * y[b] - y[c]) / (t[c] - t[a]))
-
-    mirror = np.array([1, -1, 1])
-    for name, image in (("hip", "hip"), ("left_foot", "right_foot"), ("right_foot", "left_foot")):
-        np.testing.assert_allclose(rate(double, name, 0), rate(single, name, -1), rtol=0, atol=DIFFERENCE_TOLERANCE)
-        np.testing.assert_allclose(
-            rate(double, name, -1), mirror * rate(single, image, 0), rtol=0, atol=DIFFERENCE_TOLERANCE
-        )
-    expected = [x[at_speed.variable_index(f"hip_v{axis}_touch_down_m_s")] for axis in "xyz"]
-    np.testing.assert_allclose(rate(single, "hip", -1), expected, rtol=0, atol=DIFFERENCE_TOLERANCE)
-
-
-@pytest.mark.slow
-def test_joined_signals_have_increasing_times_and_one_sample_at_the_switch(at_speed: GaitProblem) -> None:
-    x = candidates(at_speed)[0]
-    signals = at_speed.signals(x)
-    assert (np.diff(signals.arrays["t"]) > 0.0).all()
-    assert all(len(array) == 21 for array in signals.arrays.values())
-    assert signals.arrays["t"][-1] == pytest.approx(2.4)
-
-
-@pytest.mark.slow
 def test_torques_and_zmp_of_single_support_are_pinocchios(sampled: list[Sampled]) -> None:
     robot = load_robot("nao-v5")
     model, ankle = floating_model(robot), np.array([0.0, 0.05, robot.feet["left"].ankle_height_m])
@@ -221,11 +186,6 @@ def test_torque_jumps_are_those_of_the_signals(at_speed: GaitProblem, sampled: l
     assert figures["lift_off_torque_jump_Nm"] == pytest.approx(np.abs(lift_off).max(), rel=ROUNDING)
 
 
-def test_the_speed_without_its_option_is_one_sentence() -> None:
-    with pytest.raises(UnknownNameError, match="'speed_m_s' is no parameter of nao-cycle .* add --set objective=power"):
-        load("nao-cycle").with_values(speed_m_s=0.03)
-
-
 def test_a_step_beyond_its_bounds_is_a_violation(at_speed: GaitProblem) -> None:
     x = candidates(at_speed)[0]
     fast = at_speed.with_values(speed_m_s=0.06)  # a step of 0.144 m
@@ -248,15 +208,3 @@ def test_the_hip_and_the_step_range_over_shares_of_the_legs_length() -> None:
     for name, bounds in ranges.items():
         k = problem.variable_index(name)
         assert (problem.lower[k], problem.upper[k]) == bounds
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "message"),
-    [
-        ("objective", "speed", "objective must be one of energy-per-metre, power"),
-        ("torso_share", "half", "printed, lever, free"),
-    ],
-)
-def test_unknown_options_are_refused(option: str, value: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        load("nao-cycle", **{option: value})

@@ -150,10 +150,6 @@ def test_where_the_loop_stays_open_a_row_says_so() -> None:
     assert any(row.name.startswith("sole_turn") for row in row_violations(problem, x))
 
 
-def test_only_gradients_solve_it() -> None:
-    assert not problem_of().searchable
-
-
 def test_hips_that_yaw_alike_are_refused() -> None:
     robot = load_robot("nao-v5")
     right = replace(robot.joint("RHipYawPitch"), axis=robot.joint("LHipYawPitch").axis)

@@ -109,10 +109,6 @@ def test_what_a_plan_keeps_by_construction_is_a_limit(joint: str, value: float, 
     assert any(name.startswith(rows) for name in found), found[:20]
 
 
-def test_only_gradients_solve_it() -> None:
-    assert not problem_of().searchable
-
-
 def test_a_grid_without_a_middle_is_refused() -> None:
     with pytest.raises(InputError, match="must be even, got 55"):
         load("nao-ssp-free", intervals=11, samples_per_interval=5)

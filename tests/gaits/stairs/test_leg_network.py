@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from casadi import SX
 
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.gaits.stairs.leg_network import NetworkSettings, compute_leg_rates, compute_leg_vector, train_angles
 
@@ -69,9 +68,3 @@ def test_rates_of_the_leg_move_its_ankle_as_requested() -> None:
     at = ca.Function("moved", [angles, velocity], [moved, rates])
     assert at([1.2, 2.0], [0.3, -0.7])[0].full().ravel() == pytest.approx([0.3, -0.7], rel=1e-5)
     assert np.isfinite(at([1.2, 1.2], [0.3, -0.7])[1].full()).all()  # a straight knee
-
-
-@pytest.mark.parametrize("bad", [{"rule": "newton"}, {"rate": 0.0}, {"hidden": 0}, {"tolerance_m2": -1.0}])
-def test_settings_that_are_not_allowed(bad: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="must be"):
-        NetworkSettings(**bad)

@@ -12,7 +12,6 @@ from compare.judge import evaluate
 from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
 from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.stairs.planar_biped import load_toe_foot_biped
 from nlp_gait.gaits.stairs.stair import CASES, PAPER_TIMES
@@ -101,9 +100,3 @@ def test_signals_have_one_row_for_each_sample(problem: GaitProblem) -> None:
     assert len(jumps) == 3  # both sides of each knot
     assert np.abs(arrays["q"][jumps] - arrays["q"][jumps + 1]).max() < 1e-9
     assert np.abs(arrays["qd"][jumps] - arrays["qd"][jumps + 1]).max() < 1e-9
-
-
-@pytest.mark.parametrize("options", [{"intervals": 10}, {"intervals": 0}, {"minimise": "time"}])
-def test_options_that_are_not_allowed(options: dict[str, int | str]) -> None:
-    with pytest.raises(InputError, match="must be"):
-        nlp_gait.load("stairs-plan", **options)

@@ -8,7 +8,6 @@ import pytest
 import nlp_gait
 from metaheuristics import AntColony, minimize
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 
 # Stiff gains follow the plan of case 2 within 0.05 rad.
@@ -166,17 +165,3 @@ def test_the_network_in_place_of_the_closed_form(problem: GaitProblem) -> None:
 def test_ipopt_solves_with_the_network() -> None:
     short = nlp_gait.load("stairs-track", duration_s=0.02, inverse_kinematics="network")
     assert nlp_gait.solve(short, x0=[60.0, 60.0, 1.4], solver=INTERPRETED).converged
-
-
-def test_start_points_are_near_gains_that_hold_the_robot(problem: GaitProblem) -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        kp, kd, torso = problem.start_point(rng)
-        assert 30.0 < min(kp, kd) <= max(kp, kd) < 90.0
-        assert 1.1 < torso < 1.7
-
-
-@pytest.mark.parametrize("options", [{"coordinates": "link"}, {"inverse_kinematics": "newton"}, {"duration_s": 0.0}])
-def test_options_that_are_not_allowed(options: dict[str, str | float]) -> None:
-    with pytest.raises(InputError, match="must be"):
-        nlp_gait.load("stairs-track", **options)
