@@ -11,42 +11,26 @@ from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem, load
 from tests.backends.toys import corner, toy
 
-SINGLE_SUPPORT_NAMES = (
-    "hip_height_m",
-    "hip_vz_start_m_s",
-    "hip_vz_end_m_s",
-    "hip_vx_start_m_s",
-    "hip_vx_end_m_s",
-    "hip_vy_start_m_s",
-    "hip_vy_end_m_s",
-    "swing_height_m",
-    "single_support_time_s",
-)
-
-
-def test_the_variables_of_single_support_have_the_papers_order_and_bounds() -> None:
-    problem = load("nao-ssp")
-    assert problem.names == SINGLE_SUPPORT_NAMES
-    assert problem.lower.tolist() == [0.25, -0.05, -0.05, 0.001, 0.001, -0.2, -0.2, 0.015, 0.4]
-    assert problem.upper.tolist() == [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 0.03, 4.0]
-
-
-def test_the_variables_of_double_support_have_the_papers_order_and_bounds() -> None:
-    problem = load("nao-dsp")
-    assert problem.names == (*SINGLE_SUPPORT_NAMES[:7], "double_support_time_s")
-    assert problem.lower.tolist() == [0.25, -0.05, -0.05, 0.001, 0.001, -0.2, -0.2, 0.2]
-    assert problem.upper.tolist() == [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, 2.0]
+HIP = [f"hip_v{axis}_{end}_m_s" for axis in "zxy" for end in ("start", "end")]
 
 
 @pytest.mark.parametrize(
-    ("name", "limits"),
-    [("nao-ssp", (1.2, 0.0, 0.0, 0.05, 0.02, 0.025)), ("nao-dsp", (1.2, 0.0, 0.0, 0.08, 0.08, 0.025))],
+    ("name", "last", "lower", "upper", "limits"),
+    [
+        ("nao-ssp", ["swing_height_m", "single_support_time_s"], [0.015, 0.4], [0.03, 4.0], (0.05, 0.02)),
+        ("nao-dsp", ["double_support_time_s"], [0.2], [2.0], (0.08, 0.08)),
+    ],
 )
-def test_limits_default_to_the_papers(name: str, limits: tuple[float, ...]) -> None:
+def test_variables_bounds_and_limits_are_the_papers(
+    name: str, last: list[str], lower: list[float], upper: list[float], limits: tuple[float, float]
+) -> None:
     problem = load(name)
+    assert problem.names == ("hip_height_m", *HIP, *last)
+    assert problem.lower.tolist() == [0.25, -0.05, -0.05, 0.001, 0.001, -0.2, -0.2, *lower]
+    assert problem.upper.tolist() == [0.31, 0.05, 0.05, 0.2, 0.2, 0.2, 0.2, *upper]
     margins = [f"dbm_{axis}_{kind}_limit_m" for kind in ("min", "mean") for axis in "xy"]
     got = [problem.value(key) for key in ("torque_change_limit_Nm", *margins, "heat_loss_W_per_Nm2")]
-    assert tuple(got) == limits
+    assert got == [1.2, 0.0, 0.0, *limits, 0.025]
 
 
 def test_a_copy_with_other_values_shares_what_was_built_and_leaves_the_first_alone() -> None:
@@ -116,20 +100,6 @@ def test_unknown_names_get_the_nearest_ones() -> None:
         ([1.0, np.nan], "x of toy: y must be finite, got nan"),
         ([np.inf, 1.0], "x of toy: x must be finite, got inf"),
         (["a", "b"], "x of toy must be numbers, got list"),
-    ],
-)
-def test_invalid_points_are_refused(x: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        toy(corner).check_x(x)
-
-
-def test_a_point_may_be_given_by_name_in_any_order() -> None:
-    assert toy(corner).check_x({"y": 2.0, "x": 1.0}).tolist() == [1.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("x", "message"),
-    [
         ({"x": 1.0}, "x of toy must name every variable once; missing: y, unknown: none"),
         ({"x": 1.0, "y": 2.0, "z": 3.0}, "missing: none, unknown: z"),
         ({"x": 1.0, "Y": 2.0}, "missing: y, unknown: Y"),
@@ -138,7 +108,8 @@ def test_a_point_may_be_given_by_name_in_any_order() -> None:
         ({"x": 1.0, "y": "far"}, "x of toy must be numbers, got list"),
     ],
 )
-def test_a_point_by_name_says_what_is_missing_or_unknown(x: dict[str, Any], message: str) -> None:
+def test_invalid_points_are_refused(x: Any, message: str) -> None:
+    assert toy(corner).check_x({"y": 2.0, "x": 1.0}).tolist() == [1.0, 2.0]  # by name in any order
     for read in (toy(corner).check_x, toy(corner).at):
         with pytest.raises(InputError, match=message):
             read(x)

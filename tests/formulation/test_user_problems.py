@@ -220,19 +220,9 @@ def test_a_source_is_the_file_and_the_files_next_to_it_that_it_imports(tmp_path:
     assert hash_with(**{"own.py": f"{text}def"}) not in changed  # also where it cannot be parsed
 
 
-@pytest.mark.parametrize(
-    ("text", "is_one"),
-    [
-        ("own.py:leg", True),
-        ("a/b c.py:leg", True),
-        ("pkg.mod:leg", True),
-        ("nao-ssp", False),
-        ("a b:leg", False),
-        ("own.py:", False),
-    ],
-)
-def test_references_have_a_form(text: str, is_one: bool) -> None:
-    assert is_reference(text) is is_one
+def test_references_have_a_form() -> None:
+    assert all(map(is_reference, ("own.py:leg", "a/b c.py:leg", "pkg.mod:leg")))
+    assert not any(map(is_reference, ("nao-ssp", "a b:leg", "own.py:")))
 
 
 def test_a_files_path_is_made_absolute_and_a_modules_name_is_not(

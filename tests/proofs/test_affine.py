@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,8 +14,158 @@ from casadi import SX
 import nlp_gait
 from nlp_gait.backends.kernel.kernel_source import build_kernel
 from nlp_gait.errors import InputError
-from nlp_gait.proofs.affine import AffineFunction
-from tests.proofs.enclosed_operations import AFFINE, QUADRATIC, find_lost_values
+from nlp_gait.proofs.affine import AffineForms, AffineFunction
+from nlp_gait.proofs.quadratic import QuadraticForms, QuadraticFunction
+
+flint = pytest.importorskip("flint")
+arb, ctx, fmpq = flint.arb, flint.ctx, flint.fmpq
+PRECISION = 200  # bits
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Range = tuple[float, float]
+# The operation in CasADi, the same in arb, and the range of its arguments.
+Operation = tuple[Callable[..., Any], Callable[..., Any], Range]
+
+
+def remainder(x: arb, divisor: float) -> arb:
+    """Return the remainder of a division with the sign of x."""
+    exact, part = exact_ends(x)[0], Fraction(divisor)
+    rest = exact - (1 if exact > 0 else -1) * (abs(exact) // part) * part
+    return arb(fmpq(rest.numerator, rest.denominator))
+
+
+def unary(name: str, range_: Range, exact: str = "") -> Operation:
+    return lambda x, y: getattr(ca, name)(x), lambda x, y: getattr(x, exact or name)(), range_
+
+
+def same(formula: Callable[..., Any], range_: Range) -> Operation:
+    return formula, formula, range_
+
+
+BOTH: dict[str, Operation] = {
+    "add": same(lambda x, y: x + y, (-1e3, 1e3)),
+    "sub": same(lambda x, y: x - y, (-1e3, 1e3)),
+    "mul": same(lambda x, y: x * y, (-1e3, 1e3)),
+    "div": same(lambda x, y: x / y, (0.01, 1e3)),
+    "divided by a negative": same(lambda x, y: x / (-y), (0.01, 1e3)),
+    "tiny product": same(lambda x, y: x * 1e-200 * (y * 1e-200) * 1e300, (-1.0, 1.0)),
+    "sq": same(lambda x, y: x**2, (-1e3, 1e3)),
+    "sqrt": unary("sqrt", (0.0, 1e3)),
+    "fabs": unary("fabs", (-1.0, 1.0), "__abs__"),
+}
+AFFINE: dict[str, Operation] = {
+    **BOTH,
+    "cube": same(lambda x, y: x**3, (-10.0, 10.0)),
+    **{name: unary(name, (-10.0, 10.0)) for name in ("sin", "cos")},
+    "tan": unary("tan", (-1.5, 1.5)),
+    **{name: unary(name, (-1.0, 1.0)) for name in ("asin", "acos")},
+    **{name: unary(name, (-20.0, 20.0)) for name in ("atan", "exp")},
+    "atan2": (lambda x, y: ca.atan2(x, y), lambda x, y: arb.atan2(x, y), (-5.0, 5.0)),
+    "log": unary("log", (1e-3, 1e3)),
+    **{name: unary(name, (-5.0, 5.0)) for name in ("tanh", "sinh", "cosh", "floor")},
+    "fmin": (lambda x, y: ca.fmin(x, y), lambda x, y: x.min(y), (-1.0, 1.0)),
+    "fmax": (lambda x, y: ca.fmax(x, y), lambda x, y: x.max(y), (-1.0, 1.0)),
+    "sign": unary("sign", (-1.0, 1.0), "sgn"),
+    "fmod": (lambda x, y: ca.fmod(x, 0.7), lambda x, y: remainder(x, 0.7), (-5.0, 5.0)),
+    "if_else_zero": (lambda x, y: ca.if_else(x >= 0, y, 0), lambda x, y: y if x >= 0 else arb(0), (-1.0, 1.0)),
+    "composed": (
+        lambda x, y: ca.sin(x * y) / (1.5 + ca.cos(x) * y) - ca.sqrt(x * x + 1) * (x - y),
+        lambda x, y: (x * y).sin() / (1.5 + x.cos() * y) - (x * x + 1).sqrt() * (x - y),
+        (-1.0, 1.0),
+    ),
+}
+# The minimum of x and a number is taken as x: only points at which that is true count.
+QUADRATIC: dict[str, Operation] = {
+    **BOTH,
+    "larger than a number": (lambda x, y: ca.fmax(x, 0.1), lambda x, y: x.max(arb(0.1)), (-1.0, 1.0)),
+    "at most a number": (lambda x, y: ca.fmin(x, 2.0) * y, lambda x, y: x * y, (-1.0, 1.0)),
+    "only below a number": (
+        lambda x, y: ca.if_else(x < 0.1, y, 0),
+        lambda x, y: y if x < arb(0.1) else arb(0),
+        (-1.0, 1.0),
+    ),
+    "composed": (
+        lambda x, y: x * y / (1.5 + x * y * y) - ca.sqrt(x * x + 1) * (x - y) * y,
+        lambda x, y: x * y / (1.5 + x * y * y) - (x * x + 1).sqrt() * (x - y) * y,
+        (-1.0, 1.0),
+    ),
+    "composed of squares": same(lambda x, y: (x - y) ** 2 - x**2 + 2 * x * y - y**2 + 1 / (2 + x), (-1.0, 1.0)),
+}
+
+
+def exact_ends(value: arb) -> tuple[Fraction, Fraction]:
+    """Return the rational ends of a ball."""
+    ends = (end.man_exp() for end in (value.lower(), value.upper()))
+    low, high = (Fraction(int(m)) * Fraction(2) ** int(e) for m, e in ends)
+    return low, high
+
+
+def random_boxes(range_: Range, count: int, rng: np.random.Generator) -> Array:
+    """Return (count, 2, 2) boxes of two arguments: points, tiny ones, and up to the whole range."""
+    low, high = range_
+    middle = rng.uniform(low, high, (count, 2))
+    half = (high - low) * 10.0 ** rng.uniform(-17, 0.3, (count, 1)) * rng.uniform(0.1, 1.0, (count, 2))
+    half[rng.random((count, 2)) < 0.1] = 0.0
+    middle[rng.random((count, 2)) < 0.02] = low
+    return np.stack([np.clip(middle - half, low, high), np.clip(middle + half, low, high)], -1)
+
+
+def find_lost_values(name: str, count: int, rng: np.random.Generator, *, quadratic: bool = False) -> Iterator[str]:
+    """Describe random points of random boxes at which the exact value of an operation is not enclosed."""
+    operation, exact, range_ = (QUADRATIC if quadratic else AFFINE)[name]
+    x = ca.SX.sym("x", 2)
+    expression = ca.Function("operation", [x], [ca.SX(operation(x[0], x[1]))])
+    boxes = random_boxes(range_, count, rng)
+    forms = QuadraticFunction(expression)(boxes) if quadratic else AffineFunction(expression)(boxes, np.arange(2))
+    for k, box in enumerate(boxes):
+        point = np.clip(rng.uniform(box[:, 0], box[:, 1]), box[:, 0], box[:, 1])
+        if rng.random() < 0.2:
+            point = box[np.arange(2), rng.integers(0, 2, 2)]
+        with ctx.workprec(PRECISION):
+            value = exact(*(arb(v) for v in point.tolist()))
+            if not value.is_finite():
+                continue
+            low, high = exact_ends(value)
+        in_range = forms.lower[k, 0] <= high and low <= forms.upper[k, 0]
+        if not (in_range and is_in_form(forms, k, box, point, low, high)):
+            yield f"{name} at {point.tolist()} of {box.tolist()}: {value}"
+
+
+def is_in_form(
+    forms: AffineForms | QuadraticForms, k: int, box: Array, point: Array, low: Fraction, high: Fraction
+) -> bool:
+    """Return whether a value between two ends is enclosed by a form at a point of its box, in exact arithmetic."""
+    if not np.isfinite(forms.error[k, 0]):
+        return True
+    half_width = quadratic_reach if isinstance(forms, QuadraticForms) else affine_reach
+    e = []
+    for (lower, upper), at in zip(box.tolist(), point.tolist(), strict=True):
+        centre = 0.5 * lower + 0.5 * upper
+        half = half_width(lower, upper, centre)
+        e.append((Fraction(at) - Fraction(centre)) / Fraction(half) if half else Fraction(0))
+    value = Fraction(float(forms.middle[k, 0]))
+    value += sum(Fraction(slope) * at for slope, at in zip(forms.slopes[k, 0].tolist(), e, strict=True))
+    if isinstance(forms, QuadraticForms):
+        pairs = [e[i] * e[j] for j in range(len(e)) for i in range(j + 1)]
+        value += sum(Fraction(bend) * pair for bend, pair in zip(forms.bends[k, 0].tolist(), pairs, strict=True))
+    error = Fraction(float(forms.error[k, 0]))
+    return value - error <= high and low <= value + error
+
+
+def affine_reach(low: float, high: float, centre: float) -> float:
+    """Return half the width of a box as ``reach`` in native/affine.hpp rounds it up."""
+    if low == high:
+        return 0.0
+    far = max(high - centre, centre - low)
+    for _ in range(2):
+        far += 2.0**-52 * abs(far) + 2.0**-1074
+    return far
+
+
+def quadratic_reach(low: float, high: float, centre: float) -> float:
+    """Return the same for ``reach`` in native/quadratic.hpp."""
+    far = max(high - centre, centre - low)
+    return far + (2.0**-51 * abs(far) + 1e-290)
+
 
 SEED = 7
 EACH = 50  # points of each operation

@@ -103,35 +103,15 @@ def test_summaries_by_hand() -> None:
 
 
 @pytest.mark.slow
-def test_table_of_solvers(tables: Tables) -> None:
-    assert tables.row("swarm") == [
-        "swarm",
-        "4",
-        "4/4",
-        "4/4",
-        "-",
-        "10.050000 W",
-        "10.050000 W",
-        "10.550000 W",
-        "12.000000 W",
-        "5.5000 %",
-        "500",
-        "5.000 s",
-    ]
-    assert tables.row("newton") == [
-        "newton",
-        "3",
-        "3/3",
-        "2/3",
-        "-",
-        "9.500000 W",
-        "10.000000 W",
-        "10.000000 W",
-        "10.000000 W",
-        "0.0000 %",
-        "52",
-        "0.500 s",
-    ]
+@pytest.mark.parametrize(
+    "row",
+    [
+        "swarm|4|4/4|4/4|-|10.050000 W|10.050000 W|10.550000 W|12.000000 W|5.5000 %|500|5.000 s",
+        "newton|3|3/3|2/3|-|9.500000 W|10.000000 W|10.000000 W|10.000000 W|0.0000 %|52|0.500 s",
+    ],
+)
+def test_table_of_solvers(tables: Tables, row: str) -> None:
+    assert "|".join(tables.row(row.partition("|")[0])) == row
 
 
 def test_expected_running_times(tables: Tables) -> None:
