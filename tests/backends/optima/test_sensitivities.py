@@ -53,23 +53,19 @@ def slope(problem: GaitProblem, near: Outcome, name: str) -> tuple[float, np.nda
     return problem.objective.sign * (high.cost - low.cost) / (2 * STEP), (high.x - low.x) / (2 * STEP)
 
 
-def test_a_corner_of_absolute_values_moves_with_its_limit() -> None:
-    """3 (limit - 1) at (limit, limit)."""
-    at = found(toy(corner, limit=1.5))
+@pytest.mark.parametrize(
+    ("limit", "price", "moves"), [(1.5, 3.0, 1.0), (0.5, 0.0, 0.0)], ids=["binds", "does not bind"]
+)
+def test_a_corner_of_absolute_values_moves_with_its_limit(limit: float, price: float, moves: float) -> None:
+    """3 (limit - 1) at (limit, limit), down to limit 1, where the kinks of |x - 1| and |y - 1| hold it, and up to x = 2."""
+    at = found(toy(corner, limit=limit))
     answer = differentiate_by_parameters(at)
-    assert at.objective == pytest.approx(1.5)
-    np.testing.assert_allclose(answer.objective, [3.0, 0.0, 0.0, 0.0, 0.0], atol=1e-8)
-    np.testing.assert_allclose(answer.x[:, 0], [1.0, 1.0], atol=1e-8)
-    # Down to limit 1, where the kinks of |x - 1| and |y - 1| hold it, and up to x = 2, its bound.
-    np.testing.assert_allclose(answer.reach[:, 0], [-0.5, 0.5], atol=1e-6)
-
-
-def test_a_limit_that_does_not_bind_costs_nothing() -> None:
-    at = found(toy(corner, limit=0.5))
-    answer = differentiate_by_parameters(at)
-    np.testing.assert_allclose(answer.objective, 0.0, atol=1e-8)
-    np.testing.assert_allclose(answer.x, 0.0, atol=1e-8)
-    assert answer.reach[1, 0] == pytest.approx(0.5)
+    assert at.objective == pytest.approx(price * (limit - 1.0), abs=1e-8)
+    np.testing.assert_allclose(answer.objective, [price, 0.0, 0.0, 0.0, 0.0], atol=1e-8)
+    np.testing.assert_allclose(answer.x, np.outer([moves, moves], [1.0, 0.0, 0.0, 0.0, 0.0]), atol=1e-8)
+    assert answer.reach[1, 0] == pytest.approx(0.5, abs=1e-6) and (
+        not moves or answer.reach[0, 0] == pytest.approx(-0.5, abs=1e-6)
+    )
 
 
 def test_a_maximised_objective_keeps_its_sign() -> None:

@@ -29,8 +29,7 @@ def rough(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> Result:
 def test_an_acceptable_level_counts_as_converged_and_says_so() -> None:
     solution = solve(toy(rough), solver=IpoptSettings(tolerance=1e-14))
     assert solution.converged
-    assert solution.status == "converged to IPOPT's acceptable level only"
-    assert solution.starts[0].status == solution.status
+    assert solution.status == solution.starts[0].status == "converged to IPOPT's acceptable level only"
 
 
 def test_a_point_that_is_feasible_but_not_converged_is_called_that() -> None:
@@ -93,32 +92,16 @@ def test_a_row_without_a_value_is_violated_and_named() -> None:
 
 def end(claimed: bool, cost: float, violation: float) -> Outcome:
     """An outcome with what its rank depends on."""
-    none = np.zeros(0)
-    return Outcome(
-        solver="any",
-        x0=none,
-        x=none,
-        claimed=claimed,
-        status="",
-        objective=cost,
-        cost=cost,
-        violation=violation,
-        iterations=0,
-        evaluations=Evaluations(),
-        time_s=0.0,
+    none, rest = (
+        np.zeros(0),
+        {"iterations": 0, "evaluations": Evaluations(), "time_s": 0.0, "solver": "any", "status": ""},
     )
+    return Outcome(x0=none, x=none, claimed=claimed, objective=cost, cost=cost, violation=violation, **rest)  # type: ignore[arg-type]
 
 
 def test_outcomes_rank_by_convergence_then_feasibility_then_violation() -> None:
-    ranked = [
-        end(True, 2.0, 0.0),
-        end(True, 3.0, 1e-7),
-        end(False, 0.0, 0.0),
-        end(False, 1.0, 1e-7),
-        end(True, 9.0, 0.1),
-        end(False, 0.0, 0.2),
-        end(False, 0.0, math.nan),
-    ]
+    ranked = [end(True, 2.0, 0.0), end(True, 3.0, 1e-7), end(False, 0.0, 0.0), end(False, 1.0, 1e-7)]
+    ranked += [end(True, 9.0, 0.1), end(False, 0.0, 0.2), end(False, 0.0, math.nan)]
     ranks = [item.rank for item in ranked]
     assert ranks == sorted(ranks)
     assert len(set(ranks)) == len(ranks)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -74,7 +74,7 @@ def test_prices_are_what_a_changed_limit_costs(phase: str, request: pytest.Fixtu
 
 def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Solution]) -> None:
     problem, solution = single_support
-    counts = dataclasses.asdict(solution.evaluations)
+    counts = asdict(solution.evaluations)
     assert counts.keys() == {"f", "g", "gradient", "jacobian", "hessian"}
     assert all(count >= solution.iterations > 0 for count in counts.values())
     assert solution.time_s.build > 0
@@ -107,6 +107,21 @@ def test_a_corner_by_hand(limit: float, objective: float, price: float | None) -
     prices = {bound.name: (bound.side, bound.bound, bound.price_unit) for bound in solution.active_constraints}
     assert prices == ({"row": ("lower", limit, "J per m")} if price else {})
     assert [bound.price for bound in solution.active_constraints] == pytest.approx([price] if price else [], abs=1e-5)
+
+
+def on_a_line(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
+    """Distance from (1, 1) squared where x + y equals the limit, and x may not pass 0.2 below it."""
+    return (x - 1) ** 2 + (y - 1) ** 2, (
+        row(x + y, lower=limit, upper=limit),
+        replace(row(x, upper=limit - 0.3), name="most"),
+    )
+
+
+@pytest.mark.parametrize(("fix", "expected"), [({}, "most"), ({"x": 0.1}, "bounds[x]")])
+def test_equations_are_left_out(fix: dict[str, float], expected: str) -> None:
+    solution = solve(toy(on_a_line), x0=[0.1, 0.1], fix=fix)
+    assert solution.converged, solution.status
+    assert [(bound.name, bound.side) for bound in solution.active_constraints] == [(expected, "upper")]
 
 
 def test_a_corner_out_of_reach_is_missed_by_what_it_is_out_of_reach() -> None:

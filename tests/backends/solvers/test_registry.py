@@ -34,16 +34,9 @@ class Corners(Solver):
     name: ClassVar[str] = "corners"
 
     def run(self, problem: GaitProblem, x0: Array, stop: Callable[[], bool] = never) -> Outcome:
+        x, work = np.maximum(problem.value("limit"), np.ones(2)), Evaluations(f=1)
         return judge_point(
-            self.name,
-            problem,
-            x0,
-            np.maximum(problem.value("limit"), np.ones(2)),
-            claimed=True,
-            status="tried",
-            iterations=1,
-            evaluations=Evaluations(f=1),
-            time_s=0.0,
+            self.name, problem, x0, x, claimed=True, status="tried", iterations=1, evaluations=work, time_s=0.0
         )
 
 

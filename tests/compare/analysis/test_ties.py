@@ -11,7 +11,6 @@ import pytest
 from compare.analysis.best_known import ZERO, compute_gap
 from compare.analysis.comparison import compare_problems
 from compare.analysis.record_statistics import tie
-from compare.analysis.units import format_percent, with_unit
 from compare.analysis.verdict import compare_pairs, write_verdict
 from compare.study.record import RunRecord
 from nlp_gait.formulation import Objective
@@ -84,15 +83,3 @@ def test_ties_keep_the_order_of_all_other_values() -> None:
             assert (a < c) <= (b <= d) and (b == a or 0.0 < a - b <= 1e-6 * scale)
             assert a == c or abs(a - c) <= 1e-6 * scale or b != d
     assert flat[-1] == math.inf and tie([[math.inf], [math.inf]], math.nan) == [[math.inf], [math.inf]]
-
-
-VALUES = [(0.0, "0.000000 W"), (1e-16, "1e-16 W"), (-2e-9, "-2e-09 W"), (1e267, "1e+267 W"), (0.8458681, "0.845868 W")]
-
-
-@pytest.mark.parametrize(("value", "text"), VALUES)
-def test_values_near_zero_and_huge_ones_have_digits_that_mean_something(value: float, text: str) -> None:
-    assert with_unit(value, "W") == text
-
-
-def test_percent_of_nothing() -> None:
-    assert format_percent(None) == format_percent(math.inf) == "-"

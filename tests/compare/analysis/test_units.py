@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from compare.analysis.units import format_millimetres, format_number, format_seconds, with_unit
+from compare.analysis.units import format_millimetres, format_number, format_percent, format_seconds, with_unit
 
 
 @pytest.mark.parametrize(
@@ -27,11 +27,10 @@ def test_what_is_rounded_to_zero_has_no_sign(value: float, digits: str, shown: s
     assert format_number(value, digits) == shown
 
 
-def test_units_follow_numbers() -> None:
-    assert (
-        with_unit(-1e-9, "W", ".3f") == "0.000 W"
-        and with_unit(-1e-9, "W") == "-1e-09 W"
-        and with_unit(-1e-9, "1", "g") == "-1e-09"
-    )
+def test_units_follow_numbers_whose_digits_mean_something() -> None:
+    shown = {0.0: "0.000000 W", 1e-16: "1e-16 W", -2e-9: "-2e-09 W", 1e267: "1e+267 W", 0.8458681: "0.845868 W"}
+    assert {value: with_unit(value, "W") for value in shown} == shown
+    assert (with_unit(-1e-9, "W", ".3f"), with_unit(-1e-9, "1", "g")) == ("0.000 W", "-1e-09")
     assert format_millimetres(-1e-6) == "0.0 mm" and format_millimetres(None) == "-"
     assert format_seconds(-0.0) == "0.000 s" and format_seconds(math.nan) == "-"
+    assert format_percent(None) == format_percent(math.inf) == "-"
