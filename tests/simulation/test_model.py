@@ -26,8 +26,6 @@ NAO = load_robot("nao-v5")
     ("make", "words"),
     [
         (lambda: Drive(torque_limits="peak"), "urdf, stall, continuous, got 'peak'"),
-        (lambda: Drive(period_s=0.0), "period_s of a drive must be > 0"),
-        (lambda: Drive(full_error_rad=float("nan")), "full_error_rad"),
         (lambda: Conditions(friction=-1.0), "friction must be > 0, got -1.0"),
         (lambda: Conditions(slope_rad=(2.0, 0.0)), "slope_rad"),
         (lambda: make_shapes(NAO, "oval"), "rectangle, polygon, got 'oval'"),

@@ -12,7 +12,6 @@ import pytest
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.nlp import build_nlp
 from nlp_gait.backends.solve import solve
-from nlp_gait.errors import InputError
 from nlp_gait.formulation import load
 from tests.evaluation import evaluated
 
@@ -84,20 +83,3 @@ def test_an_unreachable_pose_says_which_leg_and_sample() -> None:
     assert np.isfinite(found.cost)
     assert found.violation > 0
     assert any(name.startswith(("reach[left leg, ", "reach[right leg, ")) for name in found.broken)
-
-
-def test_a_robot_without_arms_does_not_suit_the_problems(tmp_path: Path) -> None:
-    inertia = [1e-3, 1e-3, 1e-3, 0, 0, 0]
-    foot = {"ankle_height_m": 0.05, "front_m": 0.1, "back_m": 0.05, "left_m": 0.04, "right_m": 0.04, "link": "torso"}
-    raw = {
-        "schema": 1,
-        "name": "stump",
-        "root": "torso",
-        "links": {"torso": {"mass_kg": 1.0, "com_m": [0, 0, 0], "inertia_com_kgm2": inertia}},
-        "joints": {},
-        "feet": {"left": foot, "right": foot},
-    }
-    path = tmp_path / "stump.json"
-    path.write_text(json.dumps(raw), encoding="utf-8")
-    with pytest.raises(InputError, match="robot 'stump' does not suit the NAO problems: unknown joint"):
-        load("nao-ssp", robot=str(path))
