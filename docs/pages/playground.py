@@ -26,6 +26,7 @@ from nlp_gait.formulation import InstantPoint
 from nlp_gait.gaitbench import load
 from nlp_gait.gaitbench.c_export import export_objective, make_prefix
 from nlp_gait.gaitbench.instance import Instance
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.curves import make_grid
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.phase import Phase
@@ -144,7 +145,7 @@ def make_phase(instance: Instance) -> Phase:
     options = instance.definition.options
     body = make_nao(str(options["robot"]))
     step_m, grid = float(options["step_length_m"]), make_grid("cubic", 10, 0)
-    return make_support_phase(body, "ssp", step_m, "cubic", grid, make_goal(body, "power"))
+    return make_support_phase(body, Support.SINGLE, step_m, "cubic", grid, make_goal(body, "power"))
 
 
 @dataclass(frozen=True, kw_only=True)
