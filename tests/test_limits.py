@@ -158,9 +158,18 @@ def test_values_and_options_are_kept_and_problems_can_be_pickled() -> None:
     problem = nlp_gait.load("nao-dsp", intervals=3).with_values(dbm_y_mean_limit_m=0.07)
     limited = problem.with_limits(double_support=[FrictionCone()])
     assert limited.value("dbm_y_mean_limit_m") == 0.07 and limited.options["intervals"] == 3
-    assert limited.options["limits"] == "FrictionCone"
+    assert limited.options["limits"] == "double_support:FrictionCone"
     again = pickle.loads(pickle.dumps(limited))
     assert build_exact_model(again).row_names == build_exact_model(limited).row_names
+
+
+def test_limits_of_one_kind_of_phase_are_loaded_again_as_such() -> None:
+    cycle = nlp_gait.load("nao-cycle", intervals=2)
+    limited = cycle.with_limits(single_support=[FrictionCone(), FootClearance()], double_support=[FootClearance()])
+    assert limited.options["limits"] == "single_support:FrictionCone,FootClearance"
+    rows = build_exact_model(limited).row_names
+    assert not any(row.startswith("dsp_friction[") for row in rows)
+    assert build_exact_model(nlp_gait.load("nao-cycle", **limited.options)).row_names == rows
 
 
 def test_a_recorded_motion_has_the_rows_too() -> None:

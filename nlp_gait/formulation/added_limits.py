@@ -8,6 +8,8 @@ import nlp_gait.user_code as user_code
 from nlp_gait.errors import InputError, unknown
 from nlp_gait.providers import LIMITS, import_object
 
+SINGLE, DOUBLE = "single_support:", "double_support:"  # in front of a name: the limit is of these phases only
+
 
 @dataclass(frozen=True, kw_only=True)
 class AddedLimits:
@@ -39,32 +41,48 @@ def make_added_limits(single_support: Iterable[Any], double_support: Iterable[An
     for limit in (*single, *double):
         if isinstance(limit, type) or not callable(getattr(limit, "add", None)):
             raise InputError(f"a limit must be an object with a method add, got {limit!r}; for example FrictionCone()")
-    names = [type(limit).__name__ for limit in (*single, *double)]
+    of_single, of_double = ([type(limit).__name__ for limit in limits] for limits in (single, double))
+    names = [name if name in of_double else f"{SINGLE}{name}" for name in of_single]
+    names += [f"{DOUBLE}{name}" for name in of_double if name not in of_single]
     return AddedLimits(single_support=single, double_support=double, names=tuple(dict.fromkeys(names)))
 
 
 def parse_limits(value: str | AddedLimits) -> AddedLimits:
     """Return the limits of an option: objects, or names separated by commas, of limits that every phase gets.
 
-    A name is that of a limit of this package, of an installed package's entry point, or ``file.py:name`` or ``module:name`` of a
-    class without required arguments. Raises UnknownNameError, and UserCodeError for code that is not found or fails.
+    After ``single_support:`` or ``double_support:`` a limit is of these phases only. A name is that of a limit of this package,
+    of an installed package's entry point, or ``file.py:name`` or ``module:name`` of a class without required arguments. Raises
+    UnknownNameError, and UserCodeError for code that is not found or fails.
     """
     if isinstance(value, AddedLimits):
         return value
-    names = tuple(name.strip() for name in value.split(",") if name.strip())
-    limits = tuple(_load_limit(name) for name in names)
-    return AddedLimits(single_support=limits, double_support=limits, names=names)
+    parts = _split_names(value)
+    limits = [(phase, _load_limit(name)) for phase, name in parts]
+    return AddedLimits(
+        single_support=tuple(limit for phase, limit in limits if phase != DOUBLE),
+        double_support=tuple(limit for phase, limit in limits if phase != SINGLE),
+        names=tuple(phase + name for phase, name in parts),
+    )
 
 
 def resolve_limits(text: str, owner: str) -> str:
     """Return names of limits in a data file (the owner) as the user gave them; raises as ``resolve_code``."""
-    return ",".join(user_code.resolve_code(name.strip(), "limit", owner) for name in text.split(",") if name.strip())
+    return ",".join(phase + user_code.resolve_code(name, "limit", owner) for phase, name in _split_names(text))
 
 
 def hash_limits(text: str) -> str:
-    """Return a hash of the user's code that names of limits refer to, "" if there is none."""
-    own = [name.strip() for name in text.split(",") if user_code.is_reference(name.strip())]
-    return ",".join(user_code.hash_source(name, "limit") for name in own)
+    """Return the hashes of user code among names of limits, or an empty text."""
+    references = [name for _, name in _split_names(text) if user_code.is_reference(name)]
+    return ",".join(user_code.hash_source(name, "limit") for name in references)
+
+
+def _split_names(text: str) -> list[tuple[str, str]]:
+    """Return the prefix that restricts a limit to some phases, or an empty text, and its name."""
+    parts = []
+    for name in filter(None, map(str.strip, text.split(","))):
+        phase = next((prefix for prefix in (SINGLE, DOUBLE) if name.startswith(prefix)), "")
+        parts.append((phase, name.removeprefix(phase)))
+    return parts
 
 
 def _load_limit(name: str) -> Any:
