@@ -11,7 +11,6 @@ from importlib.metadata import distributions, version
 from importlib.resources import files
 from pathlib import Path
 
-from compare.analysis.tuning import FILE as TUNING
 from compare.archive.unpack import MANIFEST, ArchiveManifest, unpack_archive
 from compare.study.definition import SOURCE
 from compare.study.record import RunRecord, format_now, hash_installed_code
@@ -28,7 +27,7 @@ from nlp_gait.user_code import Kind, hash_source, is_user_code, list_source_file
 
 README, LOCK = "README.md", "requirements.txt"
 # Files of a study's folder next to its records; everything else in it stays out of the archive.
-PARTS = (FILE, TUNING, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
+PARTS = (FILE, "*.html", "*.md", "*.png", "*.svg", "*.csv", "better-*.json", "store/simulations/**/*")
 EPOCH = (1980, 1, 1, 0, 0, 0)  # time of all entries, so that equal studies give equal archives
 
 

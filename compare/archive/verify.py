@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.simulated_gaits import select_best_gaits
-from compare.analysis.tuning import read_tunings
 from compare.archive.unpack import unpack_archive
 from compare.report.study_report import make_study_document
 from compare.report.writing import render_markdown
@@ -162,7 +161,7 @@ def _check_report(folder: Path, records: Sequence[RunRecord]) -> str:
     """Write the report again, and compare its text."""
     comparisons = compare_problems(label_editions(records))
     simulated = load_simulations(folder, select_best_gaits(comparisons))
-    document = make_study_document(comparisons, read_manifest(folder), simulated, tunings=read_tunings(folder))
+    document = make_study_document(comparisons, read_manifest(folder), simulated)
     again = render_markdown(document).split("\n")
     known = read_text(folder / REPORT, "report").split("\n")
     for number, (a, b) in enumerate(zip_longest(known, again), start=1):

@@ -10,12 +10,11 @@ from compare.analysis.comparison import Comparison, compare_problems, index_solv
 from compare.analysis.overview import count_wins
 from compare.analysis.record_statistics import ECDF_TARGETS, TARGETS
 from compare.analysis.solver_table import count
-from compare.analysis.tuning import Tuning
 from compare.bench.baseline import EVALUATIONS, get_reference, load_baseline
 from compare.drawing.comparison_figures import plot_suite_ecdf
 from compare.report.document import Document, Figure, Section, Table, make_text_table
 from compare.report.provenance import TERMS
-from compare.report.solver_sections import make_tuning_section, make_wins_table
+from compare.report.solver_sections import make_wins_table
 from compare.study.record import RunRecord
 from nlp_gait import gaitbench
 
@@ -95,7 +94,7 @@ def _make_standings(comparisons: Sequence[Comparison]) -> list[Standing]:
 
 
 def make_leaderboard_page(
-    board: Leaderboard, solver: str | None, suite: str, evaluations: int = EVALUATIONS, tunings: Sequence[Tuning] = ()
+    board: Leaderboard, solver: str | None, suite: str, evaluations: int = EVALUATIONS
 ) -> Document:
     """Return the page of a leaderboard on a suite, or on that of a solver if it is not None."""
     count_of = len(board.comparisons)
@@ -115,7 +114,6 @@ def make_leaderboard_page(
                 drawing=plot_suite_ecdf(board.comparisons),
             ),
             *(() if solver is None else (make_wins_table(board.comparisons, solver),)),
-            *make_tuning_section(tunings),
             Section(title="Instance by instance", parts=(_make_instances_table(board, solver),)),
             Section(
                 title="How it was measured",

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from compare.analysis.tuning import read_tunings
 from compare.bench.baseline import BASELINE, EVALUATIONS, RUNS, choose_instances, make_bench_study
 from compare.cli.command import OUTPUT, command
 from compare.cli.compare import run_in_folder
@@ -134,7 +133,7 @@ def _rank(
             raise InputError(f"{name!r} is a solver of the baseline; give yours another name with --label")
         records = run_in_folder(settings, out, effort.jobs, effort.scheduler, tune, "rerun the command to continue")
     board = rank_solvers(instances, records, shipped=shipped)
-    page = make_leaderboard_page(board, name, chosen.title, effort.evaluations, read_tunings(out))
+    page = make_leaderboard_page(board, name, chosen.title, effort.evaluations)
     problems = [{"name": "gaitbench", "options": {"instance": id}} for id in instances]
     workers = effort.scheduler or str(effort.jobs or available_cores())
     written = write_document(out, add_session(page, describe_command(), problems, workers), "leaderboard")

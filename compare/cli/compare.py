@@ -10,7 +10,7 @@ import typer
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
-from compare.analysis.tuning import tune_solvers, write_tunings
+from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
 from compare.analysis.verdict import describe_best_known
 from compare.cli.command import OUTPUT, SESSION, command, get_marks
@@ -150,8 +150,7 @@ def run_in_folder(
     check_study(study)  # before the manifest names it
     if tune:
         with report_interrupts("interrupted while tuning; finished runs are stored; rerun the command to continue"):
-            settings, tunings = tune_solvers(study, settings, tune, say)
-        write_tunings(out, tunings)
+            settings = tune_solvers(study, settings, tune, say)
         study = replace(study, tasks=settings.tasks())
     write_manifest(out, settings, Session.begin(describe_command(), scheduler or str(study.jobs)))
     with show_progress("runs", len(study.tasks)) as advance:

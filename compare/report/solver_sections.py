@@ -1,12 +1,10 @@
-"""Sections on solvers over many problems: their median gaps and ranks, and tuned settings."""
+"""Sections on solvers over many problems: their median gaps and ranks."""
 
 import math
 from collections.abc import Mapping, Sequence
 
 from compare.analysis.comparison import Comparison
 from compare.analysis.overview import Ranking, count_wins, describe_tests, list_user_solvers
-from compare.analysis.tuning import Tuning, describe_choice
-from compare.analysis.units import join_words
 from compare.analysis.verdict import find_leaders
 from compare.drawing.comparison_figures import list_expected_costs, plot_critical_difference, plot_performance_profile
 from compare.report.document import Figure, Part, Section, Table, make_text_table
@@ -66,27 +64,3 @@ def make_wins_table(comparisons: Sequence[Comparison], solver: str) -> Table:
         "5 %, Holm-corrected over all pairs on the problem)"
     )
     return make_text_table(("against", "wins", "ties", "losses"), rows, caption)
-
-
-def make_tuning_section(tunings: Sequence[Tuning]) -> tuple[Section, ...]:
-    """Return the section, none without tunings."""
-    if not tunings:
-        return ()
-    rows = [
-        (
-            tuning.solver,
-            *(f"{area:.3f}" for area in tuning.area),
-            *(str(tuning.trials), f"{tuning.evaluations:,}".replace(",", " "), f"{tuning.time_s:.0f} s"),
-            describe_choice(tuning),
-        )
-        for tuning in tunings
-    ]
-    header = ("solver", "area before", "tuned", "trials", "evaluations", "time of all runs", "chosen settings")
-    words = (
-        f"A trial of a search is one run on each of {join_words(tunings[0].training)}, which are not judged here or have other "
-        "seeds. Optuna's tree-structured Parzen estimator proposes settings within their ranges, and the trial with the largest "
-        "mean area over the convergence curve (AOCC, from 0 to 1) gives the solver NAME-tuned. Its evaluations are spent before "
-        "the judged runs, and are not counted there."
-    )
-    table = make_text_table(header, rows, "Settings before and after tuning", prose=True)
-    return (Section(title="Tuning", parts=(words, table)),)

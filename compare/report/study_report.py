@@ -9,12 +9,11 @@ from compare.analysis.comparison import DEFAULT_WEIGHTING, Comparison, compare_p
 from compare.analysis.overview import rank_over_problems, write_overall_verdict
 from compare.analysis.record_statistics import Weighting
 from compare.analysis.simulated_gaits import select_best_gaits
-from compare.analysis.tuning import Tuning, read_tunings
 from compare.analysis.verdict import write_verdict
 from compare.report.document import Document, Section, make_table_section, make_text_table
 from compare.report.problem_section import HOW, make_problem_section
 from compare.report.provenance import TERMS, format_settings, make_solver_table
-from compare.report.solver_sections import make_overview, make_tuning_section
+from compare.report.solver_sections import make_overview
 from compare.report.study_files import FurtherFiles
 from compare.report.writing import make_citation_section, make_session_section, write_document
 from compare.study.evidence import Exclusion, read_evidence
@@ -50,7 +49,7 @@ def write_report(
     """Write the report with stored simulations, the figures as PNG and SVG, and further files; return all paths."""
     comparisons = compare_problems(records, weighting)
     simulated = load_simulations(folder, select_best_gaits(comparisons))
-    document = make_study_document(comparisons, manifest, simulated, excluded, read_tunings(folder))
+    document = make_study_document(comparisons, manifest, simulated, excluded)
     written = write_document(folder, document)
     return [*written, *write_better_points(folder, comparisons), *further.write(folder, comparisons)]
 
@@ -78,9 +77,8 @@ def make_study_document(
     manifest: Manifest,
     simulated: Sequence[SimulatedGait] = (),
     excluded: Sequence[Exclusion] = (),
-    tunings: Sequence[Tuning] = (),
 ) -> Document:
-    """Return the document of a study, of its best gaits simulated in the engine, of excluded records, and of tuned searches."""
+    """Return the document of a study, of its best gaits simulated in the engine, and of excluded records."""
     sections = [make_problem_section(c, [gait for gait in simulated if gait.problem == c.problem]) for c in comparisons]
     sessions = [make_session_section(number, session) for number, session in enumerate(manifest.sessions, start=1)]
     ranking = rank_over_problems(comparisons) if len(comparisons) > 1 else None
@@ -91,7 +89,6 @@ def make_study_document(
             *_list_excluded(excluded),
             TERMS,
             *((make_overview(comparisons, ranking),) if ranking else ()),
-            *make_tuning_section(tunings),
             *sections,
             *(() if simulated else (HOW,)),
             Section(title="Methods", parts=(*_describe_counting(comparisons), _list_settings(comparisons), *sessions)),

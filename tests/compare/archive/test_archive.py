@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import zipfile
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from compare.analysis.comparison import label_editions
-from compare.analysis.tuning import Tuning, write_tunings
 from compare.archive import Finding, pack_study, unpack_archive, verify_folder
 from compare.archive.pack import _collect_robot, write_archive
 from compare.archive.verify import _check_code_files, verify_archive
 from compare.cli import app
-from compare.report import write_report
 from compare.study.evidence import read_evidence
 from compare.study.record_files import read_records
 from compare.study.run_study import Study, run_study
-from compare.study.settings import Session, SolverSpec, StudySettings, read_manifest, write_manifest
+from compare.study.settings import Session, SolverSpec, StudySettings, write_manifest
 from compare.study.task import ProblemSpec, Stop
 from nlp_gait.errors import InputError, UserCodeError
 from nlp_gait.proofs.certificate import load_certificates
@@ -81,25 +77,6 @@ def test_every_damage_is_named(files: Files, tmp_path: Path) -> None:
         wrong = [finding.detail for finding in verify(content, tmp_path / str(k)) if not finding.holds]
         assert wrong and word in wrong[0], (name, wrong)
     assert not list(tmp_path.rglob("outside*")) and not (tmp_path.parent / "outside.txt").exists()
-
-
-def test_the_report_of_a_tuned_study_follows_from_its_archive(folder: Path, tmp_path: Path) -> None:
-    study = shutil.copytree(folder, tmp_path / "study")
-    tuned = Tuning(
-        solver="pso",
-        settings={"population": 20},
-        training=("walk",),
-        trials=1,
-        evaluations=200,
-        time_s=0.1,
-        area=(0.4, 0.5),
-    )
-    write_tunings(study, [tuned])
-    records = read_evidence(study).records
-    write_report(study, label_editions(records), read_manifest(study))
-    assert "## Tuning" in (study / "report.md").read_text(encoding="utf-8")
-    findings = verify_archive(pack_study(study, records, tmp_path / "study.zip")).findings
-    assert [finding.sentence for finding in findings if not finding.holds] == []
 
 
 @pytest.mark.slow
