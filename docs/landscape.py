@@ -132,7 +132,7 @@ def trace_ipopt(problem: Problem) -> list[list[float | None]]:
     """Return the two variables after each iteration of IPOPT from a random start, by stopping it ever later."""
     x0 = problem.gait.start_point(np.random.default_rng(SEED))
     exact, path = build_exact_model(problem.gait), []
-    most = nlp_gait.solve(problem.gait, x0=x0, solver=IpoptSettings()).iterations
+    most = nlp_gait.solve(problem.gait, x0=x0, solver=IpoptSettings()).best.iterations
     for iterations in [*range(1, most), 300]:
         x = nlp_gait.solve(problem.gait, x0=x0, solver=IpoptSettings(iterations=iterations), workers=1).x
         values = exact.at(problem.gait.check_x(x), problem.gait.p)

@@ -9,7 +9,8 @@ gait is drawn: stick figures from the side, the mechanical power, and the distan
 import nlp_gait
 
 solution = nlp_gait.solve("nao-ssp", starts=3, seed=0)
-print(f"{solution.objective_name} {solution.objective:.6f} {solution.objective_unit}, {solution.status}")
+goal = solution.problem.objective
+print(f"{goal.name} {solution.objective:.6f} {goal.unit}, {solution.status}")
 
 # %%
 # Each active constraint has a price: the change of the least power per unit by which its bound is raised.

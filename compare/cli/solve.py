@@ -97,12 +97,13 @@ def solve(
 
 
 def _print(solution: Solution) -> None:
-    value = with_unit(solution.objective, solution.objective_unit)
+    value = with_unit(solution.objective, solution.problem.objective.unit)
     converged = sum(start.converged for start in solution.starts)
+    best, name = solution.best, solution.problem.address
     if solution.feasible:
-        stdout.print(f"{solution.problem}: {solution.objective_name} {value} ({solution.status})")
+        stdout.print(f"{name}: {solution.problem.objective.name} {value} ({solution.status})")
     else:
-        stdout.print(f"{solution.problem}: no feasible point was found ({solution.status})")
+        stdout.print(f"{name}: no feasible point was found ({solution.status})")
     kind = "Optimum" if solution.converged else "Best feasible point" if solution.feasible else "Least infeasible point"
     print_table(kind, ("variable", "value"), [(name, f"{value:.6g}") for name, value in solution.x.items()])
     if solution.active_constraints:
@@ -118,13 +119,13 @@ def _print(solution: Solution) -> None:
         )
     counts = solution.evaluations
     stdout.print(
-        f"{converged} of {len(solution.starts)} starts converged; {solution.iterations} iterations of the best; "
+        f"{converged} of {len(solution.starts)} starts converged; {best.iterations} iterations of the best; "
         f"calls f {counts.f}, g {counts.g}, gradient {counts.gradient}, Jacobian {counts.jacobian}, Hessian {counts.hessian}"
     )
     time = solution.time_s
     stdout.print(
         f"build {time.build:.2f} s, derivatives {time.compile:.2f} s, solve {time.solve:.2f} s; "
-        f"{solution.solver}{f' with {solution.linear_solver}' if solution.linear_solver else ''}"
+        f"{best.solver}{f' with {best.linear_solver}' if best.linear_solver else ''}"
     )
 
 

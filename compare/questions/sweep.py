@@ -157,7 +157,7 @@ class Sweep(Question[list[SweepPoint]]):
                 feasible=end.converged,
                 status=end.status,
                 x=end.x,
-                violation=end.violation,
+                violation=end.best.violation,
                 evaluations=end.evaluations.f,
                 time_s=end.time_s.solve,
                 indexes=indexes,

@@ -169,7 +169,7 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
                 start=near,
                 converged=sum(start.converged for start in solution.starts),
                 starts=len(solution.starts),
-                iterations=solution.iterations,
+                iterations=solution.best.iterations,
                 time_s=solution.time_s.solve,
                 x=solution.x,
                 **self._compare_to_first(problem, solution.x, solved),

@@ -238,7 +238,7 @@ def _solve(problem: GaitProblem, cycle: GaitProblem | None, starts: int, progres
             x0 = start_from_cycle(problem, x0, gait.x, float(problem.options.get("stair_rise_m", 0.0)))
         found = solve(problem, x0=x0, solver=solver, workers=1)
         progress(f"start {k + 1}: {found.status}")
-        if best is None or found.starts[0].rank < best.starts[0].rank:
+        if best is None or found.best.rank < best.best.rank:
             best = found
         if best.converged:
             break

@@ -19,7 +19,7 @@ from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem, load
-from nlp_gait.formulation.solution import ActiveConstraint, Evaluations, Guess, Outcome, Solution, SolveTime
+from nlp_gait.formulation.solution import ActiveConstraint, Guess, Outcome, Solution
 from nlp_gait.interrupts import Interrupted, Stop, defer_interrupts, never
 from nlp_gait.processes import run_in_forks
 
@@ -160,22 +160,13 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
         status += f"; violated: {names}; relax these limits or widen the bounds" if names else ""
         status += "" if np.isfinite(best.cost) else f"; {problem.objective.name} is {best.cost} there"
     prices = _find_active(problem, values, best.guess) if best.converged and best.guess is not None else ()
-    same = ("claimed", "objective", "violation", "iterations", "solver", "linear_solver", "functions")
     return Solution(
-        problem=problem.address,
-        options=dict(problem.options),
-        parameters=dict(problem.values),
-        status=status,
-        objective_name=problem.objective.name,
-        objective_unit=problem.objective.unit,
-        x=problem.by_name(best.x),
-        worst_violations=violations[:10],
-        evaluations=sum((outcome.evaluations for outcome in outcomes), Evaluations()),
-        time_s=SolveTime(build=best.build_s, compile=best.compile_s, solve=sum(outcome.time_s for outcome in outcomes)),
-        active_constraints=tuple(prices),
+        problem=problem,
         starts=tuple(outcomes),
         seed=seed,
-        **{name: getattr(best, name) for name in same},
+        status=status,
+        worst_violations=violations[:10],
+        active_constraints=tuple(prices),
     )
 
 

@@ -1,9 +1,10 @@
-"""Results of solvers: numbers and names, no solver objects."""
+"""Results of solvers."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nlp_gait.formulation.signals import Array, Signals
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 # A total violation below this counts as feasible (each row in units of its scale).
 FEASIBILITY_TOLERANCE = 1e-6
 SHOWN = 20  # variables, and constraints with a price, in a notebook
+# Fields of an outcome in the file of a result.
+WRITTEN = ("claimed", "feasible", "status", "objective", "violation", "iterations", "time_s")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,45 +133,58 @@ class Outcome:
         return 2.0, math.inf if math.isnan(self.violation) else self.violation
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Solution:
-    """Best of all starts, judged by the exact functions."""
+    """All starts of a problem, of which the best one is the solution."""
 
-    problem: str  #: name
-    options: dict[str, Any]  #: of the problem
-    parameters: dict[str, float]  #: values that differ from the defaults
-    claimed: bool  #: the solver claims that x is a solution
-    status: str  #: reason why the best start ended, and the obstacle if none converged
-    objective: float  #: exact value, in the problem's sense
-    objective_name: str  #: for example ``"power"``
-    objective_unit: str  #: for example ``"W"``
-    x: dict[str, float]  #: by variable name
-    violation: float  #: exact total violation
-    worst_violations: tuple[ConstraintValue, ...]  #: violated rows, worst first
-    iterations: int  #: of the best start
-    evaluations: Evaluations  #: over all starts
-    time_s: SolveTime  #: over all starts
-    solver: str  #: for example ``"ipopt"``
-    linear_solver: str  #: used by the solver; empty if it does not report it
-    functions: str  #: ``"compiled"`` or ``"interpreted"``
-    active_constraints: tuple[ActiveConstraint, ...]  #: bounds with a price, highest first
+    problem: GaitProblem  #: with its parameter values
     starts: tuple[Outcome, ...]  #: outcome of every start
     seed: int  #: of the start points
+    status: str  #: reason why the best start ended, and the obstacle if none converged
+    worst_violations: tuple[ConstraintValue, ...]  #: violated rows of the best start, worst first
+    active_constraints: tuple[ActiveConstraint, ...]  #: bounds with a price, highest first
+
+    @cached_property
+    def best(self) -> Outcome:
+        """The cheapest start that converged, else the cheapest feasible, else the least infeasible."""
+        return min(self.starts, key=lambda outcome: outcome.rank)
+
+    @property
+    def objective(self) -> float:
+        """Exact value of the best start, in the problem's sense."""
+        return self.best.objective
+
+    @property
+    def x(self) -> dict[str, float]:
+        """End of the best start by variable name."""
+        return self.problem.by_name(self.best.x)
 
     @property
     def feasible(self) -> bool:
         """Whether the exact functions find x feasible, with a finite objective."""
-        return self.violation <= FEASIBILITY_TOLERANCE and math.isfinite(self.objective)
+        return self.best.feasible
 
     @property
     def converged(self) -> bool:
-        """Whether a start converged to a feasible point: claimed by the solver, and feasible for the exact functions."""
-        return self.claimed and self.feasible
+        """Whether the best start converged to a feasible point: claimed by the solver, and feasible for the exact functions."""
+        return self.best.converged
+
+    @property
+    def evaluations(self) -> Evaluations:
+        """Calls over all starts."""
+        return sum((outcome.evaluations for outcome in self.starts), Evaluations())
+
+    @property
+    def time_s(self) -> SolveTime:
+        """Wall time over all starts [s]."""
+        solve_s = sum(outcome.time_s for outcome in self.starts)
+        return SolveTime(build=self.best.build_s, compile=self.best.compile_s, solve=solve_s)
 
     def __repr__(self) -> str:
-        found = f"{self.objective_name} {self.objective:.6g} {self.objective_unit}" if self.feasible else "infeasible"
-        converged = sum(start.converged for start in self.starts)
-        return f"<Solution of {self.problem}: {found}; {converged} of {len(self.starts)} starts of {self.solver} converged>"
+        goal = self.problem.objective
+        value = f"{goal.name} {self.objective:.6g} {goal.unit}" if self.feasible else "infeasible"
+        counts = f"{sum(start.converged for start in self.starts)} of {len(self.starts)} starts"
+        return f"<Solution of {self.problem.address}: {value}; {counts} of {self.best.solver} converged>"
 
     def _repr_html_(self) -> str:
         bounds = {a.name: f"{a.price:.4g} {a.price_unit}" for a in self.active_constraints}
@@ -179,42 +195,52 @@ class Solution:
         header = ("variable or constraint", "value", "price of raising its bound")
         return format_html_table(repr(self)[1:-1], header, [*x, *rows], note)
 
-    def signals(self, problem: GaitProblem | None = None) -> Signals:
-        """Return time histories at x.
+    def signals(self) -> Signals:
+        """Return time histories at x; raises InputError if the problem has none."""
+        return self.problem.signals(self.best.x)
 
-        The problem that was solved is loaded by name if it is not given, which may be impossible for a user-defined one: it
-        raises UnknownNameError. Raises InputError if the problem has no time histories.
-        """
-        return self._restore(problem).signals(self.x)
+    def plot(self) -> Any:
+        """Plot the gait with Matplotlib: stick figures, power and balance margin; raises as ``signals``."""
+        return import_object(FUNCTIONS["plot_gait"])(self.problem, self.x, self.best.solver)
 
-    def plot(self, problem: GaitProblem | None = None) -> Any:
-        """Plot the gait with Matplotlib: stick figures, power and balance margin; problem and errors as for ``signals``."""
-        return import_object(FUNCTIONS["plot_gait"])(self._restore(problem), self.x, self.solver)
-
-    def animate(self, problem: GaitProblem | None = None) -> Any:
+    def animate(self) -> Any:
         """Return a page that plays the gait in 3-D, with power and margin, for notebooks; ``write`` saves it. See ``plot``."""
-        return import_object(FUNCTIONS["animate_gait"])(self._restore(problem), self.x, self.solver)
+        return import_object(FUNCTIONS["animate_gait"])(self.problem, self.x, self.best.solver)
 
-    def sensitivity(self, problem: GaitProblem | None = None) -> Any:
+    def sensitivity(self) -> Any:
         """Return a table of the derivatives of x and the objective with respect to all parameters.
 
         It has ``value(quantity, parameter)`` in the quantity's unit per unit of the parameter, ``write_csv(path)``, and
-        ``reach``, how far each parameter may change.
-
-        The problem is as for ``signals``. Raises InputError without multipliers, or if x is not an isolated optimum.
+        ``reach``, how far each parameter may change. Raises InputError without multipliers, or if x is not an isolated optimum.
         """
-        return import_object(FUNCTIONS["tabulate_sensitivities"])(self._restore(problem), self)
-
-    def _restore(self, problem: GaitProblem | None) -> GaitProblem:
-        from nlp_gait.formulation.registry import load
-
-        return (problem or load(self.problem, **self.options)).with_values(**self.parameters)
+        return import_object(FUNCTIONS["tabulate_sensitivities"])(self)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, with the schema version of results."""
-        shown = ("claimed", "feasible", "status", "objective", "violation", "iterations", "time_s")
-        starts = []
-        for index, start in enumerate(self.starts):
-            points = {name: dict(zip(self.x, getattr(start, name).tolist(), strict=True)) for name in ("x0", "x")}
-            starts.append({"index": index, **{name: getattr(start, name) for name in shown}, **points})
-        return {"schema": 1, **asdict(replace(self, starts=())), "feasible": self.feasible, "starts": starts}
+        problem, best = self.problem, self.best
+        starts = [
+            {
+                "index": index,
+                **{name: getattr(start, name) for name in WRITTEN},
+                "x0": problem.by_name(start.x0),
+                "x": problem.by_name(start.x),
+            }
+            for index, start in enumerate(self.starts)
+        ]
+        return {
+            "schema": 1,
+            "problem": problem.address,
+            "options": dict(problem.options),
+            "parameters": dict(problem.values),
+            "objective_name": problem.objective.name,
+            "objective_unit": problem.objective.unit,
+            **{name: getattr(best, name) for name in (*WRITTEN, "solver", "linear_solver", "functions")},
+            "status": self.status,
+            "x": self.x,
+            "worst_violations": [asdict(row) for row in self.worst_violations],
+            "active_constraints": [asdict(bound) for bound in self.active_constraints],
+            "evaluations": asdict(self.evaluations),
+            "time_s": asdict(self.time_s),
+            "seed": self.seed,
+            "starts": starts,
+        }

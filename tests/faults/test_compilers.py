@@ -76,7 +76,7 @@ def test_ipopt_continues_with_interpreted_functions_and_a_warning(
     monkeypatch.setattr(compiler_module, "TIME_LIMIT_S", 0.5)
     monkeypatch.setattr(ipopt, "WORTHWHILE_SIZE", 2)
     solution = nlp_gait.solve(toy(corner), starts=2)
-    assert solution.converged and solution.functions == "interpreted"
+    assert solution.converged and solution.best.functions == "interpreted"
     assert len(caplog.messages) == 1 and "IPOPT's functions are interpreted: " in caplog.messages[0]
     with pytest.raises(CompilerError):
         nlp_gait.solve(toy(corner), solver=IpoptSettings(compiled=True))

@@ -89,7 +89,7 @@ def test_solve_within_the_first_start_keeps_where_it_was(monkeypatch: pytest.Mon
         nlp_gait.solve(nlp_gait.load("walk12"), starts=2)
     solution = caught.value.partial
     assert isinstance(solution, nlp_gait.Solution)
-    assert not solution.converged and solution.iterations == 3 and "was interrupted" in solution.status
+    assert not solution.converged and solution.best.iterations == 3 and "was interrupted" in solution.status
     assert isinstance(caught.value, KeyboardInterrupt)
     assert str(pickle.loads(pickle.dumps(caught.value))) == "interrupted in start 1 of 2"
 

@@ -38,7 +38,7 @@ def test_ipopt_says_so_and_keeps_where_it_was(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(solver_module.time, "perf_counter", lambda: float(next(clock)))
     solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=4.0))
     assert not solution.converged and "stopped at the time limit" in solution.status
-    assert 1 <= solution.iterations <= 4
+    assert 1 <= solution.best.iterations <= 4
     x = np.array(list(solution.x.values()))
     assert (x >= problem.lower).all() and (x <= problem.upper).all() and np.isfinite(solution.objective)
 
@@ -50,9 +50,9 @@ def test_the_limit_is_for_all_stages_of_a_run(monkeypatch: pytest.MonkeyPatch) -
     whole = nlp_gait.solve(problem)
     clock = iter(range(10_000))
     monkeypatch.setattr(solver_module.time, "perf_counter", lambda: float(next(clock)))
-    solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=whole.iterations - 3.0))
+    solution = nlp_gait.solve(problem, solver=IpoptSettings(time_limit_s=whole.best.iterations - 3.0))
     assert solution.starts[0].status == "stopped at the time limit"
-    assert 0 < solution.iterations < whole.iterations
+    assert 0 < solution.best.iterations < whole.best.iterations
 
 
 @pytest.mark.slow
@@ -80,6 +80,6 @@ def test_a_missing_linear_solver_is_reported_and_never_replaced() -> None:
             assert "linear solver 'ma57' does not run in this installation" in str(error)
             assert "leave linear_solver out for " in str(error)
         else:
-            assert solution.linear_solver.lower() == name
+            assert solution.best.linear_solver.lower() == name
     with pytest.raises(InputError, match="linear_solver must be one of ma27, .*, got 'ma'"):
         IpoptSettings(linear_solver="ma")

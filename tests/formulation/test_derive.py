@@ -145,7 +145,7 @@ def test_another_objective_has_its_own_name_and_sense() -> None:
         objective=gain, change=lambda assembly, point, ops: replace(assembly, objective=-assembly.objective)
     )
     solution = nlp_gait.solve(flipped, starts=2)
-    assert (solution.objective_name, solution.objective) == ("gain", pytest.approx(0.0, abs=1e-6))
+    assert (solution.problem.objective.name, solution.objective) == ("gain", pytest.approx(0.0, abs=1e-6))
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ def _make_reached(problem: GaitProblem, criterion: CompetingObjective, solution:
     return FrontPoint(
         value=criterion.evaluate(problem, x),
         power_W=build_exact_model(problem).at(x, problem.p).cost,
-        violation=solution.violation,
+        violation=solution.best.violation,
         x=tuple(x.tolist()),
     )
 

@@ -84,9 +84,10 @@ def differentiate_by_parameters(optimum: Optimum) -> Sensitivities:
     return _differentiate(optimum, _Change(cost[0], *others))
 
 
-def tabulate_sensitivities(problem: GaitProblem, solution: Solution) -> SensitivityTable:
+def tabulate_sensitivities(solution: Solution) -> SensitivityTable:
     """Return the derivatives of a solution's best start; InputError if it has no multipliers or there are no derivatives."""
-    found = differentiate_by_parameters(find_optimum(problem, min(solution.starts, key=lambda outcome: outcome.rank)))
+    problem = solution.problem
+    found = differentiate_by_parameters(find_optimum(problem, solution.best))
     values = np.vstack([found.objective, found.x])
     values[:, np.logical_not(found.defined)] = np.nan
     goal = problem.objective

@@ -76,5 +76,5 @@ def test_nothing_is_rebuilt_along_the_path(monkeypatch: pytest.MonkeyPatch) -> N
 def test_a_warm_start_needs_fewer_iterations_than_a_cold_one() -> None:
     problems = path(toy(corner), np.linspace(1.1, 1.9, 9).tolist())
     warm = Continuation(starts=1)
-    first, *others = [warm.solve(problem).iterations for problem in problems]
+    first, *others = [warm.solve(problem).best.iterations for problem in problems]
     assert max(others) < first

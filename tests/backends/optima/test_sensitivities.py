@@ -183,7 +183,7 @@ def test_a_model_with_other_rows_is_refused() -> None:
 def test_a_solution_lists_its_derivatives_with_units(tmp_path: Path) -> None:
     """3 (limit - 1) at (limit, limit)."""
     problem = toy(corner, limit=1.5)
-    table = solve(problem, starts=3).sensitivity(problem)
+    table = solve(problem, starts=3).sensitivity()
     assert table.value("cost", "limit") == pytest.approx(3.0, abs=1e-8)
     assert table.value("x", "limit") == pytest.approx(1.0, abs=1e-8)
     with pytest.raises(UnknownNameError, match="quantity 'z'"):

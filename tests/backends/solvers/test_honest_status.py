@@ -35,7 +35,7 @@ def test_an_acceptable_level_counts_as_converged_and_says_so() -> None:
 def test_a_point_that_is_feasible_but_not_converged_is_called_that() -> None:
     solution = solve(toy(corner), solver=IpoptSettings(tolerance=1e-30))
     assert not solution.converged
-    assert solution.violation == 0.0
+    assert solution.best.violation == 0.0
     assert solution.status == "no start converged; the best feasible one search direction became too small"
 
 
@@ -149,8 +149,8 @@ def test_options_that_lie_in_the_working_folder_change_nothing(
     monkeypatch.chdir(tmp_path)
     find_linear_solver.cache_clear()
     solution = solve(toy(corner))
-    assert (solution.x, solution.iterations) == (expected.x, expected.iterations)
-    assert solution.linear_solver == expected.linear_solver
+    assert (solution.x, solution.best.iterations) == (expected.x, expected.best.iterations)
+    assert solution.best.linear_solver == expected.best.linear_solver
     assert [path.name for path in tmp_path.iterdir()] == ["ipopt.opt"]
     assert "".join(capfd.readouterr()) == ""
 

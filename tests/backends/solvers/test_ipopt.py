@@ -47,7 +47,7 @@ def test_an_optimum_is_feasible_for_the_exact_functions(phase: str, request: pyt
     assert solution.converged
     assert solution.status == "converged"
     assert violation <= FEASIBILITY_TOLERANCE
-    assert (solution.violation, solution.objective) == (violation, cost)
+    assert (solution.best.violation, solution.objective) == (violation, cost)
     assert solution.worst_violations == ()
     assert (point(solution) >= problem.lower).all()
     assert (point(solution) <= problem.upper).all()
@@ -76,11 +76,11 @@ def test_a_solution_accounts_for_its_work(single_support: tuple[GaitProblem, Sol
     problem, solution = single_support
     counts = asdict(solution.evaluations)
     assert counts.keys() == {"f", "g", "gradient", "jacobian", "hessian"}
-    assert all(count >= solution.iterations > 0 for count in counts.values())
+    assert all(count >= solution.best.iterations > 0 for count in counts.values())
     assert solution.time_s.build > 0
     assert solution.time_s.compile > 0
     assert solution.time_s.solve == pytest.approx(sum(start.time_s for start in solution.starts))
-    assert solution.linear_solver.lower().startswith(("mumps", "ma", "spral", "pardiso"))
+    assert solution.best.linear_solver.lower().startswith(("mumps", "ma", "spral", "pardiso"))
     written = json.loads(json.dumps(solution.to_json()))
     assert written["x"] == solution.x
     assert [start["index"] for start in written["starts"]] == [0, 1]
@@ -133,7 +133,7 @@ def test_a_corner_out_of_reach_is_missed_by_what_it_is_out_of_reach() -> None:
     assert "row (by 0.5 m)" in solution.status
     assert solution.status.endswith("relax these limits or widen the bounds")
     assert solution.active_constraints == ()
-    assert solution.violation == min(start.violation for start in solution.starts)
+    assert solution.best.violation == min(start.violation for start in solution.starts)
 
 
 def test_what_is_maximised_has_prices_in_its_own_sense() -> None:
@@ -213,7 +213,7 @@ def test_widths_of_ones_own_narrow_from_stage_to_stage() -> None:
     usual, narrower = (
         solve(problem, starts=1, solver=IpoptSettings(widths=widths)) for widths in ((), (1e-2, 1e-3, 1e-4))
     )
-    assert narrower.converged and narrower.iterations > usual.iterations  # one stage more
+    assert narrower.converged and narrower.best.iterations > usual.best.iterations  # one stage more
     assert narrower.objective == pytest.approx(usual.objective, rel=1e-6)
     for widths in ((1e-3, 1e-2), (1e-2, 0.0)):
         with pytest.raises(InputError, match=r"widths must be positive and narrow from stage to stage, got \(0\.0"):

@@ -51,7 +51,7 @@ def ready(name: str) -> Solver:
 def test_each_solver_of_the_registry_solves_and_accounts_for_it(name: str) -> None:
     solution = solve(toy(corner, limit=1.5), starts=3, solver=ready(name))
     assert solution.objective == pytest.approx(1.5, abs=TOLERANCE)
-    assert (solution.solver, len(solution.starts)) == (name, 3)
+    assert (solution.best.solver, len(solution.starts)) == (name, 3)
     assert solution.evaluations.f >= 3
     assert bool(solution.active_constraints) == (solution.starts[0].guess is not None)
     assert solution.to_json()["starts"][2]["x0"] == dict(zip("xy", solution.starts[2].x0.tolist(), strict=True))
@@ -70,7 +70,11 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
     problem = toy(corner, limit=1.5)
     solution = solve(problem, starts=2, solver=Corners())
     assert solution.converged and solution.status == "tried" and solution.objective == pytest.approx(1.5)
-    assert (solution.solver, solution.linear_solver, solution.functions) == ("corners", "", "interpreted")
+    assert (solution.best.solver, solution.best.linear_solver, solution.best.functions) == (
+        "corners",
+        "",
+        "interpreted",
+    )
     ends = run_stored_starts(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
     assert ends.feasible.all() and ends.objective == pytest.approx([1.5] * 3)
 

@@ -85,7 +85,7 @@ def test_a_problem_by_name_a_solution_in_one_line_and_its_x_wherever_one_is_take
     power, violation = nlp_gait.compile_objective(problem)(solution.x)
     np.testing.assert_allclose(power, [solution.objective])
     assert violation[0] < 1e-6
-    assert nlp_gait.solve(problem, x0=solution.x).iterations < 30
+    assert nlp_gait.solve(problem, x0=solution.x).best.iterations < 30
 
 
 def test_long_work_leaves_a_line_in_a_log_now_and_then(monkeypatch, capsys):

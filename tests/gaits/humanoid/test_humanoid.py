@@ -75,7 +75,7 @@ def test_torques_and_zmp_are_pinocchios(problem: GaitProblem) -> None:
 
 @pytest.mark.slow
 def test_an_optimum_is_exact_closed_and_the_lifted_problems(problem: GaitProblem, solution: Solution) -> None:
-    assert solution.converged and solution.violation == 0.0
+    assert solution.converged and solution.best.violation == 0.0
     x = np.array(list(solution.x.values()))
     model, exact = build_nlp(problem), build_exact_model(problem).at(x, problem.p)
     closure = [i for i, name in enumerate(build_exact_model(problem).row_names) if name.startswith("closure")]

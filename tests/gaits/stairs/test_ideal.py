@@ -27,7 +27,7 @@ def solution(problem: GaitProblem) -> nlp_gait.Solution:
 def test_case_2_meets_the_known_optimum(solution: nlp_gait.Solution) -> None:
     assert solution.converged, solution.status
     assert solution.objective == pytest.approx(KNOWN[2], rel=KNOWN_TOLERANCE)
-    assert solution.iterations < 100
+    assert solution.best.iterations < 100
 
 
 def test_a_search_is_refused(problem: GaitProblem) -> None:
