@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from nlp_gait.backends.kernel.compiled_function import CompiledFunction as CompiledFunction
     from nlp_gait.backends.kernel.compiled_function import compile_function as compile_function
     from nlp_gait.backends.plan_walk import WalkPlan as WalkPlan
+    from nlp_gait.backends.plan_walk import WalkSettings as WalkSettings
+    from nlp_gait.backends.plan_walk import plan_climb as plan_climb
+    from nlp_gait.backends.plan_walk import plan_route as plan_route
     from nlp_gait.backends.plan_walk import plan_walk as plan_walk
     from nlp_gait.backends.solve import solve as solve
     from nlp_gait.backends.solvers.ipopt import IpoptSettings as IpoptSettings
@@ -35,7 +38,7 @@ _PUBLIC = {
     "nlp_gait.formulation.solution": "Solution",
     "nlp_gait.backends.kernel.compiled": "CompiledObjective compile_objective",
     "nlp_gait.backends.kernel.compiled_function": "CompiledFunction compile_function",
-    "nlp_gait.backends.plan_walk": "WalkPlan plan_walk",
+    "nlp_gait.backends.plan_walk": "WalkPlan WalkSettings plan_climb plan_route plan_walk",
     "nlp_gait.backends.solve": "solve",
     "nlp_gait.backends.solvers.ipopt": "IpoptSettings",
     "nlp_gait.backends.solvers.registry": "make_solver",

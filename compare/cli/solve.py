@@ -26,6 +26,7 @@ from compare.cli.outputs import check_output_file
 from compare.cli.printing import print_json, print_rows, print_table, print_written, say, show_progress, stdout
 from compare.study.references import find_reference
 from nlp_gait.backends.identity import identify_problem
+from nlp_gait.backends.plan_walk import WalkSettings
 from nlp_gait.backends.solvers import registry
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation.solution import Solution
@@ -185,21 +186,29 @@ def plan(
     target = None if out is None else check_output_file(out)
     given = dict(parse_pairs(values, "--set"))
     options = parse_options("nao-walk", [("intervals", given.pop("intervals", "10"))])
-    found = nlp_gait.plan_walk(
-        robot,
-        steps,
-        speed_m_s=speed,
-        speeds_m_s=[parse_number("speed", part, "--speeds") for part in parse_names(speeds)],
-        distance_m=distance,
-        slope_deg=slope_deg,
-        stairs=stairs,
-        turn_deg=turn_deg,
-        footholds=footholds,
-        values={name: parse_number(name, text, "--set") for name, text in given.items()},
-        starts=starts,
-        progress=say,
-        **options,
-    )
+    numbers = {name: parse_number(name, text, "--set") for name, text in given.items()}
+    settings = WalkSettings(values=numbers, starts=starts, progress=say, **options)
+    if turn_deg or footholds is not None or speeds:
+        if (speed, stairs, slope_deg) != (None, "", 0.0):
+            fail("a walk whose steps differ is on a level floor; leave out --speed, --slope-deg and --stairs")
+        inner_speeds = [parse_number("speed", part, "--speeds") for part in parse_names(speeds)]
+        found = nlp_gait.plan_route(
+            robot,
+            footholds=footholds,
+            turn_deg=turn_deg,
+            steps=steps,
+            distance_m=distance,
+            speeds_m_s=inner_speeds,
+            settings=settings,
+        )
+    elif stairs:
+        if (steps, distance, slope_deg) != (None, None, 0.0):
+            fail("stairs determine steps and distance and are level; leave out --steps, --distance and --slope-deg")
+        found = nlp_gait.plan_climb(robot, stairs, speed_m_s=speed, settings=settings)
+    else:
+        found = nlp_gait.plan_walk(
+            robot, steps, speed_m_s=speed, distance_m=distance, slope_deg=slope_deg, settings=settings
+        )
     if target is not None:
         found.save(target)
     if as_json:

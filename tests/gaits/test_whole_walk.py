@@ -11,7 +11,7 @@ import pytest
 
 import nlp_gait
 from nlp_gait.backends.exact import build_exact_model
-from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, plan_walk
+from nlp_gait.backends.plan_walk import WalkPlan, describe_violation, plan_climb, plan_walk
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result, load_result
 from nlp_gait.formulation.solution import ConstraintValue
@@ -172,7 +172,7 @@ def test_an_infeasible_plan_names_its_obstacles(problem: GaitProblem) -> None:
     x0 = problem.start_point(np.random.default_rng(0))
     quick = nlp_gait.IpoptSettings(iterations=1, compiled=False, hessian="limited-memory")
     solution = nlp_gait.solve(problem, x0=x0, solver=quick)
-    plan = WalkPlan(problem=problem, solution=solution, steps=STEPS, distance_m=1.0, duration_s=1.0, energy_J=1.0)
+    plan = WalkPlan(solution=solution, distance_m=1.0, duration_s=1.0, energy_J=1.0)
     assert not plan.feasible and plan.obstacles
     assert "left leg is too straight or too bent by 0.01 1" in describe_violation(row, STEPS)
 
@@ -214,4 +214,4 @@ def test_every_step_climbs_one_tread_and_clears_its_edge(climb: GaitProblem) -> 
 )
 def test_stairs_that_cannot_be_climbed_are_refused(stairs: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        plan_walk("nao-v5", stairs=stairs)
+        plan_climb("nao-v5", stairs)

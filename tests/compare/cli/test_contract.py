@@ -114,6 +114,8 @@ def test_same_seed_same_result_with_one_or_two_processes(tmp_path, undrawn_pages
         (["compare", "nao-ssp", "--out", "/proc/nowhere"], ["cannot write", "--out"]),
         (["solve", "nao-ssp", "--set", "intervals=0"], ["intervals must be a whole number >= 1", "got 0"]),
         (["solve", "nao-ssp", "--set", "derivatives=numeric"], ["derivatives", "finite-difference"]),
+        (["plan", "--turn-deg", "90", "--speed", "0.05"], ["whose steps differ", "leave out --speed"]),
+        (["plan", "--stairs", "0.02x0.2:3", "--steps", "4"], ["stairs determine steps", "leave out --steps"]),
     ],
 )
 def test_bad_input_is_one_sentence(arguments, words):
