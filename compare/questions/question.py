@@ -17,7 +17,7 @@ from compare.study.references import find_reference
 from compare.study.store import Store, store_runs
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decode
+from nlp_gait.decoding import decode_value
 from nlp_gait.files import replace_nan, write_json
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.progress import Progress, ignore_progress
@@ -39,18 +39,23 @@ class Work:
 
     def compute(
         self,
-        kind: Callable[..., T],
+        kind: type[T],
         name: str,
         inputs: Mapping[str, Any],
         function: Callable[[], T],
         code: Sequence[ModuleType] = (),
     ) -> T:
-        """Return the stored data class of a kind, or compute and store it; arguments as for ``Store.compute``."""
+        """Return the stored data class, or tuple of data classes, of a kind, or compute and store it.
 
-        def plain() -> Any:
-            return replace_nan(asdict(function()))  # type: ignore[call-overload]
+        Arguments as for ``Store.compute``. Infinite numbers are not stored.
+        """
 
-        return decode(kind, self.store.compute(name, inputs, plain, code=code))
+        def compute() -> Any:
+            value: Any = function()
+            return replace_nan([asdict(item) for item in value] if isinstance(value, tuple) else asdict(value))
+
+        stored: T = decode_value(kind, self.store.compute(name, inputs, compute, code=code), name)
+        return stored
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

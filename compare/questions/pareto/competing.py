@@ -23,10 +23,6 @@ class Margin:
     name: str
     unit: str = "m"
 
-    def get_demand(self, problem: GaitProblem) -> float:
-        """Return the least value that the problem demands."""
-        return problem.value(f"{self.name}_limit_m")
-
     def drop_demand(self, problem: GaitProblem) -> GaitProblem:
         """Return the problem with the least demand: zero, which keeps the ZMP within the soles' box."""
         return self.demand(problem, 0.0)
@@ -55,40 +51,31 @@ class Margin:
 
 @dataclass(frozen=True, kw_only=True)
 class Speed:
-    """Mean speed of the hip over the phase: the distance that the phase prescribes, divided by its duration."""
+    """Mean speed of the hip over the phase, with the methods of ``Margin``: its prescribed distance by its duration."""
 
     duration: str  #: variable that holds the phase's duration
     distance_m: float  #: of the hip along x
     name: str = SPEED
     unit: str = "m/s"
 
-    def get_demand(self, problem: GaitProblem) -> float:
-        """Return the least value that the problem demands."""
-        return self.distance_m / problem.value(f"{self.duration}.upper")
-
     def drop_demand(self, problem: GaitProblem) -> GaitProblem:
-        """Return the problem itself: its bound on the duration stays, and demands no more speed than that."""
-        return problem
+        return problem  # its bound on the duration demands no more speed than that
 
     def demand(self, problem: GaitProblem, least: float) -> GaitProblem:
-        """Return the problem with a least value."""
         longest = max(problem.value(f"{self.duration}.lower"), self.distance_m / least)
         return problem.with_values(**{f"{self.duration}.upper": longest})
 
     def evaluate(self, problem: GaitProblem, x: Array) -> float:
-        """Return the exact value at x (n,)."""
         return self.distance_m / float(x[problem.variable_index(self.duration)])
 
     def evaluate_many(self, objective: CompiledObjective, X: Array) -> Array:
-        """Return the values (P,) of candidates (P, n)."""
         return self.distance_m / X[:, objective.names.index(self.duration)]
 
     def express(self, point: Point, assembly: Assembly) -> MX:
-        """Return a scalar for the assembly of a problem."""
         return self.distance_m / point[self.duration]
 
     def compute_price(self, solution: Solution) -> float:
-        """Return the change of the least power per unit of the demand [W/unit]: dP/dv = dP/dT dT/dv with T = distance / v."""
+        # dP/dv = dP/dT dT/dv with T = distance / v
         bound = f"bounds[{self.duration}]"
         per_second = sum(a.price for a in solution.active_constraints if a.name == bound and a.side == "upper")
         return -per_second * solution.x[self.duration] ** 2 / self.distance_m
@@ -117,19 +104,19 @@ def make_competing_objective(name: str, problem: GaitProblem) -> CompetingObject
     return Speed(duration=durations[0], distance_m=round(float(hip[-1, 0] - hip[0, 0]), 9))
 
 
-def add_reward(problem: GaitProblem, criterion: CompetingObjective) -> GaitProblem:
-    """Return the problem that minimises power less a reward for the criterion, of the size ``reward_W_per_unit``."""
+def add_reward(problem: GaitProblem, criterion: CompetingObjective, reward: float) -> GaitProblem:
+    """Return the problem that minimises power less a reward for the criterion [W per unit]."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
         cost = assembly.objective - point[REWARD] * criterion.express(point, assembly)
         return replace(assembly, objective=cost)
 
-    reward = Parameter(
+    parameter = Parameter(
         name=REWARD, unit=f"W/({criterion.unit})", default=0.0, description=f"reward for {criterion.name}", minimum=0.0
     )
     return problem.derive(
         name=f"{problem.name}-{criterion.name}",
         objective=Objective(name="rewarded_power", unit="W"),
-        parameters=(reward,),
+        parameters=(parameter,),
         change=change,
-    )
+    ).with_values(**{REWARD: reward})

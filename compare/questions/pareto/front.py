@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from compare.questions.pareto.competing import REWARD, CompetingObjective, add_reward
+from compare.questions.pareto.competing import CompetingObjective, add_reward
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible, make_solution, solve
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
@@ -41,6 +42,68 @@ class FrontPoint:
     x: tuple[float, ...]  #: (n,) as plain numbers
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Front:
+    """A front in the making: the runs at each demanded value of the criterion."""
+
+    problem: GaitProblem  #: without a demand on the criterion
+    criterion: CompetingObjective
+    starts: int  #: random starts where no neighbour helps
+    solver: Solver
+    progress: Progress
+    runs: dict[float, list[Outcome]] = field(default_factory=dict)
+
+    @cached_property
+    def prepared(self) -> Solver:
+        """The solver, ready for many solves."""
+        return self.solver.prepare(self.problem, SOLVES)
+
+    def limit(self, value: float) -> GaitProblem:
+        """Return the problem that demands a value."""
+        return self.criterion.demand(self.problem, value)
+
+    def note(self, words: str, value: float) -> None:
+        """Report what was solved at a value."""
+        self.progress(f"{words}{self.criterion.name} {value:.5g} {self.criterion.unit}")
+
+    def run(self, value: float, x0: Array) -> None:
+        """Solve at a value from a start (n,)."""
+        limited = self.limit(value)
+        end = self.prepared.run(limited, np.clip(x0, limited.lower, limited.upper))
+        self.runs.setdefault(value, []).append(end)
+
+    def follow(self, values: Sequence[float], seed: int) -> None:
+        """Solve at all values in this order, each from its neighbour."""
+        path = Continuation(starts=self.starts, seed=seed, solver=self.solver, solves=SOLVES)
+        for value in values:
+            earlier = self.runs.get(value, [])
+            self.runs[value] = earlier + path.run(self.limit(value), earlier)
+            self.note("", value)
+
+    def halve_longest_gap(self) -> None:
+        """Solve in the middle of the longest gap between solved neighbours, both ranges being 1, from these neighbours."""
+        ends = {value: find_cheapest_feasible(self.runs[value]) for value in sorted(self.runs)}
+        solved = [(value, end) for value, end in ends.items() if end is not None]
+        values, costs = np.array([(value, end.cost) for value, end in solved]).T
+        k = int(np.argmax(np.hypot(np.diff(values) / np.ptp(values), np.diff(costs) / np.ptp(costs))))
+        middle, neighbours = float((values[k] + values[k + 1]) / 2), [solved[k][1], solved[k + 1][1]]
+        warm = (self.prepared.run_from(self.limit(middle), end) for end in neighbours)
+        self.runs[middle] = [*self.runs.get(middle, []), *(end for end in warm if end is not None)]
+        if find_cheapest_feasible(self.runs[middle]) is None:
+            for end in neighbours:
+                self.run(middle, end.x)
+        self.note("", middle)
+
+    def find_best(self, value: float) -> FrontPoint | None:
+        """Return the best point at a value; None if no run converged there."""
+        best = find_cheapest_feasible(self.runs[value])
+        if best is None:
+            return None
+        solution = make_solution(self.limit(value), self.runs[value])
+        price = math.nan if best.guess is None else self.criterion.compute_price(solution)
+        return _make_point(self.problem, self.criterion, solution, price)
+
+
 def solve_front(
     problem: GaitProblem,
     criterion: CompetingObjective,
@@ -51,127 +114,84 @@ def solve_front(
     solver: Solver | None = None,
     progress: Progress = ignore_progress,
     known: Sequence[float] = (),
-) -> list[FrontPoint]:
+) -> tuple[FrontPoint, ...]:
     """Return points of the front, by rising criterion, about evenly spaced along it.
 
     Half of the points are spaced evenly over the criterion, from its value at the least power to the end of the front; the
     others halve the longest gaps between neighbours, measured with both ranges as 1. Each is solved from both neighbours, some
     also from random starts, and the whole front is then followed forwards and backwards, so that a better local optimum
-    spreads as far as it is the better one. The problem keeps its other limits; its demand on the criterion is dropped. ``starts``
-    counts the random starts at both ends and at every third point; the solver is IPOPT with its defaults if it is None. One
-    more start is a point (n,) that is known to be good, from which the power at its own criterion is solved for.
+    spreads as far as it is the better one. The problem keeps its other limits; its demand on the criterion is dropped.
+    ``starts`` counts the random starts at both ends and at every third point; the solver is IPOPT with its defaults if it is
+    None. One more start is a point (n,) that is known to be good, from which the power at its own criterion is solved for.
 
     Raises:
         InputError: too few points, or the least power or the largest criterion cannot be found.
     """
     if points < LEAST_POINTS:
         raise InputError(f"points must be at least {LEAST_POINTS}, got {points}")
-    problem = criterion.drop_demand(problem)
+    problem, solver = criterion.drop_demand(problem), solver or IpoptSettings()
     low, high = _solve_ends(problem, criterion, starts, seed, solver)
-    ready = (solver or IpoptSettings()).prepare(problem, SOLVES)
-    rng = np.random.default_rng(seed)
-    found: dict[float, list[Outcome]] = {}
-
-    def attempt(at: float, x0: Array) -> None:
-        limited = criterion.demand(problem, at)
-        found.setdefault(at, []).append(ready.run(limited, np.clip(x0, limited.lower, limited.upper)))
-
-    def follow(order: Sequence[float], path_seed: int) -> None:
-        path = Continuation(starts=starts, seed=path_seed, solver=solver, solves=SOLVES)
-        for at in order:
-            limited = criterion.demand(problem, at)
-            found[at] = found.get(at, []) + path.run(limited, found.get(at, []))
-            progress(f"{criterion.name} {at:.5g} {criterion.unit}")
-
+    front = _Front(problem=problem, criterion=criterion, starts=starts, solver=solver, progress=progress)
     grid = np.linspace(low.value, high.value, max(LEAST_POINTS, points // 2)).tolist()
-    for point, at in ((low, grid[0]), (high, grid[-1])):
-        attempt(at, np.array(point.x))
+    front.run(grid[0], np.array(low.x))
+    front.run(grid[-1], np.array(high.x))
     if known:
-        attempt(criterion.evaluate(problem, np.array(known)), np.array(known))
-    for at in grid[::CHECK_EVERY]:
+        front.run(criterion.evaluate(problem, np.array(known)), np.array(known))
+    rng = np.random.default_rng(seed)
+    for value in grid[::CHECK_EVERY]:
         for _ in range(starts):
-            attempt(at, criterion.demand(problem, at).start_point(rng))
-        progress(f"random starts at {criterion.name} {at:.5g} {criterion.unit}")
-    follow(grid, seed)
-    follow(grid[::-1], seed + 1)
-    while len(found) < points:
-        at, neighbours = _find_largest_gap(found)
-        limited = criterion.demand(problem, at)
-        warm = (ready.run_from(limited, end) for end in neighbours)
-        found[at] = [*found.get(at, []), *(end for end in warm if end is not None)]
-        if find_cheapest_feasible(found[at]) is None:
-            for end in neighbours:
-                attempt(at, end.x)
-        progress(f"{criterion.name} {at:.5g} {criterion.unit}")
-    follow(sorted(found), seed)
-    follow(sorted(found, reverse=True), seed + 1)
-    return select_front(
-        [p for at in sorted(found) if (p := _make_point(problem, criterion, at, found[at])) is not None]
-    )
+            front.run(value, front.limit(value).start_point(rng))
+        front.note("random starts at ", value)
+    front.follow(grid, seed)
+    front.follow(grid[::-1], seed + 1)
+    while len(front.runs) < points:
+        front.halve_longest_gap()
+    front.follow(sorted(front.runs), seed)
+    front.follow(sorted(front.runs, reverse=True), seed + 1)
+    return select_front(filter(None, map(front.find_best, sorted(front.runs))))
 
 
 def solve_point(
-    problem: GaitProblem, criterion: CompetingObjective, least: float, x0: Array, solver: Solver | None = None
+    problem: GaitProblem, criterion: CompetingObjective, least: float, x0: Sequence[float], solver: Solver
 ) -> FrontPoint | None:
     """Return the least power with the criterion at least at a value, from a start (n,); None if it does not converge."""
-    limited = criterion.demand(problem, least)
-    x0 = np.clip(x0, limited.lower, limited.upper)
-    return _make_point(
-        problem, criterion, least, [(solver or IpoptSettings()).prepare(problem, SOLVES).run(limited, x0)]
-    )
+    front = _Front(problem=problem, criterion=criterion, starts=0, solver=solver, progress=ignore_progress)
+    front.run(least, np.array(x0))
+    return front.find_best(least)
 
 
-def select_front(points: Iterable[FrontPoint]) -> list[FrontPoint]:
+def select_front(points: Iterable[FrontPoint]) -> tuple[FrontPoint, ...]:
     """Return the points, by rising criterion, that no other point equals or betters in both; the first of equal ones stays."""
     kept: list[FrontPoint] = []
     for point in sorted(points, key=lambda p: (-p.value, p.power_W)):
         if not kept or point.power_W < kept[-1].power_W:
             kept.append(point)
-    return kept[::-1]
+    return tuple(kept[::-1])
 
 
 def _solve_ends(
-    problem: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver | None
+    problem: GaitProblem, criterion: CompetingObjective, starts: int, seed: int, solver: Solver
 ) -> tuple[FrontPoint, FrontPoint]:
     """Return the least power, and the point beyond which the criterion costs too much."""
     solution = solve(problem, starts=2 * starts, seed=seed, solver=solver)
     if not solution.converged:
         raise InputError(f"{problem.name} has no front: {solution.status}")
-    low = _make_reached(problem, criterion, solution)
-    reward = LARGEST_TRADE_OFF * abs(low.power_W / low.value)
-    ending = add_reward(problem, criterion).with_values(**{REWARD: reward})
+    low = _make_point(problem, criterion, solution)
+    ending = add_reward(problem, criterion, LARGEST_TRADE_OFF * abs(low.power_W / low.value))
     solution = solve(ending, starts=2 * starts, seed=seed, solver=solver)
     if not solution.converged:
         raise InputError(f"the largest {criterion.name} of {problem.name} was not found: {solution.status}")
-    return low, _make_reached(problem, criterion, solution)
-
-
-def _find_largest_gap(found: dict[float, list[Outcome]]) -> tuple[float, list[Outcome]]:
-    """Middle of the longest gap between solved neighbours, and their ends."""
-    solved = [(at, end) for at in sorted(found) if (end := find_cheapest_feasible(found[at])) is not None]
-    at = np.array([a for a, _ in solved])
-    cost = np.array([end.cost for _, end in solved])
-    lengths = np.hypot(np.diff(at) / np.ptp(at), np.diff(cost) / np.ptp(cost))
-    k = int(np.argmax(lengths))
-    return float((at[k] + at[k + 1]) / 2), [solved[k][1], solved[k + 1][1]]
+    return low, _make_point(problem, criterion, solution)
 
 
 def _make_point(
-    problem: GaitProblem, criterion: CompetingObjective, at: float, outcomes: Sequence[Outcome]
-) -> FrontPoint | None:
-    solution = make_solution(criterion.demand(problem, at), outcomes)
-    best = find_cheapest_feasible(outcomes)
-    if best is None:
-        return None
-    price = math.nan if best.guess is None else criterion.compute_price(solution)
-    return replace(_make_reached(problem, criterion, solution), price=price)
-
-
-def _make_reached(problem: GaitProblem, criterion: CompetingObjective, solution: Solution) -> FrontPoint:
+    problem: GaitProblem, criterion: CompetingObjective, solution: Solution, price: float = 0.0
+) -> FrontPoint:
     x = problem.check_x(solution.x)
     return FrontPoint(
         value=criterion.evaluate(problem, x),
         power_W=build_exact_model(problem).at(x, problem.p).cost,
+        price=price,
         violation=solution.best.violation,
         x=tuple(x.tolist()),
     )

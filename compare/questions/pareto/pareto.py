@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import make_axis_label
-from compare.drawing.figures import COLOURS, make_figure, use_style
+from compare.drawing.figures import COLOURS, add_legend_below, make_figure, use_style
 from compare.questions.pareto import front as front_module
 from compare.questions.pareto.competing import CompetingObjective, make_competing_objective
 from compare.questions.pareto.front import FrontPoint, Knee, find_knees, select_front, solve_front, solve_point
@@ -18,12 +18,11 @@ from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
-from metaheuristics.multi_objective import MultiObjective, check_budgets, make_front_algorithm, minimize_many
+from metaheuristics.multi_objective import check_budgets, make_front_algorithm, minimize_many
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.identity import fingerprint, identify_problem
 from nlp_gait.backends.kernel.compiled import CompiledObjective, compile_objective
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
@@ -39,11 +38,16 @@ Spread = tuple[float, float, float]
 """Least, median and greatest value over the runs."""
 
 
+def to_arrays(points: Sequence[FrontPoint | Knee]) -> Array:
+    """Return criterion and power of points (2, P)."""
+    return np.array([(point.value, point.power_W) for point in points]).reshape(-1, 2).T
+
+
 class Scale:
     """Power and criterion as numbers to be minimised, 0 at the best and 1 at the worst value on the true front."""
 
     def __init__(self, front: Sequence[FrontPoint]) -> None:
-        self.values, self.powers = np.array([(p.value, p.power_W) for p in front]).T
+        self.values, self.powers = to_arrays(front)
         self.best = np.array([self.powers.min(), self.values.max()])
         self.ranges = np.array([np.ptp(self.powers), -np.ptp(self.values)])
 
@@ -51,10 +55,9 @@ class Scale:
         """Return (P, 2) from criterion (P,) and power (P,)."""
         return np.asarray((np.column_stack([powers, values]) - self.best) / self.ranges)
 
-    def undo(self, F: Array) -> tuple[Array, Array]:
-        """Return criterion (P,) and power (P,) of (P, 2)."""
-        powers, values = (self.best + self.ranges * F).T
-        return values, powers
+    def compute_excess(self, values: Array, powers: Array) -> Array:
+        """Return the powers above the straight lines between the front's points, relative (P,)."""
+        return np.asarray(powers / np.interp(values, self.values, self.powers) - 1.0)
 
 
 class PowerAndCompeting:
@@ -69,6 +72,12 @@ class PowerAndCompeting:
         power, violation = self._objective(X)
         return self._scale(self._criterion.evaluate_many(self._objective, X), power), violation
 
+    def list_points(self, X: Array) -> tuple[FrontPoint, ...]:
+        """Return feasible candidates (P, n) as points."""
+        values, powers = self._criterion.evaluate_many(self._objective, X), self._objective(X)[0]
+        rows = zip(values.tolist(), powers.tolist(), X.tolist(), strict=True)
+        return tuple(FrontPoint(value=v, power_W=w, violation=0.0, x=tuple(x)) for v, w, x in rows)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchFront:
@@ -76,9 +85,7 @@ class SearchFront:
 
     solver: str  #: name of the search
     budget: int  #: evaluations allowed
-    values: Array  #: (k,) criterion
-    powers: Array  #: (k,) [W]
-    X: Array  #: (k, n)
+    points: tuple[FrontPoint, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +108,8 @@ class Challenge:
     points: int  #: number of nondominated points
     solved: int  #: for how many of these, the lowest, the least power was solved for
     infeasible: int  #: how many of these the exact functions find infeasible
-    least_gap: (
-        float  #: smallest power above the least one at an equal criterion, relative; negative if a point is better
-    )
+    #: smallest power above the least one at an equal criterion, relative; negative if a point is better
+    least_gap: float
     moved: int  #: number of points at which the front itself was improved by more than a millionth
     front: tuple[FrontPoint, ...]  #: the front with all solved points
 
@@ -152,46 +158,35 @@ class Pareto(Question[FoundFront]):
     def find(self, work: Work) -> Iterator[FoundFront]:
         criterion, problem = self.criterion, self.criterion.drop_demand(self.problem)
         known = list(find_reference(identify_problem(self.problem)).x)
-        effort = {"points": self.points, "starts": self.starts, "seed": self.seed}
-        inputs = {**fingerprint(problem), "criterion": criterion.name, **effort, "known": known}
-        solver, code = work.solver(), [front_module]
-
-        def solve() -> list[dict[str, object]]:
-            options: dict[str, Any] = {**effort, "solver": solver, "progress": work.progress, "known": known}
-            return [asdict(p) for p in solve_front(problem, criterion, **options)]
-
-        stored = work.store.compute(f"front-{criterion.name}-{{key}}", inputs, solve, code=code)
-        front = tuple(decode(FrontPoint, point) for point in stored)
+        effort: dict[str, Any] = {"points": self.points, "starts": self.starts, "seed": self.seed, "known": known}
+        inputs = {**fingerprint(problem), "criterion": criterion.name, **effort}
+        solver, progress, code = work.solver(), work.progress, [front_module]
+        solve = partial(solve_front, problem, criterion, **effort, solver=solver, progress=progress)
+        front = work.compute(tuple[FrontPoint, ...], f"front-{criterion.name}-{{key}}", inputs, solve, code)
         if not self.searches:
             yield FoundFront(front, find_knees(front))
             return
-        searches = self._run_searches(problem, Scale(front), work)
-        inputs = {**inputs, "searches": {name: list(b) for name, b in self.searches.items()}, "runs": self.runs}
-        challenge = partial(challenge_front, problem, criterion, front, searches, solver, work.progress)
-        outcome = work.compute(Challenge, f"challenge-{criterion.name}-{{key}}", inputs, challenge, code=code)
+        searches = self._run_searches(problem, front, work)
+        inputs |= {"searches": {name: list(b) for name, b in self.searches.items()}, "runs": self.runs}
+        challenge = partial(challenge_front, problem, criterion, front, searches, solver, progress)
+        outcome = work.compute(Challenge, f"challenge-{criterion.name}-{{key}}", inputs, challenge, code)
         qualities = tuple(compute_qualities(outcome.front, searches))
-        yield FoundFront(outcome.front, find_knees(outcome.front), tuple(searches), qualities, outcome)
+        yield FoundFront(outcome.front, find_knees(outcome.front), searches, qualities, outcome)
 
-    def _run_searches(self, problem: GaitProblem, scale: Scale, work: Work) -> list[SearchFront]:
-        """Return the fronts of all runs on a problem without the criterion's demand; each finished run is stored.
-
-        The scale keeps either objective from dominating an algorithm's distances.
-        """
+    def _run_searches(self, problem: GaitProblem, front: Sequence[FrontPoint], work: Work) -> tuple[SearchFront, ...]:
+        """Return the fronts of all runs on a problem without the criterion's demand; each finished run is stored."""
+        scale = Scale(front)  # keeps either objective from dominating an algorithm's distances
         objectives = PowerAndCompeting(compile_objective(problem), self.criterion, scale)
         ranges = [*scale.best.tolist(), *scale.ranges.tolist()]
         identity = {**fingerprint(problem), "criterion": self.criterion.name, "scale": ranges}
-        fronts = []
+        fronts: tuple[SearchFront, ...] = ()
         for name, budgets in self.searches.items():
-            algorithm = make_front_algorithm(name)
+            settings = repr(make_front_algorithm(name))
             for run in range(self.runs):
                 seed = self.seed + run
-                inputs = {**identity, "budgets": list(budgets), "algorithm": repr(algorithm), "seed": seed}
-                compute = partial(_run_search, objectives, algorithm, budgets, seed)
-                snapshots = work.store.compute(f"{name.lower()}-{run}-{{key}}", inputs, compute)
-                for budget, snapshot in zip(budgets, snapshots, strict=True):
-                    values, powers = scale.undo(np.array(snapshot["F"]).reshape(-1, 2))
-                    X = np.array(snapshot["X"]).reshape(-1, len(problem.names))
-                    fronts.append(SearchFront(solver=name, budget=budget, values=values, powers=powers, X=X))
+                inputs = {**identity, "budgets": list(budgets), "algorithm": settings, "seed": seed}
+                search = partial(_run_search, objectives, name, budgets, seed)
+                fronts += work.compute(tuple[SearchFront, ...], f"{name.lower()}-{run}-{{key}}", inputs, search)
                 work.progress(f"{name}, run {run}")
         return fronts
 
@@ -199,15 +194,11 @@ class Pareto(Question[FoundFront]):
         problem, criterion, challenge = self.problem, self.criterion, findings.challenge
         stem = f"{problem.name}-front-{criterion.name}"
         caption = "The front as a line, its knees, and what the searches found; its cheap part on the right."
+        value = f"{criterion.name}_{criterion.unit.replace('/', '_')}"
         rows = [
-            {
-                f"{criterion.name}_{criterion.unit.replace('/', '_')}": point.value,
-                "power_W": point.power_W,
-                "price": point.price,
-                "violation": point.violation,
-                **problem.by_name(np.array(point.x)),
-            }
-            for point in findings.front
+            {value: p.value, "power_W": p.power_W, "price": p.price, "violation": p.violation}
+            | problem.by_name(np.array(p.x))
+            for p in findings.front
         ]
         return Answer(
             stem=f"{problem.name}-pareto-{criterion.name}",
@@ -215,7 +206,7 @@ class Pareto(Question[FoundFront]):
             parts=(
                 *_make_tables(findings, criterion),
                 *_report_searches(findings, criterion),
-                Figure(name=stem, caption=caption, drawing=plot_front(findings, criterion, problem)),
+                Figure(name=stem, caption=caption, drawing=plot_front(findings, criterion)),
                 make_record_table(stem, rows),
             ),
             data={
@@ -229,15 +220,16 @@ class Pareto(Question[FoundFront]):
         )
 
 
-def _run_search(
-    objectives: PowerAndCompeting, algorithm: MultiObjective, budgets: Sequence[int], seed: int
-) -> list[dict[str, Any]]:
-    snapshots = minimize_many(objectives, algorithm, evaluations=budgets, seed=seed)
-    return [{"F": s.F.tolist(), "X": s.X.tolist()} for s in snapshots]
+def _run_search(objectives: PowerAndCompeting, name: str, budgets: Sequence[int], seed: int) -> tuple[SearchFront, ...]:
+    snapshots = minimize_many(objectives, make_front_algorithm(name), evaluations=budgets, seed=seed)
+    return tuple(
+        SearchFront(solver=name, budget=budget, points=objectives.list_points(snapshot.X))
+        for budget, snapshot in zip(budgets, snapshots, strict=True)
+    )
 
 
 def parse_searches(texts: Sequence[str]) -> dict[str, tuple[int, ...]]:
-    """Return the budgets by algorithm from ``NSGA2=10000,100000``; none from ``none``; raises InputError for another text."""
+    """Return the budgets by algorithm from ``NSGA2=10000,100000``; none from ``none``; InputError for another text."""
     if list(texts) == ["none"]:
         return {}
     searches: dict[str, tuple[int, ...]] = {}
@@ -250,6 +242,12 @@ def parse_searches(texts: Sequence[str]) -> dict[str, tuple[int, ...]]:
     return searches
 
 
+def group_runs(fronts: Sequence[SearchFront]) -> dict[tuple[str, int], list[SearchFront]]:
+    """Return the fronts of all runs by search and budget."""
+    keys = dict.fromkeys((front.solver, front.budget) for front in fronts)
+    return {key: [front for front in fronts if (front.solver, front.budget) == key] for key in keys}
+
+
 def compute_qualities(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]) -> list[Quality]:
     """Return a row for each search and budget."""
     from pymoo.indicators.hv import HV
@@ -260,21 +258,19 @@ def compute_qualities(front: Sequence[FrontPoint], fronts: Sequence[SearchFront]
     hypervolume, distance = HV(ref_point=np.full(2, REFERENCE)), IGD(true)
     whole = float(hypervolume(true))
     rows = []
-    for solver, budget in dict.fromkeys((f.solver, f.budget) for f in fronts):
-        runs = [f for f in fronts if (f.solver, f.budget) == (solver, budget)]
-        found = [f for f in runs if len(f.values)]
-        scaled = [scale(f.values, f.powers) for f in found]
-        shares = [float(hypervolume(F)) / whole for F in scaled] + [0.0] * (len(runs) - len(found))
-        above = [float(np.mean(f.powers / np.interp(f.values, scale.values, scale.powers) - 1.0)) for f in found]
+    for (solver, budget), runs in group_runs(fronts).items():
+        ends = [to_arrays(run.points) for run in runs if run.points]
+        scaled, empty = [scale(*end) for end in ends], len(runs) - len(ends)
+        shares = [float(hypervolume(F)) / whole for F in scaled] + [0.0] * empty
         rows.append(
             Quality(
                 solver=solver,
                 budget=budget,
                 runs=len(runs),
-                empty=len(runs) - len(found),
+                empty=empty,
                 hypervolume=_compute_spread(shares),
-                igd=_compute_spread([float(distance(F)) for F in scaled]) if found else None,
-                gap=_compute_spread(above) if found else None,
+                igd=_compute_spread([float(distance(F)) for F in scaled]) if ends else None,
+                gap=_compute_spread([float(scale.compute_excess(*end).mean()) for end in ends]) if ends else None,
             )
         )
     return rows
@@ -298,24 +294,19 @@ def challenge_front(
     none does. Of more than a thousand points those are taken that are lowest above the straight lines between the front's
     points.
     """
-    points = select_front(
-        FrontPoint(value=v, power_W=w, violation=0.0, x=tuple(x))
-        for found in fronts
-        for v, w, x in zip(found.values.tolist(), found.powers.tolist(), found.X.tolist(), strict=True)
-    )
-    values, powers = np.array([(p.value, p.power_W) for p in front]).T
-    lowest = sorted(points, key=lambda p: p.power_W / float(np.interp(p.value, values, powers)))[:MOST_CHALLENGES]
+    points, scale = select_front(point for search in fronts for point in search.points), Scale(front)
+    order = np.argsort(scale.compute_excess(*to_arrays(points)), kind="stable")[:MOST_CHALLENGES]
     solved: list[FrontPoint] = []
     gaps: list[float] = []
     infeasible = moved = 0
-    for point in lowest:
+    for point in (points[i] for i in order):
         exact = build_exact_model(problem).at(point.x, problem.p)
         if not exact.violation <= FEASIBILITY_TOLERANCE:
             infeasible += 1
             continue
-        near = front[int(np.argmin(np.abs(values - point.value)))]
-        at = min(point.value, front[-1].value)
-        of_front, of_search = (solve_point(problem, criterion, at, np.array(p.x), solver) for p in (near, point))
+        near = front[int(np.argmin(np.abs(scale.values - point.value)))]
+        least = min(point.value, front[-1].value)
+        of_front, of_search = (solve_point(problem, criterion, least, p.x, solver) for p in (near, point))
         candidates = [p for p in (of_front, of_search) if p is not None]
         if not candidates:
             gaps.append(exact.cost / near.power_W - 1.0 if near.value >= point.value else -np.inf)
@@ -331,7 +322,7 @@ def challenge_front(
         infeasible=infeasible,
         least_gap=min(gaps, default=np.inf),
         moved=moved,
-        front=tuple(select_front([*front, *solved])),
+        front=select_front([*front, *solved]),
     )
 
 
@@ -339,27 +330,20 @@ def _make_tables(findings: FoundFront, criterion: CompetingObjective) -> tuple[P
     """Some points of the front, and its knees."""
     front, unit, per = findings.front, criterion.unit, f"W per {criterion.unit}"
     shown = [front[i] for i in sorted({round(k * (len(front) - 1) / 9) for k in range(10)})]
+    place: dict[str, Any] = {
+        criterion.name: lambda p: f"{p.value:z.5f} {unit}",
+        "power": lambda p: f"{p.power_W:.5f} W",
+    }
+    bend: dict[str, Any] = {
+        "turn": lambda k: f"{k.turn_deg:z.0f} degrees",
+        "price before": lambda k: f"{k.price_before:.4g} {per}",
+        "price after": lambda k: f"{k.price_after:.4g} {per}",
+    }
+    title = f"Front of power against {criterion.name}, {len(front)} points, {len(shown)} shown"
+    turns = "Knees: turns of at least 15 degrees within a tenth of the front's length, both ranges being 1"
     return (
-        make_table(
-            f"Front of power against {criterion.name}, {len(front)} points, {len(shown)} shown",
-            shown,
-            {
-                criterion.name: lambda p: f"{p.value:z.5f} {unit}",
-                "power": lambda p: f"{p.power_W:.5f} W",
-                "price": lambda p: f"{p.price:.4g} {per}",
-            },
-        ),
-        make_table(
-            "Knees: turns of at least 15 degrees within a tenth of the front's length, both ranges being 1",
-            findings.knees,
-            {
-                criterion.name: lambda k: f"{k.value:z.5f} {unit}",
-                "power": lambda k: f"{k.power_W:.5f} W",
-                "turn": lambda k: f"{k.turn_deg:z.0f} degrees",
-                "price before": lambda k: f"{k.price_before:.4g} {per}",
-                "price after": lambda k: f"{k.price_after:.4g} {per}",
-            },
-        ),
+        make_table(title, shown, place | {"price": lambda p: f"{p.price:.4g} {per}"}),
+        make_table(turns, findings.knees, place | bend),
     )
 
 
@@ -367,20 +351,17 @@ def _report_searches(findings: FoundFront, criterion: CompetingObjective) -> tup
     challenge = findings.challenge
     if challenge is None:
         return ()
+    columns: dict[str, Any] = {
+        "solver": lambda q: q.solver,
+        "evaluations": lambda q: f"{q.budget:,}",
+        "hypervolume, of the front's": lambda q: _format_spread(q.hypervolume, 100, " %"),
+        "IGD": lambda q: _format_spread(q.igd, 1, ""),
+        "mean power above the front": lambda q: _format_spread(q.gap, 100, " %"),
+    }
     return (
-        make_table(
-            "Searches: median over runs (least to greatest)",
-            findings.qualities,
-            {
-                "solver": lambda q: q.solver,
-                "evaluations": lambda q: f"{q.budget:,}",
-                "hypervolume, of the front's": lambda q: _format_spread(q.hypervolume, 100, " %"),
-                "IGD": lambda q: _format_spread(q.igd, 1, ""),
-                "mean power above the front": lambda q: _format_spread(q.gap, 100, " %"),
-            },
-        ),
-        f"{challenge.points} points of the searches are nondominated; the least power was solved for {challenge.solved} of "
-        f"these, the lowest. The nearest is {100 * challenge.least_gap:+z.4f} % above the least power at its "
+        make_table("Searches: median over runs (least to greatest)", findings.qualities, columns),
+        f"{challenge.points} points of the searches are nondominated; the least power was solved for {challenge.solved} "
+        f"of these, the lowest. The nearest is {100 * challenge.least_gap:+z.4f} % above the least power at its "
         f"{criterion.name}; {challenge.moved} of them moved the front, {challenge.infeasible} are infeasible for the exact "
         "functions",
     )
@@ -393,48 +374,37 @@ def _format_spread(values: Spread | None, factor: float, unit: str) -> str:
     return f"{median}{unit} ({least} to {greatest}{unit})"
 
 
-def plot_front(findings: FoundFront, criterion: CompetingObjective, problem: GaitProblem) -> Drawing:
+def plot_front(findings: FoundFront, criterion: CompetingObjective) -> Drawing:
     """Plot the front with its knees and the points of the searches (left), and its lower part (right)."""
-    values, powers = np.array([(p.value, p.power_W) for p in findings.front]).T
-    knees, demand = findings.knees, criterion.get_demand(problem)
-    end = knees[0].value + 0.08 * np.ptp(values) if knees else values[0] + 0.5 * np.ptp(values)
-    top = float(np.interp(end, values, powers))
+    values, powers = to_arrays(findings.front)
+    end = np.interp(0.5, (0.0, 1.0), (values[0], values[-1]))
+    if findings.knees:
+        end = findings.knees[0].value + 0.08 * np.ptp(values)
+    top = np.interp(end, values, powers)
     with use_style():
         figure = make_figure(7.2, 3.3)
         left, right = figure.subplots(1, 2)
         for axes in (left, right):
             _plot_searches(axes, findings.searches)
             axes.plot(values, powers, "-", color=COLOURS["ipopt"], label=f"IPOPT, {len(values)} points")
-            if knees:
-                ring = {"markeredgecolor": COLOURS["aco"], "markersize": 9, "markeredgewidth": 1.6}
-                axes.plot(
-                    *zip(*[(k.value, k.power_W) for k in knees], strict=True), "o", color="none", label="knee", **ring
-                )
-            if values[0] < demand < values[-1]:
-                label = "demanded in the paper's problem"
-                axes.axvline(demand, color="0.6", linestyle=":", linewidth=1.0, label=label)
+            if findings.knees:
+                rings = {"markeredgecolor": COLOURS["aco"], "markersize": 9, "markeredgewidth": 1.6}
+                axes.plot(*to_arrays(findings.knees), "o", color="none", label="knee", **rings)
             axes.set_xlabel(make_axis_label(criterion.name, criterion.unit))
             axes.locator_params(axis="x", nbins=6)
-        left.set_ylabel("power [W]")
-        left.set_xlim(values[0] - 0.03 * np.ptp(values), values[-1] + 0.03 * np.ptp(values))
-        left.set_ylim(0.0, powers[-1] * 1.06)
-        right.set_xlim(values[0] - 0.03 * (end - values[0]), end)
-        right.set_ylim(powers[0] - 0.08 * (top - powers[0]), top)
+        left.set(ylabel="power [W]", ylim=(0.0, powers[-1] * 1.06))
+        right.set(xlim=(values[0], end), ylim=(powers[0] - 0.08 * (top - powers[0]), top))
         right.set_title("the front's cheap part", loc="left")
-        handles, labels = left.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
-        figure.set_figheight(3.3 + 0.19 * -(-len(labels) // 2))
+        add_legend_below(figure)
     return figure
 
 
 def _plot_searches(axes: Axes, searches: Sequence[SearchFront]) -> None:
-    budgets = sorted({f.budget for f in searches})
-    for solver, budget in sorted({(f.solver, f.budget) for f in searches}):
-        runs = [f for f in searches if (f.solver, f.budget) == (solver, budget)]
+    budgets = sorted({search.budget for search in searches})
+    for (solver, budget), runs in sorted(group_runs(searches).items()):
         title, colour = SEARCHES[solver]
         axes.plot(
-            np.concatenate([f.values for f in runs]),
-            np.concatenate([f.powers for f in runs]),
+            *to_arrays([point for run in runs for point in run.points]),
             MARKS[budgets.index(budget) % len(MARKS)],
             color=colour,
             markersize=2.5,

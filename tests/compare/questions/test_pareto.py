@@ -106,12 +106,7 @@ def test_what_cannot_be_traded_is_refused() -> None:
 
 def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothing() -> None:
     front = broken_line((0.0, 1.0), (0.7, 1.1), (1.0, 4.0))
-    values, powers = (np.array([getattr(p, key) for p in front]) for key in ("value", "power_W"))
-    none = np.empty(0)
-    runs = [
-        SearchFront(solver="NSGA2", budget=10, values=values, powers=powers, X=np.zeros((len(front), 1))),
-        SearchFront(solver="NSGA2", budget=10, values=none, powers=none, X=np.empty((0, 1))),
-    ]
+    runs = [SearchFront(solver="NSGA2", budget=10, points=points) for points in (tuple(front), ())]
     (row,) = compute_qualities(front, runs)
     assert row.hypervolume == pytest.approx((0.0, 0.5, 1.0))
     assert row.empty == 1
