@@ -34,6 +34,7 @@ CONDITIONS: Mapping[str, Conditions] = {
     },
 }
 DEFAULT = Feedback()
+NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
 STRENGTHS = ("spring_N_per_m", "damper_Ns_per_m", "tilt_spring_Nm_per_rad", "tilt_damper_Nms_per_rad")
 
 
@@ -42,12 +43,17 @@ def scale_strength(feedback: Feedback, factor: float) -> Feedback:
     return replace(feedback, **{name: factor * getattr(feedback, name) for name in STRENGTHS})
 
 
+def scale_noise(feedback: Feedback, factor: float) -> Feedback:
+    """Return the feedback with the noise of its sensors times a factor."""
+    return replace(feedback, **{name: factor * getattr(feedback, name) for name in NOISES})
+
+
 VARIANTS: Mapping[str, Feedback | None] = {
     "open loop": None,
     "default": DEFAULT,
     "another seed": replace(DEFAULT, seed=1),
-    "ideal sensors": replace(DEFAULT.with_noise(0.0), delay_s=0.0),
-    "twice the noise": DEFAULT.with_noise(2.0),
+    "ideal sensors": replace(scale_noise(DEFAULT, 0.0), delay_s=0.0),
+    "twice the noise": scale_noise(DEFAULT, 2.0),
     "delay 20 ms": replace(DEFAULT, delay_s=0.02),
     "half the springs and dampers": scale_strength(DEFAULT, 0.5),
     "twice the springs and dampers": scale_strength(DEFAULT, 2.0),

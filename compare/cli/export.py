@@ -49,7 +49,7 @@ def export(
         str,
         typer.Option(
             metavar="KIND",
-            help="Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif, mp4 or html. Of a problem: objective "
+            help="Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif or html. Of a problem: objective "
             "(C++), solver (NLP with derivatives in C++) or nl (for AMPL's solvers).",
         ),
     ],
@@ -134,7 +134,6 @@ def _load_problem(source: str, changes: ProblemOptions) -> GaitProblem:
 GAITS: Mapping[str, GaitKind] = {
     **{name: GaitKind(ending, partial(write_as, name)) for name, ending in FORMATS.items()},
     "gif": GaitKind(".gif", _write_film),
-    "mp4": GaitKind(".mp4", _write_film),
     "html": GaitKind(".html", _write_page),
 }
 PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path], Sequence[Path]]] = {

@@ -13,7 +13,7 @@ DRIVE_FILE = "its value belongs into the file of simulate --drive FILE.toml"
 FILM = "simulate --page FILE.html plays the simulation at any speed"
 # By "command", "command --option" or "--option" of any command.
 REPLACEMENTS = {
-    "animate": "export --to gif (or mp4, html) draws a gait",
+    "animate": "export --to gif (or html) draws a gait",
     "archive": "verify FOLDER --pack FILE.zip packs a study",
     "bench --code": "verify FILE.zip --code names user code of an archive",
     "bench --leaderboard": "bench ranks an algorithm beside the baseline",

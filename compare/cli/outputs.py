@@ -16,7 +16,6 @@ OWN_CONTENT = {
     ".zip": rb"manifest\.json",
     ".html": rb'<meta name="generator" content="nlp-gait">',
     ".gif": rb"\AGIF89a.*nlp-gait",
-    ".mp4": rb"nlp-gait",
     ".png": rb"\A\x89PNG.*Matplotlib",
 }
 EXAMINED = 4096  # bytes at each end

@@ -129,7 +129,7 @@ def simulate(
     ] = None,
     video: Annotated[
         Path | None,
-        typer.Option(help="Film it to this .gif or .mp4 file; needs OpenGL, and MP4 imageio-ffmpeg."),
+        typer.Option(help="Film it to this .gif file; needs OpenGL."),
         OUTPUT_FILE,
     ] = None,
     sole: Annotated[str, typer.Option(help="rectangle, as in the paper, or polygon, the true outline.")] = "rectangle",
@@ -245,10 +245,7 @@ def _print(report: Measurements, survival: Robustness | None) -> None:
     print_table("Mean power [W]", ("", "mechanical", "heat", "total", "net mechanical"), powers)
     lengths = {
         "centre of pressure to planned ZMP, RMS": report.pressure_rms_m,
-        "- largest": report.pressure_max_m,
         "- RMS in the middle 60 % of the phase": report.pressure_middle_rms_m,
-        "- RMS without averaging over a period": report.pressure_raw_rms_m,
-        "- RMS, both relative to the feet": report.pressure_in_feet_rms_m,
         "slip of a supporting foot": report.slip_m,
         **{f"landing error, {side} foot": landing.error_m for side, landing in report.landings.items()},
     }

@@ -2,8 +2,8 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,6 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
 from nlp_gait.simulation.engine import Addresses, check_period, load_mujoco
 from nlp_gait.simulation.plan import SIDES, Plan
-
-NOISES = ("position_noise_m", "velocity_noise_m_s", "tilt_noise_rad", "rate_noise_rad_s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,18 +47,11 @@ class Feedback:
     growth_limit: float = 0.05
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            least = "> 0" if each.name == "period_s" else ">= 0"
-            if isinstance(value, bool | str):
-                continue
-            if not (math.isfinite(value) and (value > 0.0 or (value == 0.0 and least == ">= 0"))):
-                raise InputError(f"{each.name} of a feedback must be {least}, got {value!r}")
+        for setting in fields(self):
+            value = getattr(self, setting.name)
+            if not 0.0 <= value < math.inf:
+                raise InputError(f"{setting.name} of a feedback must be >= 0, got {value!r}")
         check_period("feedback", self.period_s)
-
-    def with_noise(self, factor: float) -> Self:
-        """Return the same with the noise times a factor."""
-        return replace(self, **{name: factor * getattr(self, name) for name in NOISES})
 
 
 class SensorValues(NamedTuple):

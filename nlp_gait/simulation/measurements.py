@@ -76,10 +76,7 @@ class Measurements:
     landings: Mapping[str, Landing]  #: by side, of the swinging feet
     #: distance of the centre of pressure, averaged over one set-point period, from the planned ZMP
     pressure_rms_m: float | None
-    pressure_max_m: float | None  #: largest
     pressure_middle_rms_m: float | None  #: over the middle 60 % of the phase
-    pressure_raw_rms_m: float | None  #: without averaging; contact forces ring at every new set-point
-    pressure_in_feet_rms_m: float | None  #: both relative to the measured and the planned places of the supporting feet
     touchdowns: tuple[Touchdown, ...]  #: of the swinging feet, in order of time
     #: largest time by which a foot touched the ground too early; negative if all were late
     earliest_landing_s: float | None
@@ -101,11 +98,9 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
     limits = np.array([drive.torque_limit(joint) for joint in joints])
     low, high = np.array([joint.limits_rad for joint in joints]).T
     outside = (simulation.q[during] < low) | (simulation.q[during] > high)
-    pressure, planned = average_pressure(simulation, drive.period_s), plan.at("zmp", simulation.t)
-    raw = np.linalg.norm(simulation.pressure - planned, axis=1)[during]
-    deviation = np.linalg.norm(pressure - planned, axis=1)[during]
-    in_feet = np.linalg.norm(pressure - planned - _measure_feet(plan, simulation), axis=1)[during]
-    landed = _find_touchdowns(plan, simulation)
+    pressure = average_pressure(simulation, drive.period_s)
+    deviation = np.linalg.norm(pressure - plan.at("zmp", simulation.t), axis=1)[during]
+    touchdowns = _find_touchdowns(plan, simulation)
     share = simulation.t[during] / plan.duration_s
     middle = deviation[(share >= MIDDLE[0]) & (share <= MIDDLE[1])]
     return Measurements(
@@ -116,14 +111,11 @@ def measure(plan: Plan, simulation: Simulation, drive: Drive) -> Measurements:
         tracking_max_rad=float(np.abs(error).max()),
         slip_m=_measure_slip(plan, simulation),
         landings={side: _measure_landing(plan, simulation, side) for side in SIDES if side not in plan.supports},
-        pressure_rms_m=_apply_if_any(_compute_rms, deviation),
-        pressure_max_m=_apply_if_any(np.max, deviation),
-        pressure_middle_rms_m=_apply_if_any(_compute_rms, middle),
-        pressure_raw_rms_m=_apply_if_any(_compute_rms, raw),
-        pressure_in_feet_rms_m=_apply_if_any(_compute_rms, in_feet),
-        touchdowns=landed,
-        earliest_landing_s=max((at.planned_s - at.measured_s for at in landed), default=None),
-        landing_speed_m_s=max((at.speed_m_s for at in landed), default=None),
+        pressure_rms_m=_rms_if_any(deviation),
+        pressure_middle_rms_m=_rms_if_any(middle),
+        touchdowns=touchdowns,
+        earliest_landing_s=max((landing.planned_s - landing.measured_s for landing in touchdowns), default=None),
+        landing_speed_m_s=max((landing.speed_m_s for landing in touchdowns), default=None),
         predicted=predict_power(plan),
         measured=Power.compute(torque, simulation.qd[during], plan.heat_loss, np.mean),
         saturated=_select_joints(plan, (np.abs(torque) >= AT_LIMIT * limits).mean(axis=0), above=0.0),
@@ -168,19 +160,8 @@ def _measure_slip(plan: Plan, simulation: Simulation) -> float:
     return max((float(np.linalg.norm(path - path[0], axis=1).max()) for path in moved), default=0.0)
 
 
-def _measure_feet(plan: Plan, simulation: Simulation) -> Array:
-    """Return the distance (T, 2) of the supporting feet from their planned places [m], averaged over these feet."""
-    weights = np.stack([plan.stands(side, simulation.t) for side in SIDES], axis=1)
-    moved = np.stack(
-        [simulation.feet[:, i, :2] - plan.at(f"{side}_foot", simulation.t)[:, :2] for i, side in enumerate(SIDES)],
-        axis=1,
-    )
-    with np.errstate(invalid="ignore"):
-        return np.asarray((weights[:, :, None] * moved).sum(axis=1) / weights.sum(axis=1)[:, None])
-
-
 def _find_touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...]:
-    found, lasting = [], round(SHORTEST_CONTACT / TIME_STEP)
+    touchdowns, lasting = [], round(SHORTEST_CONTACT / TIME_STEP)
     for i, side in enumerate(SIDES):
         swings = np.diff(np.concatenate([[1.0], plan.bears(side, simulation.t), [1.0]]))
         for lifted, set_down in zip(np.flatnonzero(swings < 0), np.flatnonzero(swings > 0), strict=True):
@@ -193,8 +174,8 @@ def _find_touchdowns(plan: Plan, simulation: Simulation) -> tuple[Touchdown, ...
                 first = middle + int(lasting_from[0])
                 speed = max(0.0, float(simulation.feet[first - 1, i, 2] - simulation.feet[first, i, 2]) / TIME_STEP)
                 times = {"planned_s": float(simulation.t[planned]), "measured_s": float(simulation.t[first])}
-                found.append(Touchdown(side=side, **times, speed_m_s=speed))
-    return tuple(sorted(found, key=lambda at: at.planned_s))
+                touchdowns.append(Touchdown(side=side, **times, speed_m_s=speed))
+    return tuple(sorted(touchdowns, key=lambda touchdown: touchdown.planned_s))
 
 
 def _measure_landing(plan: Plan, simulation: Simulation, side: str) -> Landing:
@@ -212,9 +193,9 @@ def _compute_rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _apply_if_any(statistic: Any, values: Array) -> float | None:
+def _rms_if_any(values: Array) -> float | None:
     numbers = values[np.isfinite(values)]
-    return float(statistic(numbers)) if numbers.size else None
+    return _compute_rms(numbers) if numbers.size else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,5 +255,5 @@ def _measure_walked_distance(simulation: Simulation, way: tuple[float, float]) -
     """Return the distances of the point halfway between the feet along a way (x, y) and to its left, from start to rest [m]."""
     middle = simulation.feet.mean(axis=1)
     x, y = (middle[-1] - middle[0])[:2].tolist()
-    cos, sin = (part / math.hypot(*way) for part in way) if any(way) else (1.0, 0.0)
+    cos, sin = (component / math.hypot(*way) for component in way) if any(way) else (1.0, 0.0)
     return cos * x + sin * y, cos * y - sin * x

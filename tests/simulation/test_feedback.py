@@ -35,7 +35,8 @@ from nlp_gait.simulation.simulate import (  # noqa: E402
 )
 from tests.simulation.test_walking import CHEAPEST  # noqa: E402
 
-IDEAL = replace(Feedback().with_noise(0.0), delay_s=0.0)
+NOISELESS = Feedback(position_noise_m=0.0, velocity_noise_m_s=0.0, tilt_noise_rad=0.0, rate_noise_rad_s=0.0)
+IDEAL = replace(NOISELESS, delay_s=0.0)
 DOWNHILL = Conditions(slope_rad=(-0.05236, 0.0))  # 3 degrees
 STEPS = 2
 
@@ -87,7 +88,7 @@ def test_downhill_it_saves_energy_and_keeps_the_torso_upright(plan: Plan) -> Non
 def test_the_same_seed_gives_the_same_walk_and_noise_and_delay_act(step: Plan) -> None:
     first, again = simulate(step, Feedback()), simulate.__wrapped__(step, Feedback())
     np.testing.assert_array_equal(first.q, again.q)
-    others = (replace(Feedback(), seed=1), Feedback().with_noise(0.0), replace(Feedback(), delay_s=0.02))
+    others = (replace(Feedback(), seed=1), NOISELESS, replace(Feedback(), delay_s=0.02))
     for other in others:
         assert np.abs(simulate(step, other).q[: len(first.q)] - first.q).max() > 1e-5
 

@@ -44,7 +44,7 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
         (["export", "GAIT", "--to", "csv", "--set", "a=1"], ["leave out --set"]),
         (["export", "nao-ssp", "--to", "nl"], ["name their folder by --out DIR"]),
         (["export", "absent.json", "--to", "csv"], ["'absent.json' cannot be read"]),
-        (["export", "GAIT", "--to", "gif", "--out", "walk.avi"], ["must end in .gif or .mp4"]),
+        (["export", "GAIT", "--to", "gif", "--out", "walk.avi"], ["must end in .gif"]),
         (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
         (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
         (["simulate", "GAIT", "--drive", "fast"], ["unknown drive 'fast'", "feed-forward"]),
