@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -63,8 +63,6 @@ def read_duration(at: InstantPoint, phase: Support) -> SX:
 # torso and of the right foot, from the left one's.
 Angles: TypeAlias = Mapping[str, Motion]
 TORSO_YAW, RIGHT_YAW = "torso_yaw", "right_yaw"
-# What is planned of an instant, and what the joints follow from: motions of the hip, of these angles, and of both ankles by side.
-State: TypeAlias = tuple[Motion, Angles, Mapping[str, Motion]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -296,9 +294,7 @@ class Body(ABC):
         sole = Box(back=-foot.back_m, front=foot.front_m, right=-foot.right_m, left=foot.left_m)
         return lambda zmp, at, ops: compute_margins(sole, zmp - ca.repmat(DM(support_xy), 1, zmp.shape[1]), ops)
 
-    def make_curve_limits(
-        self, phase: Support, count: int, state: Callable[[InstantPoint, SX], State]
-    ) -> tuple[Limit, ...]:
+    def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""
         return ()
 

@@ -12,7 +12,7 @@ from casadi import DM, MX
 from nlp_gait.formulation import Constraint, InstantPoint, Over, Parameter, Point
 from nlp_gait.formulation.assembly import make_parameters as table
 from nlp_gait.formulation.blocks import make_labels
-from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Samples, Trace
+from nlp_gait.gaits.biped.samples import BOTH_FEET, CORNERS, Samples
 from nlp_gait.robots import Robot
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
@@ -195,34 +195,26 @@ class BalanceMargins(Limit):
 
 
 class AngleLimits(Limit):
-    """Angles within the robot's limits between the ends, which a cubic cannot break; the trace is a column of them [rad]."""
+    """Angles, a quantity of the motion, within the robot's limits between the ends, which a cubic cannot break."""
 
-    def __init__(self, name: str, robot: Robot, joints: Sequence[str], angles: Trace) -> None:
-        self._name, self._robot, self._joints, self._angles = name, robot, tuple(joints), angles
+    def __init__(self, name: str, robot: Robot, joints: Sequence[str]) -> None:
+        self._name, self._joints = name, tuple(joints)
+        self._limits = np.array([robot.joint(joint).planning_limits_rad for joint in joints])
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        return [
-            make_angle_rows(self._name, self._robot, self._joints, samples.trace(self._name, self._angles)[:, 1:-1])
-        ], {}
-
-
-def make_angle_rows(name: str, robot: Robot, joints: tuple[str, ...], angles: MX) -> Constraint:
-    """Make rows that keep angles (m, N - 1) between the ends of a phase within the robot's limits [rad]."""
-    lower, upper = (
-        MX(DM(np.tile([robot.joint(joint).planning_limits_rad[end] for joint in joints], angles.shape[1])))
-        for end in (0, 1)
-    )
-    return make_rows_at_samples(name, "rad", angles, joints, lower, upper, first=1)
+        angles = samples.read(self._name)[:, 1:-1]
+        lower, upper = (MX(DM(np.tile(limits, angles.shape[1]))) for limits in self._limits.T)
+        return [make_rows_at_samples(self._name, "rad", angles, self._joints, lower, upper, first=1)], {}
 
 
 class SplineClearance(Limit):
     """A planned swing foot above the ground between its ends, and high enough in the middle of its path, an x, at half time."""
 
-    def __init__(self, path: Trace, middle: float, least_height: str) -> None:
+    def __init__(self, path: Callable[[InstantPoint, ca.SX], ca.SX], middle: float, least_height: str) -> None:
         self._path, self._middle, self._least_height = path, middle, least_height
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        n, heights = samples.steps, samples.trace("foot", self._path)[2, 1:-1]
+        n, heights = samples.steps, samples.swing_heights[1:-1]
         above = make_rows("foot_height", "m", heights.T, MX(0.0), labels=[str(k) for k in range(1, n)], over="instant")
         # Half the phase is a sample only on some grids.
         names = [name for name, (kind, _) in at.positions.items() if kind == "x"]

@@ -21,7 +21,7 @@ from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples, Trace
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples
 from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic import balance
@@ -99,7 +99,7 @@ class PlannedLoad(LoadSharing):
         self._degree, self._weight = degree, body.weight
         self._count = degree + 1 + RAMPS  # coefficients of each component
         self.loads = make_planned_loads(body)
-        self.limits = (FootLimits(body, self.load_slope),)
+        self.limits = (FootLimits(body),)
         # Component by component, with wide bounds: coefficients may lie beyond what the curve reaches.
         weight, foot = self._weight, body.robot.feet["right"]
         along, across = max(foot.front_m, foot.back_m), max(foot.left_m, foot.right_m)
@@ -116,16 +116,16 @@ class PlannedLoad(LoadSharing):
     def add_to(self, plan: Planner) -> Planner:
         names = [variable.name for variable in self.variables]
 
-        def both(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+        def plan_with_load(at: InstantPoint, phase: SX, ops: Nonsmooth) -> Instant:
+            instant, s = plan(at, phase, ops), SX.sym("s")
             values = ca.reshape(ca.vertcat(*(at[name] for name in names)), self._count, len(COMPONENTS))
-            return plan(at, phase, ops)._replace(wrench=values.T @ load_basis(self._degree, phase))
+            basis = load_basis(self._degree, s)
+            shapes = ca.Function("shapes", [s], [basis, ca.jacobian(basis, s)])
+            load, slope = (values.T @ shape for shape in shapes(phase))
+            normal = slope[list(COMPONENTS).index("force_z")]
+            return instant._replace(wrench=load, quantities={**instant.quantities, "load_slope": normal})
 
-        return both
-
-    def load_slope(self, at: InstantPoint, phase: SX) -> SX:
-        """Return the derivative of the load on the right sole with respect to the phase [N]."""
-        own = [v.name for v in self.variables if v.name.startswith("right_force_z")]
-        return ca.dot(ca.vertcat(*(at[name] for name in own)), ca.jacobian(load_basis(self._degree, phase), phase))
+        return plan_with_load
 
     def start(self, names: Sequence[str], others: Start | None) -> Start:
         """Start near a load that passes evenly to the right foot."""
@@ -206,7 +206,10 @@ SWITCH_LOAD = (
 
 
 class FootLimits(Limit):
-    """What both soles can bear at every sample, how fast load may pass; ``load_slope`` is the right sole's by phase [N]."""
+    """What both soles can bear at every sample, and how fast load may pass.
+
+    It reads ``load_slope``, the derivative of the load on the right sole with respect to the phase [N].
+    """
 
     parameters = table(
         ("friction_coefficient", "1", balance.SOLE_FRICTION, "of both soles on the ground", 0.0, math.inf),
@@ -214,9 +217,8 @@ class FootLimits(Limit):
         ("switch_load_limit", "1", 1.0, SWITCH_LOAD, 0.0, math.inf),
     )
 
-    def __init__(self, body: Body, load_slope: Trace) -> None:
+    def __init__(self, body: Body) -> None:
         self._feet, self._weight = body.robot.feet, body.weight
-        self._load_slope = load_slope
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
         n, mu = samples.steps + 1, at["friction_coefficient"]
@@ -227,7 +229,7 @@ class FootLimits(Limit):
                 found.append(make_rows_at_samples(f"{foot}_{name}", unit, values, names, MX(0.0)))
             loads[foot] = samples.wrench(side)[2, :] / self._weight
         # The right foot's load is known with its slope, the left one has the rest of a total that changes slowly.
-        right = samples.trace("load_slope", self._load_slope) / (samples.step_s * samples.steps * self._weight)
+        right = samples.read("load_slope") / (samples.step_s * samples.steps * self._weight)
         total = loads["left"] + loads["right"]
         changes = (total[1:] - total[:-1]) / samples.step_s
         rates = {"left": ca.horzcat(changes[0], (changes[:-1] + changes[1:]) / 2, changes[-1]) - right, "right": right}

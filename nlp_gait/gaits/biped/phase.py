@@ -34,7 +34,6 @@ from nlp_gait.gaits.biped.samples import (
     Placeholders,
     Planner,
     Samples,
-    Trace,
 )
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
@@ -71,7 +70,7 @@ HISTORIES = {
     "left_foot": "left_foot",
     "right_foot": "right_foot",
 }
-OF_GROUND = tuple(f"wrench_{side}" for side in BOTH_FEET)
+IN_TIME = (*HISTORIES.values(), *(f"wrench_{side}" for side in BOTH_FEET), "attitude", "yaw")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,13 +122,6 @@ class Phase:
 
     def sample_several(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None = None) -> list[Samples]:
         """Evaluate the phase at several points in one map, each as ``sample`` does; several need analytic derivatives."""
-        names, traces = self._names_read, self._requests.traces
-        if self.derivatives == "analytic":
-            columns = self._map_instant(ats, ops, phases)
-        else:
-            staged = self._make_stages(self._symbolic_plan(ops), names, traces)
-            columns = list(self._evaluate_stages(staged, ats[0]).values())
-        split = [[part] if len(ats) == 1 else ca.horzsplit(part, part.shape[1] // len(ats)) for part in columns]
         return [
             Samples(
                 joints=self.body.joints,
@@ -138,20 +130,29 @@ class Phase:
                 grid=self.grid if phases is None else Grid(intervals=int(phases.shape[1]) - 1),
                 duration=at[self.duration],
                 progress=self.grid.progress if phases is None else phases,
-                values={name: part[k] for name, part in zip((*names, *traces), split, strict=True)},
+                values=values,
             )
-            for k, at in enumerate(ats)
+            for at, values in zip(ats, self._evaluate(ats, ops, phases), strict=True)
+        ]
+
+    def _evaluate(self, ats: Sequence[Point], ops: Nonsmooth, phases: MX | None) -> list[dict[str, MX]]:
+        """Return the quantities that limits and the goal read, by name, at each point."""
+        if self.derivatives != "analytic":
+            stages = self._make_stages(self._symbolic_plan(ops), self._names_read)
+            return [self._evaluate_stages(stages, at) for at in ats]
+        columns = self._map_instant(ats, ops, phases)
+        split = [[values] if len(ats) == 1 else ca.horzsplit(values, values.shape[1] // len(ats)) for values in columns]
+        return [
+            {name: values[k] for name, values in zip(self._names_read, split, strict=True)} for k in range(len(ats))
         ]
 
     def measure(self, name: str, now: Instant) -> SX:
         """Return a quantity (k,) of an instant by name, see ``QUANTITIES``; raises UnknownNameError."""
+        if name in now.quantities:
+            return now.quantities[name]
         if name not in QUANTITIES:
             raise unknown("quantity of a phase", name, QUANTITIES)
         return QUANTITIES[name](self, now)
-
-    def count_rows(self, name: str) -> int:
-        """Return the number of rows of a quantity by name; raises UnknownNameError."""
-        return int(self.measure(name, self._exact_now).shape[0])
 
     @cached_property
     def _requests(self) -> Placeholders:
@@ -166,17 +167,12 @@ class Phase:
             grid=self.grid,
             duration=at[self.duration],
             progress=self.grid.progress,
-            rows=self.count_rows,
-            trace_rows=self._count_trace_rows,
+            rows=lambda name: int(self.measure(name, self._exact_now).shape[0]),
         )
         for limit in self.every_limit:
             limit.add(at, symbols, Exact())
         self.goal.evaluate(at, symbols, Exact())
         return symbols
-
-    def _count_trace_rows(self, trace: Trace) -> int:
-        (_, _, phase), _, at = self._exact_plan
-        return int(trace(at, phase).shape[0])
 
     @property
     def _names_read(self) -> tuple[str, ...]:
@@ -203,7 +199,7 @@ class Phase:
 
     def signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
-        found = {name: _to_array(part) for name, part in self._evaluate_stages(self._signal_stages, at).items()}
+        found = {name: _to_array(values) for name, values in self._evaluate_histories(at).items()}
         n = self.grid.parts + 1
         arrays = {
             "t": _to_array(at[self.duration] * DM(np.linspace(0.0, 1.0, n)).T)[:, 0],
@@ -233,13 +229,13 @@ class Phase:
         return tuple(variable.name for variable in self.variables)
 
     @cached_property
-    def _exact_plan(self) -> tuple[list[SX], Instant, InstantPoint]:
+    def _exact_plan(self) -> tuple[list[SX], Instant]:
         return self._symbolic_plan(Exact())
 
-    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant, InstantPoint]:
+    def _symbolic_plan(self, ops: Nonsmooth) -> tuple[list[SX], Instant]:
         x, margin, phase = SX.sym("x", len(self.variables)), SX.sym("margin"), SX.sym("phase")
         at = InstantPoint.of(x, margin, self.names, (REACH_MARGIN,))
-        return [x, margin, phase], self.plan(at, phase, ops), at
+        return [x, margin, phase], self.plan(at, phase, ops)
 
     @cached_property
     def _exact_now(self) -> Instant:
@@ -272,22 +268,18 @@ class Phase:
 
     def _instant_outputs(self, ops: Nonsmooth) -> tuple[list[SX], list[SX]]:
         """Return x, margin and phase of one instant, and its outputs for ``sample``, with analytic derivatives."""
-        inputs, plan, at = self._exact_plan if ops.exact else self._symbolic_plan(ops)
+        inputs, plan = self._exact_plan if ops.exact else self._symbolic_plan(ops)
         now = self._exact_now if ops.exact else self.loads(plan)
-        outputs = [self.measure(name, now) for name in self._names_read]
-        return inputs, outputs + [trace(at, inputs[2]) for trace in self._requests.traces.values()]
+        return inputs, [self.measure(name, now) for name in self._names_read]
 
-    def _make_stages(
-        self, planned: tuple[list[SX], Instant, InstantPoint], names: Sequence[str], traces: Mapping[str, Trace]
-    ) -> "Stages":
+    def _make_stages(self, planned: tuple[list[SX], Instant], names: Sequence[str]) -> "Stages":
         """Return the evaluation of quantities in two stages: the motion, then the loads that it causes."""
-        inputs, plan, at = planned
-        of_motion = [name for name in names if name in OF_MOTION]
-        of_loads = [name for name in names if name not in OF_MOTION | ALL_JOINTS]
+        inputs, plan = planned
+        of_motion = [name for name in names if name in OF_MOTION or name in plan.quantities]
+        of_loads = [name for name in names if name not in {*of_motion, *ALL_JOINTS}]
         world = [plan.hip, *plan.ankles.values(), plan.wrench, plan.yaw]
         outputs = [*_stack_motions(plan, self.body.joints), ca.vertcat(*world)]
         outputs += [self.measure(name, plan) for name in of_motion]
-        outputs += [trace(at, inputs[2]) for trace in traces.values()]
         motion = ca.Function("motion", inputs, outputs)
         parts = [SX.sym(name, len(self.moving)) for name in ("q", "qd", "qdd")]
         given = SX.sym("world", ca.vertcat(*world).shape[0])
@@ -297,23 +289,26 @@ class Phase:
         joints = {**self._exact_plan[1].joints, **moved}
         now = self.loads(Instant(joints=joints, hip=hip, ankles={"L": left, "R": right}, wrench=wrench, yaw=yaw))
         loads = ca.Function("loads", [*parts, given], [self.measure(name, now) for name in of_loads])
-        return Stages(motion, loads, of_motion, of_loads, tuple(names), tuple(traces))
+        return Stages(motion, loads, of_motion, of_loads, tuple(names))
 
     def _evaluate_stages(self, stages: "Stages", at: NumericPoint) -> dict[str, MX]:
-        """Evaluate quantities and traces at all samples, by their names; derivatives may be finite differences."""
+        """Evaluate quantities at all samples, by their names; derivatives may be finite differences."""
         q, qd, qdd, world, *others = self._map(stages.motion, [at])
         if self.derivatives != "analytic":
             qd, qdd = self._differences(q, at)
         rows = [self.body.joints.index(name) for name in self.moving]
         loads = stages.loads.map(self.grid.parts + 1)(q[rows, :], qd[rows, :], qdd[rows, :], world)
-        found = dict(zip((*stages.of_motion, *stages.traces), others, strict=True))
+        found = dict(zip(stages.of_motion, others, strict=True))
         found |= dict(zip(stages.of_loads, loads if isinstance(loads, tuple) else [loads], strict=True))
         found |= {"all_q": q, "all_qd": qd, "all_qdd": qdd}  # see ``ALL_JOINTS``
-        return {name: found[name] for name in (*stages.names, *stages.traces)}
+        return {name: found[name] for name in stages.names}
+
+    def _evaluate_histories(self, at: NumericPoint) -> dict[str, MX]:
+        return self._evaluate_stages(self._history_stages, at)
 
     @cached_property
-    def _signal_stages(self) -> "Stages":
-        return self._make_stages(self._exact_plan, (*HISTORIES.values(), *OF_GROUND, "attitude", "yaw"), {})
+    def _history_stages(self) -> "Stages":
+        return self._make_stages(self._exact_plan, IN_TIME)
 
     def _map(self, function: ca.Function, ats: Sequence[Point], *columns: MX, phases: MX | None = None) -> list[Any]:
         """Evaluate a function of columns and (x, margin, phase) at all samples, or at other phases (1, k), of each point.
@@ -361,7 +356,6 @@ class Stages(NamedTuple):
     of_motion: Sequence[str]
     of_loads: Sequence[str]
     names: tuple[str, ...]  # of all quantities, in order
-    traces: tuple[str, ...]
 
 
 def _locate_sole(phase: Phase, now: Instant, side: str) -> SX:

@@ -29,6 +29,7 @@ class Instant(NamedTuple):
     yaw: SX = SX(0, 1)  # (1,) yaw of the right foot, from the left one's [rad]; empty where both point forward
     miss: SX = SX(0, 1)  # (k,) distances by which legs miss their feet [m]; empty where they cannot
     attitude: SX = SX(0, 1)  # (4,) of the torso, a unit quaternion (w, x, y, z); empty where it is upright
+    quantities: Mapping[str, SX] = {}  # others of this kind of motion by name, columns, which its limits read
     torques: Mapping[str, SX] = {}  # by joint name [Nm]; this and the rest are computed from the motion by a ``Loader``
     zmp: SX = SX(0, 1)  # (2,) in the world [m]
     wrenches: Mapping[str, SX] = {}  # (6,) of the ground on each sole by side, about the point under its ankle [N, Nm]
@@ -37,8 +38,6 @@ class Instant(NamedTuple):
 # From the phase's variables and the reach margin by name, the phase in [0, 1], and an interpretation of acos.
 Planner: TypeAlias = Callable[[InstantPoint, SX, Nonsmooth], Instant]
 Loader: TypeAlias = Callable[[Instant], Instant]  # adds torques, ZMP and the ground's wrenches to a planned motion
-# Another quantity at an instant, a column, from the variables by name and the phase in [0, 1].
-Trace: TypeAlias = Callable[[InstantPoint, SX], SX]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,10 +57,6 @@ class Samples:
         if name not in self.values:
             raise unknown("quantity of this motion", name, tuple(self.values))
         return self.values[name]
-
-    def trace(self, name: str, column: Trace) -> MX:
-        """Return a quantity (k, N + 1) that the caller defines at an instant of a planned motion."""
-        return self.read(name)
 
     @property
     def steps(self) -> int:
@@ -141,9 +136,7 @@ class Placeholders(Samples):
     """Symbols in place of samples, which record what limits and the goal read."""
 
     rows: Callable[[str], int]  # number of rows of a quantity by name; raises UnknownNameError
-    trace_rows: Callable[[Trace], int]
     names: list[str] = field(default_factory=list)  # quantities that were read
-    traces: dict[str, Trace] = field(default_factory=dict)
     values: Mapping[str, MX] = field(default_factory=dict)
 
     def read(self, name: str) -> MX:
@@ -151,8 +144,3 @@ class Placeholders(Samples):
         if name not in self.names:
             self.names.append(name)
         return MX.sym(name, self.rows(name), self.grid.parts + 1)
-
-    def trace(self, name: str, column: Trace) -> MX:
-        """Return symbols, and record the definition."""
-        self.traces[name] = column
-        return MX.sym(name, self.trace_rows(column), self.grid.parts + 1)

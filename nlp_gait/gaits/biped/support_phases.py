@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 from casadi import SX
 
 from nlp_gait.formulation import Grid, InstantPoint
-from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, State, Support, read_duration
+from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support, read_duration
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
@@ -125,19 +125,16 @@ def make_support_phase(
     def sole(at: InstantPoint, s: SX) -> SX:
         return swing(at, splines.motions(at, read_duration(at, name), s), 0.0, s).position
 
-    def state(at: InstantPoint, s: SX) -> State:
+    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
         time = read_duration(at, name)
         more = splines.motions(at, time, s)
-        hip = move_hip(at, more, *hip_places, time, s)
+        hip, angles = move_hip(at, more, *hip_places, time, s), body.angles(name, at, more, time, s)
         ankles = {**standing, "R": swing(at, more, body.ankle("R")[1], s)} if swings else standing
-        return hip, body.angles(name, at, more, time, s), ankles
-
-    def plan(at: InstantPoint, s: SX, ops: Nonsmooth) -> Instant:
-        return body.plan(*state(at, s), at[REACH_MARGIN], ops)
+        return body.plan(hip, angles, ankles, at[REACH_MARGIN], ops)
 
     balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
     clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()
-    curve_limits = body.make_curve_limits(name, splines.count, state)
+    curve_limits = body.make_curve_limits(name, splines.count)
     lift = (body.lift_variable,) if swings else ()
     own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
     variables = (*body.hip_variables, *body.angle_variables, *own)

@@ -1,6 +1,6 @@
 """NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms, its motors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -12,7 +12,7 @@ from nlp_gait.formulation import InstantPoint, Point, Signals
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
 from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
 from nlp_gait.gaits.biped import skeleton
-from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, State, Support
+from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
 from nlp_gait.gaits.biped.samples import Instant, Samples
@@ -214,7 +214,13 @@ class NaoBody(Body):
             reach.append(leg.reach)
         joints |= {name: constant_motion(angle) for name, angle in nao_joints.RESTING_ARM_ANGLES.items()}
         places = {side: ankle.position for side, ankle in ankles.items()}
-        return Instant(joints={**joints, **angles}, hip=hip.position, ankles=places, reach=vertcat(*reach))
+        return Instant(
+            joints={**joints, **angles},
+            hip=hip.position,
+            ankles=places,
+            reach=vertcat(*reach),
+            quantities={"arm_angle": vertcat(*(motion.position for motion in angles.values()))},
+        )
 
     def compute_cosines(self, q: MX) -> MX:
         return cos(q[[nao_joints.JOINTS.index(knee) for knee in nao_joints.KNEES], :])
@@ -238,17 +244,9 @@ class NaoBody(Body):
 
         return margins
 
-    def make_curve_limits(
-        self, phase: Support, count: int, state: Callable[[InstantPoint, SX], State]
-    ) -> tuple[Limit, ...]:
+    def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits of the arms' joints that swing."""
-        joints = tuple(ARM_SWING[phase])
-
-        def positions(at: InstantPoint, s: SX) -> SX:
-            _, angles, _ = state(at, s)
-            return vertcat(*(angles[joint].position for joint in joints))
-
-        return (AngleLimits("arm_angle", self.robot, joints, positions),) if count else ()
+        return (AngleLimits("arm_angle", self.robot, tuple(ARM_SWING[phase])),) if count else ()
 
     def draw(self, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
         """Return NAO with its arms and its head; a robot with other links is drawn as any biped."""

@@ -5,16 +5,16 @@ position, roll and pitch are planned; its yaw and the angle of the hips' yaw-pit
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import casadi as ca
 from casadi import DM, MX, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import InstantPoint, Point
-from nlp_gait.gaits.biped.body import Angles, State, Support
+from nlp_gait.gaits.biped.body import Angles, Support
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, RowsAndIndexes, make_rows_at_samples
-from nlp_gait.gaits.biped.samples import Instant, Samples, Trace
+from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao.body import NaoBody
 from nlp_gait.gaits.nao.joints import AXIS_TOLERANCE, HELD_ARM_ANGLES, LEG_JOINTS, YAW_PITCHES, measure_leg
 from nlp_gait.robots import Robot
@@ -41,21 +41,23 @@ class LeaningNao(NaoBody):
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         places = {side: ankle.position for side, ankle in ankles.items()}
-        joints, reach = solve_leaning_legs(self.robot, hip, read_lean(angles), places, margin, ops)
-        arms = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()}
-        arms |= {name: motion for name, motion in angles.items() if name not in LEAN}
-        return Instant(joints={**joints, **arms}, hip=hip.position, ankles=places, reach=reach)
+        lean = read_lean(angles)
+        joints, reach = solve_leaning_legs(self.robot, hip, lean, places, margin, ops)
+        swing = {name: motion for name, motion in angles.items() if name not in LEAN}
+        arms = {name: constant_motion(angle) for name, angle in HELD_ARM_ANGLES.items()} | swing
+        yaw_pitch, sole_turn = close_chain(self.robot, ca.vertcat(hip.position, lean.position), places)
+        arm_angle = ca.vertcat(*(motion.position for motion in swing.values()))
+        return Instant(
+            joints={**joints, **arms},
+            hip=hip.position,
+            ankles=places,
+            reach=reach,
+            quantities={"arm_angle": arm_angle, "other_angle": yaw_pitch, "sole_turn": sole_turn},
+        )
 
-    def make_curve_limits(
-        self, phase: Support, count: int, state: Callable[[InstantPoint, SX], State]
-    ) -> tuple[Limit, ...]:
-        def close(at: InstantPoint, s: SX) -> tuple[SX, SX]:
-            hip, angles, ankles = state(at, s)
-            places = {side: ankle.position for side, ankle in ankles.items()}
-            return close_chain(self.robot, ca.vertcat(hip.position, read_lean(angles).position), places)
-
-        yaw_pitch = AngleLimits("other_angle", self.robot, YAW_PITCHES[:1], lambda at, s: close(at, s)[0])
-        return (*super().make_curve_limits(phase, count, state), yaw_pitch, FlatSoles(lambda at, s: close(at, s)[1]))
+    def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
+        yaw_pitch = AngleLimits("other_angle", self.robot, YAW_PITCHES[:1])
+        return (*super().make_curve_limits(phase, count), yaw_pitch, FlatSoles())
 
 
 def make_leaning_nao(body: NaoBody) -> LeaningNao:
@@ -66,13 +68,10 @@ def make_leaning_nao(body: NaoBody) -> LeaningNao:
 
 
 class FlatSoles(Limit):
-    """Soles that the closed chain leaves flat where Newton's method has converged; ``turns`` (2,) are their angles [rad]."""
-
-    def __init__(self, turns: Trace) -> None:
-        self._turns = turns
+    """Soles that the closed chain leaves flat where Newton's method has converged."""
 
     def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
-        turns = samples.trace("sole_turn", self._turns)[:, 1:-1]
+        turns = samples.read("sole_turn")[:, 1:-1]
         return [make_rows_at_samples("sole_turn", "rad", turns, ("left", "right"), MX(-FLAT), MX(FLAT), first=1)], {}
 
 

@@ -232,7 +232,7 @@ def nao_ssp_free(
 
     def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
         """Start from the paper's motion, for random values of its variables."""
-        return fit_joints(trajectory, make_planned(), draw_uniform(phase.free.paper.names, parameters, rng))
+        return fit_joints(trajectory, make_planned(), draw_uniform(phase.paper.names, parameters, rng))
 
     title = "single support with free joints: least mean power"
     return make_phase_problem("ssp-free", title, replace(phase, start=start), searchable=False)
