@@ -3,7 +3,6 @@
 import json
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -174,15 +173,15 @@ def test_limits_of_one_kind_of_phase_are_loaded_again_as_such() -> None:
 
 def test_a_recorded_motion_has_the_rows_too() -> None:
     from nlp_gait.gaits.biped.body import Support
-    from nlp_gait.gaits.biped.recorded_cycle import make_recorded_phase_problem
-    from nlp_gait.gaits.biped.recorded_motion import RecordedMotion
     from nlp_gait.gaits.nao.body import make_nao
+    from nlp_gait.gaits.nao.recorded import make_recorded_phase_problem
+    from nlp_gait.gaits.nao.recorded_motion import RecordedMotion
 
     problem = nlp_gait.load("nao-ssp")
     signals = problem.signals(problem.check_x(OPTIMUM))
-    motion = RecordedMotion(body=make_nao("nao-v5"), t=signals.arrays["t"], q=signals.arrays["q"])
     body = make_nao("nao-v5", limits=",".join(LIMITS))
-    recorded = make_recorded_phase_problem(body, Support.SINGLE, replace(motion, body=body), Grid(intervals=10))
+    motion = RecordedMotion(body=body, t=signals.arrays["t"], q=signals.arrays["q"])
+    recorded = make_recorded_phase_problem(Support.SINGLE, motion, Grid(intervals=10))
     rows = build_exact_model(recorded)
     values = dict(zip(rows.row_names, rows.at(np.array([4.0]), recorded.p).g, strict=True))
     planned = nlp_gait.load("nao-ssp", limits=",".join(LIMITS))

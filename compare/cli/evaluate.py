@@ -28,7 +28,7 @@ from nlp_gait.robots import load_robot
 
 if TYPE_CHECKING:
     from compare.questions.recorded import JudgedGait
-    from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
+    from nlp_gait.gaits.nao.recorded import RecordedGait
 
 SHOWN_VIOLATIONS = 10
 

@@ -11,7 +11,7 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.errors import GaitError
 from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Result
-from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
+from nlp_gait.gaits.nao.recorded import RecordedGait
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure
 from nlp_gait.simulation.plan import make_plan

@@ -6,7 +6,7 @@ from typing import Any
 from nlp_gait.errors import InputError
 from nlp_gait.providers import import_object
 
-_NAO_RECORDED = "nlp_gait.gaits.nao.problems:make_recorded_gait"
+_NAO_RECORDED = "nlp_gait.gaits.nao.recorded:make_recorded_gait"
 _NAO_FITTED = "nlp_gait.gaits.nao.free_joints:fit_joints"
 # Makes a gait from recorded joint angles, by the problem whose limits judge it; the first is the default.
 RECORDED_GAITS = {"nao-ssp": _NAO_RECORDED, "nao-dsp": _NAO_RECORDED, "nao-cycle": _NAO_RECORDED}

@@ -176,11 +176,6 @@ def guess(leg: Leg, hip: SX, rotation: SX, margin: SX, ops: Nonsmooth) -> tuple[
     return ca.vertcat(*(cos for cos, _ in turns)), ca.vertcat(*(sin for _, sin in turns))
 
 
-def compute_reach(leg: Leg, q: SX) -> SX:
-    """Return the cosine of the knee's angle from straight, as in ``LegMotion``, for given angles (6,) [rad]."""
-    return _knee_cosine(leg, ca.sumsqr(_build_chain(leg, ca.cos(q), ca.sin(q)).hip - _ankle(leg)))
-
-
 def _ankle(leg: Leg) -> SX:
     return SX(DM(leg.ankle_m - leg.foot_m))
 

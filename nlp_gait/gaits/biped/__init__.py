@@ -12,6 +12,6 @@ From a robot to the first constraint, in reading order:
     Assembly  objective, rows and indexes of a problem (``nlp_gait.formulation``)
 
 ``support_phases.py`` composes a phase, ``cycle.py`` joins both; ``phase_problem.py`` makes the problem.
-``load_sharing.py`` divides the load between two standing feet. ``recorded_*.py`` judge motions that are given as angles over
-time by the same limits.
+``load_sharing.py`` divides the load between two standing feet. ``nao/joint_phase.py`` is a phase whose joints' motion is given,
+free or recorded.
 """

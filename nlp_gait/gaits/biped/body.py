@@ -10,7 +10,7 @@ from typing import Self, TypeAlias
 
 import casadi as ca
 import numpy as np
-from casadi import DM, MX, SX
+from casadi import DM, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
@@ -283,10 +283,6 @@ class Body(ABC):
         Motions are those of the hip (3,) [m], of the planned angles [rad], of which those left out rest, and of the ankles (3,)
         by ``"L"`` and ``"R"`` [m]; ``margin`` is on the reach of the knees.
         """
-
-    @abstractmethod
-    def compute_cosines(self, q: MX) -> MX:
-        """Return the cosines (2, n) of both knees, as ``plan`` has them, from the angles (J, n) of all joints."""
 
     def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
         """Return the balance margins on the left sole, whose ankle is at ``support_xy`` [m]: distances to the nearer edges."""

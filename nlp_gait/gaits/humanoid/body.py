@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from casadi import DM, MX, SX
+from casadi import DM, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Variable
@@ -71,14 +71,6 @@ class Humanoid(Body):
 
     def cycle_angles(self, coordinates: Sequence[Motion]) -> Angles:
         return dict(zip(LEAN, coordinates, strict=True))
-
-    def compute_cosines(self, q: MX) -> MX:
-        angles = SX.sym("q", len(self.joints))
-        legs = zip(self.biped.legs.values(), ca.vertsplit(angles, LEG_JOINT_COUNT), strict=True)
-        reach = ca.Function(
-            "reach", [angles], [ca.vertcat(*(general_leg.compute_reach(leg, own) for leg, own in legs))]
-        )
-        return reach.map(q.shape[1])(q)
 
     def plan(self, hip: Motion, angles: Angles, ankles: Mapping[str, Motion], margin: SX, ops: Nonsmooth) -> Instant:
         """Return the motion of the whole robot; the torso rolls about its own x axis, pitches before that and yaws first."""

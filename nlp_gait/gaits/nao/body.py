@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from casadi import DM, MX, SX, cos, fmax, vertcat, vertsplit
+from casadi import DM, MX, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import InstantPoint, Point, Signals
@@ -221,9 +221,6 @@ class NaoBody(Body):
             reach=vertcat(*reach),
             quantities={"arm_angle": vertcat(*(motion.position for motion in angles.values()))},
         )
-
-    def compute_cosines(self, q: MX) -> MX:
-        return cos(q[[nao_joints.JOINTS.index(knee) for knee in nao_joints.KNEES], :])
 
     def make_sole_margins(self, support_xy: tuple[float, float]) -> Margins:
         """Return the balance margins in x and y on the left sole.

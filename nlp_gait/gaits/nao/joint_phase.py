@@ -86,7 +86,9 @@ class JointPhase(Phase):
             "other_angle": _stack(q, self.others),
         }
         mapped = [name for name in names if name not in {*values, "power"}]
-        outputs = simplify([self.measure(name, self._exact_now) for name in mapped])
+        outputs = [self.measure(name, self._exact_now) for name in mapped]
+        if isinstance(motions, MX):  # a function that is evaluated once is not worth it
+            outputs = simplify(outputs)
         columns = ca.Function("instant", [self._joint_symbols], outputs).map(n).call([motions])
         values |= {name: self.tie(column, ops) for name, column in zip(mapped, columns, strict=True)}
         values["power"] = ca.vertcat(*(qd[name] * values["torque"][joints.index(name), :] for name in moving))

@@ -1,18 +1,17 @@
-"""The NAO problems: published phases, with free joints too, walking cycle, recorded gaits; options are in ``gaits.nao``."""
+"""The NAO problems: published phases, with free joints too, walking cycle; options are in ``gaits.nao``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Grid, load, maker
+from nlp_gait.formulation import Array, GaitProblem, Grid, maker
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.formulation.gait_problem import draw_uniform
-from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.biped.body import Body, Support
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory, make_grid
 from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
 from nlp_gait.gaits.biped.footholds import parse_footholds
@@ -21,18 +20,11 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.load_sharing import LOAD_DEGREE, TorsoShare, share_load
 from nlp_gait.gaits.biped.phase import Derivatives
 from nlp_gait.gaits.biped.phase_problem import DOUBLE_SUPPORT, SINGLE_SUPPORT, Criterion, make_goal, make_phase_problem
-from nlp_gait.gaits.biped.recorded_cycle import (
-    RecordedCycles,
-    RecordedGait,
-    make_recorded_phase_problem,
-    make_refinable,
-)
-from nlp_gait.gaits.biped.recorded_motion import FINE, LEAST_ROWS, LIFTED, RecordedMotion, make_places_function
 from nlp_gait.gaits.biped.support_phases import make_support_phase, place_hip, place_soles, place_stance
 from nlp_gait.gaits.biped.walk import plan_whole_walk
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, ZmpGravity, ZmpMasses, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
-from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES, check_step_length
+from nlp_gait.gaits.nao.joints import check_step_length
 from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
 from nlp_gait.gaits.nao.least_power.power_form import FORM_OPTIONS, make_power_form_maker
 from nlp_gait.gaits.nao.least_power.power_instants import make_double_support, make_single_support
@@ -267,98 +259,3 @@ def nao_dsp_free(
     return make_phase_problem(
         "dsp-free", "double support with a leaning torso: least mean power", phase, searchable=False
     )
-
-
-GAITS = ("nao-ssp", "nao-dsp", "nao-cycle")
-
-
-def read_motion(angles: JointAngles, body: Body) -> RecordedMotion:
-    """Return the motion of a robot on its left foot; mirrored if the right one stands. Arms that are missing are held.
-
-    Raises InputError if a joint of the legs is missing, or times or angles are missing or out of order.
-    """
-    missing = [name for name in JOINTS if name not in angles.joints]
-    needed = [name for name in missing if name not in RESTING_ARM_ANGLES]
-    if needed:
-        raise InputError(f"{angles.owner} has no angles of {', '.join(needed)}")
-    if len(angles.t) < LEAST_ROWS:
-        raise InputError(f"{angles.owner} has {len(angles.t)} rows; a motion needs {LEAST_ROWS}")
-    if not (np.isfinite(angles.t).all() and np.diff(angles.t).min() > 0.0):
-        raise InputError(f"{angles.owner}: times must ascend")
-    columns = dict(zip(angles.joints, angles.q.T, strict=True))
-    for name in JOINTS:
-        if name in columns and not np.isfinite(columns[name]).all():
-            raise InputError(f"{angles.owner}: an angle of {name} is missing")
-    columns |= {name: np.full(len(angles.t), RESTING_ARM_ANGLES[name]) for name in missing}
-    q = np.column_stack([columns[name] for name in JOINTS])
-    motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=q, held=tuple(missing))
-    heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
-    return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
-
-
-def make_nao_cycles(robot: str = "nao-v5", intervals: int = 10) -> RecordedCycles:
-    """Return NAO, or a robot of its build, and the limits of ``nao-cycle``, by which its recorded cycles are judged."""
-    return RecordedCycles(body=make_nao(robot), intervals=intervals, options={"robot": robot, "intervals": intervals})
-
-
-def make_recorded_gait(
-    angles: JointAngles,
-    *,
-    robot: str = "nao-v5",
-    intervals: int = 10,
-    gait: str | None = None,
-    touch_down_s: float | None = None,
-) -> RecordedGait:
-    """Make a gait from angles over time; their last instant is its end.
-
-    Without ``gait``, the problem with whose limits it is judged, and without ``touch_down_s``, where single support ends in a
-    cycle, both are detected. Raises InputError for angles that are not a gait, or another gait than named.
-    """
-    if gait is not None and gait not in GAITS:
-        raise InputError(f"a motion is judged by the limits of {', '.join(GAITS)}, got {gait!r}")
-    cycles = make_nao_cycles(robot, intervals)
-    body = cycles.body
-    motion = read_motion(angles, body)
-    phases: dict[Support, tuple[float, float]]
-    if touch_down_s is None and gait in ("nao-ssp", "nao-dsp"):
-        phases = {Support.SINGLE if gait == "nao-ssp" else Support.DOUBLE: (0.0, motion.duration_s)}
-    else:
-        phases = motion.phases(touch_down_s)
-    found = "nao-cycle" if len(phases) > 1 else "nao-ssp" if Support.SINGLE in phases else "nao-dsp"
-    if gait not in (None, found):
-        raise InputError(
-            f"{angles.owner} shows {found}, not {gait}: the right foot lands at no time before the end; name it with --touch-down"
-        )
-    foot = motion.right_foot(np.array([0.0, motion.duration_s]))
-    step = float(foot[1, 0])
-    if found == "nao-cycle":
-        judged = cycles.judge(motion.t, motion.q, phases[Support.SINGLE][1])
-        problem, x = judged.problem, tuple(judged.x.tolist())
-    else:
-        (name,) = phases
-        problem = make_refinable(
-            lambda grid: make_recorded_phase_problem(body, name, motion, grid), intervals, cycles.options
-        )
-        x = (motion.duration_s,)
-        step = float(foot[1, 0] - foot[0, 0]) / 2 if name == Support.SINGLE else step
-    cosine = float(make_places_function(body)(motion.q[0])[4])
-    return RecordedGait(
-        gait=found,
-        problem=problem,
-        x=x,
-        motion=motion,
-        step_m=step,
-        lean_deg=float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))),
-        make_planned=partial(_load_planned, found, problem, x, step),
-    )
-
-
-def _load_planned(gait: str, recorded: GaitProblem, x: Sequence[float], step_m: float) -> GaitProblem:
-    options = {key: recorded.options[key] for key in ("robot", "intervals")}
-    problem = load(gait, **options) if gait == "nao-cycle" else load(gait, step_length_m=step_m, **options)
-    fixed = dict(zip(recorded.names, x, strict=True))
-    wider: dict[str, float] = {}
-    for name, value in fixed.items():  # a recorded duration may violate its bounds; the optimum has the same duration
-        low, high = problem.value(f"{name}.lower"), problem.value(f"{name}.upper")
-        wider |= {f"{name}.lower": min(low, value), f"{name}.upper": max(high, value)}
-    return problem.with_values(**wider).fix(**fixed)

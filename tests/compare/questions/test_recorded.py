@@ -14,7 +14,7 @@ from nlp_gait.export.formats import write_as
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.nao.problems import make_recorded_gait
+from nlp_gait.gaits.nao.recorded import make_recorded_gait
 from nlp_gait.robots import load_robot
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 

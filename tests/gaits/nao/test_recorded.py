@@ -15,10 +15,9 @@ from nlp_gait.export.formats import write_as
 from nlp_gait.export.joint_angles import read_joint_angles
 from nlp_gait.formulation import Result
 from nlp_gait.formulation.signals import JointAngles
-from nlp_gait.gaits.biped.recorded_cycle import RecordedGait
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.gaits.nao.joints import JOINTS
-from nlp_gait.gaits.nao.problems import make_recorded_gait
+from nlp_gait.gaits.nao.recorded import RecordedGait, make_recorded_gait
 from nlp_gait.robots import load_robot
 from nlp_gait.robots.tree import find_partner, mirror_sign
 from tests.pinocchio_oracle import floating_model, stand

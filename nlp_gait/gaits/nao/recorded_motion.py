@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -13,13 +12,10 @@ from casadi import DM, SX
 
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array
+from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import Body, Support
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
-from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import make_tree
-from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
-from nlp_gait.symbolic.tape import simplify
-from nlp_gait.symbolic.trajectories import Motion
+from nlp_gait.gaits.nao.joint_phase import locate_free_parts
+from nlp_gait.gaits.nao.joints import JOINTS, RESTING_ARM_ANGLES
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -60,22 +56,22 @@ class RecordedMotion:
 
         Raises InputError for too few samples.
         """
-        own = (self.t > start_s - SAME_TIME_S) & (self.t < end_s + SAME_TIME_S)
-        count = np.count_nonzero(own)
+        within = (self.t > start_s - SAME_TIME_S) & (self.t < end_s + SAME_TIME_S)
+        count = np.count_nonzero(within)
         if count < LEAST_ROWS:
             raise InputError(f"the phase from {start_s:g} s to {end_s:g} s has {count} samples; it needs {LEAST_ROWS}")
-        rows = self.t[own]
+        rows = self.t[within]
         inside = rows[(rows > start_s + SAME_TIME_S) & (rows < end_s - SAME_TIME_S)]
         times = np.array([start_s, *inside, end_s])
         from scipy.interpolate import CubicSpline
 
-        q = CubicSpline(rows, self.q[own])(times)
+        q = CubicSpline(rows, self.q[within])(times)
         return replace(self, t=times - start_s, q=q)
 
     def right_foot(self, times: Array) -> Array:
         """Return the right sole under its ankle relative to the left one (T, 3): ahead, to the left, and above [m]."""
         (_, left_y, _), (_, height) = self.body.support, self.body.ankle("R")
-        ankle = make_places_function(self.body).map(len(times))(DM(self.spline(times).T))[2].full().T
+        ankle = make_places_function(self.body).map(len(times))(DM(self.spline(times).T))[0].full().T
         return np.asarray(ankle - (0.0, left_y, height))
 
     def mirror_image(self) -> RecordedMotion:
@@ -112,63 +108,33 @@ class RecordedMotion:
         return float(self.t[np.argmin(np.abs(self.t - (self.t[last] + late)))])
 
 
-class FreeParts(NamedTuple):
-    """Places of what does not stand."""
-
-    torso: SX  # (3,) origin of the torso [m]
-    ankle: SX  # (3,) of the right foot [m]
-    corners: SX  # (3, 4) of the right sole [m]
-    rotation: SX  # (3, 3) from the torso's axes
-
-
-def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, float, float]) -> FreeParts:
-    """Return the places of torso and right foot of a robot with its left ankle at ``support`` [m], from joint angles [rad]."""
-    tree = make_tree(robot, robot.feet["left"].link)
-    found = forward_kinematics(tree, q, SX(DM(support)))
-    poses = {body.link.name: pose for body, pose in zip(tree, found, strict=True)}
-    torso = poses[robot.root]
-    entry = next(body.joint for body in tree if body.link.name == robot.root)
-    assert entry is not None  # the torso is not the fixed link; for the type checker
-    foot = robot.feet["right"]
-    ankle = poses[foot.link]
-    corners = [
-        (along, across, -foot.ankle_height_m)
-        for along in (-foot.back_m, foot.front_m)
-        for across in (-foot.right_m, foot.left_m)
-    ]
-    return FreeParts(
-        torso.position - torso.rotation @ DM(entry.origin_m),
-        ankle.position,
-        ca.repmat(ankle.position, 1, 4) + ankle.rotation @ DM(np.array(corners).T),
-        torso.rotation,
-    )
-
-
 @lru_cache(maxsize=8)
 def make_places_function(body: Body) -> ca.Function:
-    """Return the function of angles (J,) to torso, hip, right ankle (3,), right sole's corners (3, 4) [m], cosine of the lean."""
+    """Return the function of angles (J,) to the right ankle (3,) [m], and the cosine of the torso's lean."""
     q = SX.sym("q", len(body.joints))
-    parts = locate_free_parts(body.robot, dict(zip(body.joints, ca.vertsplit(q), strict=True)), body.support)
-    hip = parts.torso + parts.rotation @ DM(body.hip_m)
-    return ca.Function("places", [q], [parts.torso, hip, parts.ankle, parts.corners, parts.rotation[2, 2]])
+    places = locate_free_parts(body.robot, dict(zip(body.joints, ca.vertsplit(q), strict=True)), body.support)
+    return ca.Function("places", [q], [places.ankle, places.rotation[2, 2]])
 
 
-@lru_cache(maxsize=8)  # the phases of a few robots: every motion of one has the same
-def make_instant_function(body: Body, loads: Loader) -> ca.Function:
-    """Return a function of angles and both derivatives (J,) on the left foot.
+def read_motion(angles: JointAngles, body: Body) -> RecordedMotion:
+    """Return the motion of a robot on its left foot; mirrored if the right one stands. Arms that are missing are held.
 
-    Outputs: torque (J,), ZMP (2,), torso (3,), hip (3,) and its velocity, right ankle (3,), corners of the right sole (12,),
-    centre of mass (3,), and the ground's wrench (6,) on each sole.
+    Raises InputError if a joint of the legs is missing, or times or angles are missing or out of order.
     """
-    joints, support = body.joints, SX(DM(body.support))
-    q, qd, qdd = (SX.sym(name, len(joints)) for name in ("q", "qd", "qdd"))
-    torso, hip, ankle, corners, _ = make_places_function(body)(q)
-    motions = {name: Motion(*(part[row] for part in (q, qd, qdd))) for row, name in enumerate(joints)}
-    found = loads(Instant(joints=motions, hip=torso, ankles={"L": support, "R": ankle}))
-    torque = ca.vertcat(*(found.torques[name] for name in joints))
-    angles = dict(zip(joints, ca.vertsplit(q), strict=True))
-    tree = make_tree(body.robot, body.robot.feet["left"].link)
-    com = centre_of_mass(tree, forward_kinematics(tree, angles, support))
-    outputs = [torque, found.zmp, torso, hip, ca.jtimes(hip, q, qd), ankle, ca.vec(corners), com]
-    outputs += [found.wrenches[side] for side in BOTH_FEET]
-    return ca.Function("instant", [q, qd, qdd], simplify(outputs))
+    missing = [name for name in JOINTS if name not in angles.joints]
+    needed = [name for name in missing if name not in RESTING_ARM_ANGLES]
+    if needed:
+        raise InputError(f"{angles.owner} has no angles of {', '.join(needed)}")
+    if len(angles.t) < LEAST_ROWS:
+        raise InputError(f"{angles.owner} has {len(angles.t)} rows; a motion needs {LEAST_ROWS}")
+    if not (np.isfinite(angles.t).all() and np.diff(angles.t).min() > 0.0):
+        raise InputError(f"{angles.owner}: times must ascend")
+    columns = dict(zip(angles.joints, angles.q.T, strict=True))
+    for name in JOINTS:
+        if name in columns and not np.isfinite(columns[name]).all():
+            raise InputError(f"{angles.owner}: an angle of {name} is missing")
+    columns |= {name: np.full(len(angles.t), RESTING_ARM_ANGLES[name]) for name in missing}
+    q = np.column_stack([columns[name] for name in JOINTS])
+    motion = RecordedMotion(body=body, t=angles.t - angles.t[0], q=q, held=tuple(missing))
+    heights = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))[:, 2]
+    return motion.mirror_image() if -heights.min() > max(heights.max(), LIFTED) else motion
