@@ -54,7 +54,7 @@ class JointPhase(Phase):
         joints = {name: constant_motion(angle) for name, angle in self.held.items()}
         for row, names in enumerate(self.curves.values()):
             joints |= dict.fromkeys(names, Motion(*(v[order * count + row] for order in range(3))))
-        instant = self.loads(stand_on_left_foot(self.body.robot, joints, self.support))
+        instant = self.loads(place_on_left_foot(self.body.robot, joints, self.support))
         return instant._replace(
             quantities={
                 **instant.quantities,
@@ -138,7 +138,7 @@ def locate_free_parts(robot: Robot, q: Mapping[str, SX], support: tuple[float, f
     )
 
 
-def stand_on_left_foot(robot: Robot, joints: Mapping[str, Motion], support: tuple[float, float, float]) -> Instant:
+def place_on_left_foot(robot: Robot, joints: Mapping[str, Motion], support: tuple[float, float, float]) -> Instant:
     """Return the motion of a robot with its left ankle at ``support`` [m], from that of its joints."""
     places = locate_free_parts(robot, {name: motion.position for name, motion in joints.items()}, support)
     return Instant(
