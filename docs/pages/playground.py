@@ -32,9 +32,9 @@ from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import make_goal
 from nlp_gait.gaits.biped.samples import BOTH_FEET
-from nlp_gait.gaits.biped.skeleton import ON_GROUND, make_level_sole, place_links
+from nlp_gait.gaits.biped.skeleton import ON_GROUND, list_limbs, make_level_sole, place_links
 from nlp_gait.gaits.biped.support_phases import make_support_phase
-from nlp_gait.gaits.nao.body import connect_joints, make_nao
+from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic.kinematics import centre_of_mass, forward_kinematics
 from nlp_gait.symbolic.nonsmooth import Exact
@@ -169,11 +169,12 @@ def write_frames(phase: Phase) -> Frames:
         side: now.ankles[letter] - SX([0, 0, body.robot.feet[side].ankle_height_m])
         for letter, side in BOTH_FEET.items()
     }
-    lines = connect_joints(body.full, place_links(body.full, angles, now.ankles["L"]), soles)
+    places = place_links(body.full, angles, now.ankles["L"]) | {f"{side}_foot": sole for side, sole in soles.items()}
+    lines = list_limbs(body.full)
     tree = make_tree(body.robot, body.robot.feet["left"].link)
     com = centre_of_mass(tree, forward_kinematics(tree, angles, now.ankles["L"]))
     power = sum((ca.fabs(now.joints[name].velocity * now.torques[name]) for name in body.joints), SX(0))
-    points = [point for _, line in lines for point in line]
+    points = [places[name] for _, line in lines for name in line]
     frame = ca.vertcat(*points, *soles.values(), com, now.zmp, power)
     feet = {side: make_level_sole(body.full, side, np.zeros((1, 3))) for side in soles}
     facts = {

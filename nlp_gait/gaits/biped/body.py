@@ -13,16 +13,14 @@ import numpy as np
 from casadi import DM, SX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, InstantPoint, Parameter, Signals, Variable
+from nlp_gait.formulation import Array, InstantPoint, Parameter, Variable
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import make_variables
-from nlp_gait.formulation.display import Skeleton
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
-from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.robots import Robot
 from nlp_gait.robots.tree import make_tree, mirror_sign
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler, tilt_gravity
@@ -293,7 +291,3 @@ class Body(ABC):
     def make_curve_limits(self, phase: Support, count: int) -> tuple[Limit, ...]:
         """Return the limits that cubics cannot break but splines of ``count`` coefficients can; none without splines."""
         return ()
-
-    def draw(self, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
-        """Return the robot as a stick figure."""
-        return draw_robot(self.full, signals)

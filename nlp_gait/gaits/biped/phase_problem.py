@@ -10,13 +10,14 @@ import numpy as np
 from casadi import MX
 
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, NumericPoint, Point, SolverHints, Start, Variable
-from nlp_gait.formulation.display import Display, SimulationModel, Tread
+from nlp_gait.formulation import Array, GaitProblem, NumericPoint, Point, Signals, SolverHints, Start, Variable
+from nlp_gait.formulation.display import Display, SimulationModel, Skeleton, Tread
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
@@ -94,7 +95,11 @@ def add_robot(
         steps=steps,
         ground=ground,
     )
-    display = replace(problem.display, robot=body.full, skeleton=body.draw, simulation_model=model)
+
+    def draw(signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
+        return draw_robot(body.full, signals)
+
+    display = replace(problem.display, robot=body.full, skeleton=draw, simulation_model=model)
     return replace(problem, display=display)
 
 

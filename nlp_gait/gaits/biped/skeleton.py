@@ -19,26 +19,30 @@ SHORTEST_SHARE = 0.25  # of the height of the root at zero angles; shorter limbs
 
 def draw_robot(robot: Robot, signals: Signals) -> Skeleton:
     """Return a robot's limbs and soles over time; joints that a gait does not move are at zero."""
-    arrays, at = signals.arrays, locate_links(robot, signals)
-    limbs, soles = [], []
-    for side in (LEFT, RIGHT):
-        leg = [at[link] for link in _list_chain(robot, robot.feet[side].link)]
-        limbs.append(Limb(side=side, points=np.stack([*leg, arrays[f"{side}_foot"]], axis=1)))
-        yaw = arrays["feet_yaw"][:, (LEFT, RIGHT).index(side)] if "feet_yaw" in arrays else None
-        soles.append(make_level_sole(robot, side, arrays[f"{side}_foot"], yaw))
-    feet = {link for side in (LEFT, RIGHT) for link in _list_chain(robot, robot.feet[side].link)[1:]}
+    arrays = signals.arrays
+    feet = {f"{side}_foot": arrays[f"{side}_foot"] for side in (LEFT, RIGHT)}
+    places = locate_links(robot, signals) | feet
+    limbs = [
+        Limb(side=side, points=np.stack([places[name] for name in names], axis=1)) for side, names in list_limbs(robot)
+    ]
+    yaw = arrays["feet_yaw"].T if "feet_yaw" in arrays else (None, None)
+    soles = [make_level_sole(robot, side, feet[f"{side}_foot"], yaw[k]) for k, side in enumerate((LEFT, RIGHT))]
+    return make_flat_skeleton(signals, limbs, soles)
+
+
+def list_limbs(robot: Robot) -> list[tuple[str, list[str]]]:
+    """Return side and points of each line: names of ``place_links``, and ``left_foot`` and ``right_foot``, under the ankles."""
+    chains = {side: _list_chain(robot, robot.feet[side].link) for side in (LEFT, RIGHT)}
+    limbs = [(side, [*chain, f"{side}_foot"]) for side, chain in chains.items()]
+    legs = {joint.child for side in (LEFT, RIGHT) for joint in robot.path_to_root(robot.feet[side].link)}
     height = -min(float(_place_at_zero(robot, foot.link)[2]) for foot in robot.feet.values())
     parents = {joint.parent for joint in robot.joints.values()}
-    for tip in (link for link in robot.links if link not in parents):
-        chain = _list_chain(robot, tip)
-        if feet & set(chain):
-            continue
-        far = _place_at_zero(robot, tip)
-        if np.linalg.norm(far) < SHORTEST_SHARE * height:
-            continue
-        side = TRUNK if abs(far[1]) < 0.1 * height else LEFT if far[1] > 0 else RIGHT
-        limbs.append(Limb(side=side, points=np.stack([at[link] for link in chain], axis=1)))
-    return make_flat_skeleton(signals, limbs, soles)
+    for end in (link for link in robot.links if link not in parents):
+        chain, place = _list_chain(robot, end), _place_at_zero(robot, end)
+        if not legs & {end, *chain[1:]} and np.linalg.norm(place) >= SHORTEST_SHARE * height:
+            side = TRUNK if abs(place[1]) < 0.1 * height else LEFT if place[1] > 0 else RIGHT
+            limbs.append((side, [*chain, f"{end} tip"]))
+    return limbs
 
 
 def make_level_sole(robot: Robot, side: str, centre: Array, yaw: Array | None = None) -> Sole:
@@ -51,7 +55,8 @@ def make_level_sole(robot: Robot, side: str, centre: Array, yaw: Array | None = 
 
 
 def _list_chain(robot: Robot, link: str) -> list[str]:
-    return [robot.root, *(joint.child for joint in reversed(robot.path_to_root(link)))]
+    """Return the links from the root to a link; of joints in one place, the first one's."""
+    return [robot.root, *(joint.child for joint in reversed(robot.path_to_root(link)) if any(joint.origin_m))]
 
 
 def _place_at_zero(robot: Robot, link: str) -> Array:

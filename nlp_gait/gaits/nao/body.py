@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from casadi import DM, MX, SX, fmax, vertcat, vertsplit
 
 from nlp_gait.errors import InputError, UnknownNameError
-from nlp_gait.formulation import InstantPoint, Point, Signals
+from nlp_gait.formulation import InstantPoint, Point
 from nlp_gait.formulation.added_limits import AddedLimits, parse_limits
-from nlp_gait.formulation.display import LEFT, RIGHT, TRUNK, Limb, Skeleton, make_flat_skeleton
-from nlp_gait.gaits.biped import skeleton
 from nlp_gait.gaits.biped.body import Angles, Body, Coordinate, Support
 from nlp_gait.gaits.biped.limits import AngleLimits, Limit, Margins, RowsAndIndexes, make_rows
 from nlp_gait.gaits.biped.motors import Motors, parse_features
@@ -245,16 +243,6 @@ class NaoBody(Body):
         """Return the limits of the arms' joints that swing."""
         return (AngleLimits("arm_angle", self.robot, tuple(ARM_SWING[phase])),) if count else ()
 
-    def draw(self, signals: Signals, parameters: Mapping[str, float]) -> Skeleton:
-        """Return NAO with its arms and its head; a robot with other links is drawn as any biped."""
-        if not DRAWN <= set(self.full.links):
-            return super().draw(signals, parameters)
-        feet = {side: signals.arrays[f"{side}_foot"] for side in LETTER}
-        lines = connect_joints(self.full, skeleton.locate_links(self.full, signals), feet)
-        limbs = [Limb(side=side, points=np.stack(points, axis=1)) for side, points in lines]
-        soles = [skeleton.make_level_sole(self.full, *foot) for foot in feet.items()]
-        return make_flat_skeleton(signals, limbs, soles)
-
 
 def make_nao(
     robot: str,
@@ -301,25 +289,3 @@ def make_nao(
         carries_shared_arms=arms == "shared",
         hip_height_m=(lowest, highest),
     )
-
-
-DRAWN = {
-    "Neck",
-    "Head",
-    *(f"{side}{link}" for side in "LR" for link in ("Pelvis", "Tibia", "Shoulder", "Elbow")),
-    "l_wrist",
-    "r_wrist",
-}
-LETTER = {LEFT: "L", RIGHT: "R"}
-
-
-def connect_joints(robot: Robot, at: Mapping[str, Any], feet: Mapping[str, Any]) -> list[tuple[str, list[Any]]]:
-    """Return the side and the points of each line, from places of links and under the ankles: (T, 3) numbers or (3,) symbols."""
-    torso, shoulders = at[robot.root], (at["LShoulder"] + at["RShoulder"]) / 2
-    lines = [(TRUNK, [torso, shoulders, at["Neck"], at["Head tip"]])]
-    for side, letter in LETTER.items():
-        leg = [at[f"{letter}{link}"] for link in ("Pelvis", "Tibia")]
-        arm = [at[f"{letter}{link}"] for link in ("Shoulder", "Elbow")]
-        lines.append((side, [torso, *leg, at[robot.feet[side].link], feet[side]]))
-        lines.append((side, [shoulders, *arm, at[f"{letter.lower()}_wrist tip"]]))
-    return lines
