@@ -257,6 +257,14 @@ class PointOf(Generic[Expression]):
         taken: dict[str, tuple[Literal["x", "p"], int]] = {name: ("x", i) for i, name in enumerate(variables)}
         return PointOf(x=ca.vertcat(*(self[name] for name in variables)), p=self.p, positions=parameters | taken)
 
+    def with_values(self, values: Mapping[str, Expression]) -> "PointOf[Expression]":
+        """Return the point with other values of some of its variables."""
+        places = {
+            index: values[name] for name, (kind, index) in self.positions.items() if kind == "x" and name in values
+        }
+        x = ca.vertcat(*(places.get(i, self.x[i]) for i in range(self.x.shape[0])))
+        return PointOf(x=x, p=self.p, positions=self.positions)
+
     def extend(self, name: str, value: Expression) -> "PointOf[Expression]":
         """Return the point with one more variable at the end."""
         positions = {**self.positions, name: ("x", int(self.x.shape[0]))}

@@ -14,14 +14,22 @@ from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Grid, Si
 from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable, make_parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, Support
-from nlp_gait.gaits.biped.cycle_motion import LEAST_STEP, STEP, make_cycle_planners, make_cycle_variables
+from nlp_gait.gaits.biped.cycle_motion import (
+    AFTER,
+    LANDING,
+    LEAST_STEP,
+    STEP,
+    make_cycle_planners,
+    make_cycle_variables,
+)
 from nlp_gait.gaits.biped.goals import Goal
+from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.limits import BalanceMargins, Box, Limit, compute_margins, make_rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader, Planner
-from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, Part, Sequence, Switch
+from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, Part, Sequence, Switch
 from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
@@ -33,7 +41,7 @@ LEAST_SPEED = 1e-4  # [m/s]
 NO_JUMP_LIMIT = 1000.0  # of NAO [Nm]
 
 
-TORQUE_JUMPS = (Switch("lift_off", mirrored=True), Switch("touch_down"))
+Landing = Literal["soft", "inelastic"]  # of the swinging foot: at rest, or an impact
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +49,7 @@ class WalkingCycle(Sequence):
     """A cycle sampled over both phases; of the variables, the step length is the last one."""
 
     parts: tuple[Part, ...] = CYCLE
+    touch_down: Switch = Switch(name="touch_down")
     at_given_speed: bool  # the step length is no decision variable but follows from the speed
 
     @property
@@ -59,9 +68,7 @@ class WalkingCycle(Sequence):
         both = self.phase_parameters
         balance, shared = ([p for p in both if p.name.endswith(BALANCE) == own] for own in (True, False))
         jump = ("largest jump of a torque at a switch; the default is out of reach", 0.0, math.inf)
-        limit = make_parameters(
-            ("torque_jump_limit_Nm", "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump)
-        )
+        limit = make_parameters((TORQUE_JUMP, "Nm", NO_JUMP_LIMIT * math.ceil(self.body.torque_scale), *jump))
         step = self.variables[-1]
         speed = make_parameters(
             (SPEED, "m/s", self.body.scale_time(SPEED_M_S), "speed of walking", LEAST_SPEED, math.inf),
@@ -88,9 +95,10 @@ class WalkingCycle(Sequence):
         period, step = sum(parts.times.values(), MX(0)), ca.fmax(at[STEP], LEAST_STEP)
         energy = sum(parts.energies.values(), MX(0))
         mean = sum((parts.objectives[name] * time for name, time in parts.times.items()), MX(0)) / period
-        samples, limit = list(parts.samples.values()), at["torque_jump_limit_Nm"]
-        switches = [j.limit_jump(samples[k - 1], samples[k], self.body, limit) for k, j in enumerate(TORQUE_JUMPS)]
-        rows = [row for row, _ in switches]
+        single, double = parts.samples.values()
+        lift_off, jump = Switch(name="lift_off", mirrored=True).join(self.phases, at, double, single, ops)
+        touch_down, landing = self.touch_down.join(self.phases, at, single, double, ops)
+        rows = [*lift_off, *touch_down]
         if self.at_given_speed:
             rows.append(make_rows("step_length", "m", at[STEP], at[f"{STEP}.lower"], at[f"{STEP}.upper"], over="once"))
         return Assembly(
@@ -103,7 +111,8 @@ class WalkingCycle(Sequence):
                 "speed_m_s": step / period,
                 "step_length_m": step,
                 **parts.indexes,
-                **{f"{j.name}_torque_jump_Nm": jump for j, (_, jump) in zip(TORQUE_JUMPS, switches, strict=True)},
+                **jump,
+                **landing,
             },
         )
 
@@ -113,12 +122,13 @@ class WalkingCycle(Sequence):
 
 
 def make_walking_cycle(
-    body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool
+    body: Body, sharing: LoadSharing, grid: Grid, goal: Goal, *, at_given_speed: bool, landing: Landing = "soft"
 ) -> WalkingCycle:
     """Return both phases of the cycle, joined, each with the goal; at a given speed the step length follows from it."""
-    *motion, step = make_cycle_variables(body)
+    inelastic = landing == "inelastic"
+    *motion, step = make_cycle_variables(body, inelastic)
     variables = (*motion, *sharing.variables, step)
-    plans, margins = make_cycle_planners(body), make_cycle_margins(body)
+    plans, margins = make_cycle_planners(body, inelastic), make_cycle_margins(body)
     own: dict[Support, tuple[Planner, Loader, tuple[Limit, ...]]] = {
         Support.SINGLE: (plans[Support.SINGLE], make_single_support_loads(body), ()),
         Support.DOUBLE: (sharing.add_to(plans[Support.DOUBLE]), sharing.loads, sharing.limits),
@@ -137,7 +147,10 @@ def make_walking_cycle(
         )
         for name, (plan, loads, more) in own.items()
     }
-    return WalkingCycle(body=body, variables=variables, phases=phases, at_given_speed=at_given_speed)
+    touch_down = Impact(name="touch_down") if inelastic else Switch(name="touch_down")
+    return WalkingCycle(
+        body=body, variables=variables, phases=phases, at_given_speed=at_given_speed, touch_down=touch_down
+    )
 
 
 def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
@@ -155,17 +168,20 @@ def make_cycle_margins(body: Body) -> dict[Support, BalanceMargins]:
     return {Support.SINGLE: limit_to_sole(body, (0.0, left_y)), Support.DOUBLE: limit_to_box(usual, double)}
 
 
-def plan_cycle(body: Body, grid: Grid, objective: CycleObjective, sharing: LoadSharing) -> GaitProblem:
+def plan_cycle(
+    body: Body, grid: Grid, objective: CycleObjective, sharing: LoadSharing, landing: Landing = "soft"
+) -> GaitProblem:
     """Return the problem of a walking cycle; for the options see ``gaits.nao``."""
     at_given_speed = objective != "energy-per-metre"
     goal = make_goal(body, "torque" if objective == "torque" else "power")
-    cycle = make_walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed)
+    cycle = make_walking_cycle(body, sharing, grid, goal, at_given_speed=at_given_speed, landing=landing)
     names = tuple(variable.name for variable in cycle.decisions)
 
     def reach(at: Point) -> MX:
         return ca.horzcat(*(cycle.phases[p.kind].sample(cycle.read_part(p, at), Exact()).reach for p in cycle.parts))
 
-    start = sharing.start(names, partial(draw_start, names) if at_given_speed else None)
+    drawn = at_given_speed or landing == "inelastic"
+    start = sharing.start(names, partial(draw_start, names) if drawn else None)
     if not body.closed_form:
         usual = [body.narrow(variable) for variable in cycle.decisions]
         start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)
@@ -193,9 +209,18 @@ def make_cycle_problem(
 
 
 def draw_start(names: tuple[str, ...], values: Mapping[str, float], rng: np.random.Generator) -> Array:
-    """Draw a start point within the bounds whose times give a step within its bounds, as far as their own bounds allow."""
+    """Draw a start point within the bounds, with a soft landing.
+
+    At a given speed its times give a step within its bounds, as far as their own bounds allow.
+    """
     x = draw_uniform(names, values, rng)
-    times = [names.index(time) for time in TIMES.values()]
-    step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
-    x[times] *= step / (values[SPEED] * x[times].sum())
+    if SPEED in values:
+        times = [names.index(time) for time in TIMES.values()]
+        step = rng.uniform(values[f"{STEP}.lower"], values[f"{STEP}.upper"])
+        x[times] *= step / (values[SPEED] * x[times].sum())
+    for k, name in enumerate(names):
+        if name == LANDING:
+            x[k] = values[f"{LANDING}.lower"]
+        elif AFTER in name:  # nothing jumps
+            x[k] = x[names.index(name.replace(AFTER, "touch_down"))]
     return np.asarray(x)

@@ -27,6 +27,8 @@ HIP_X_SHARES = {"lift_off": (-0.25, 0.25), "touch_down": (-0.1, 0.5)}
 STEP_SHARES = (0.1, 0.6)
 
 STEP = "step_length_m"
+LANDING, LANDING_M_S = "foot_vx_touch_down_m_s", 0.5  # of an inelastic touch-down; the greatest, of NAO
+AFTER = "after_touch_down"
 LEAST_STEP = 1e-3  # [m]; a shorter step is evaluated as this one, so that the path of the swing foot stays defined
 SUFFIXES = {"m": "m", "m/s": "m_s", "rad": "rad", "rad/s": "rad_s"}
 
@@ -49,20 +51,30 @@ class PhaseMotion(NamedTuple):
     right_from: SX  # x of the right foot from the left one [m]
     right_to: SX  # at the end [m]
     lift: SX | None = None  # height of the swing [m]
+    landing_m_s: SX | float = 0.0  # forward velocity of the swinging foot at its end
 
 
-def make_cycle_variables(body: Body) -> tuple[Variable, ...]:
+def make_cycle_variables(body: Body, inelastic: bool = False) -> tuple[Variable, ...]:
     """Return the variables of a cycle, most with the bounds of the phases; the step length is the last one."""
-    found = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
+    states = [variable for switch in SWITCHES for variable in make_state_variables(body, switch, switch)]
     low, high = (round(share * body.leg_length_m, 3) for share in STEP_SHARES)
     step = Variable(name=STEP, unit="m", lower=low, upper=high, description="from foot to foot")
+    if inelastic:
+        fastest, words = body.scale_time(LANDING_M_S * body.swing_speed), "forward velocity of the landing foot"
+        speed = Variable(name=LANDING, unit="m/s", lower=0.0, upper=fastest, description=words)
+        states += [*make_landing_rates(body), speed]
     return (
-        *found,
+        *states,
         body.lift_variable,
         body.make_time_variable(Support.SINGLE),
         body.make_time_variable(Support.DOUBLE),
         step,
     )
+
+
+def make_landing_rates(body: Body) -> list[Variable]:
+    """Return the variables of the velocities right after an inelastic touch-down, of the hip and of every coordinate."""
+    return [v for v in make_state_variables(body, AFTER, "touch_down") if v.unit in ("m/s", "rad/s")]
 
 
 def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
@@ -88,8 +100,8 @@ def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     return list(make_variables(*rows))
 
 
-def make_cycle_planners(body: Body) -> dict[Support, Planner]:
-    """Return the plans of both phases."""
+def make_cycle_planners(body: Body, inelastic: bool = False) -> dict[Support, Planner]:
+    """Return the plans of both phases; after an inelastic touch-down all velocities are variables of their own."""
     images = DM([c.image for c in body.coordinates])
     mirror = SX([1, -1, 1])
 
@@ -100,11 +112,15 @@ def make_cycle_planners(body: Body) -> dict[Support, Planner]:
 
     def single(at: InstantPoint) -> PhaseMotion:
         lift_off, touch_down, step = read(at)
-        return PhaseMotion(lift_off, touch_down, read_duration(at, Support.SINGLE), -step, step, at[LIFT])
+        speed = at[LANDING] if inelastic else 0.0
+        return PhaseMotion(lift_off, touch_down, read_duration(at, Support.SINGLE), -step, step, at[LIFT], speed)
 
     def double(at: InstantPoint) -> PhaseMotion:
         (hip, velocity, others, rates), touch_down, step = read(at)
         place = mirror * hip + vertcat(step, 0, 0)  # the mirror image of lift-off, a step further
+        if inelastic:
+            velocity_after, rates_after = read_rates(at, AFTER, body.coordinates)
+            touch_down = touch_down._replace(hip_velocity=velocity_after, others_rate=rates_after)
         end = SwitchState(place, mirror * velocity, images * others, images * rates)
         return PhaseMotion(touch_down, end, read_duration(at, Support.DOUBLE), step, step)
 
@@ -124,7 +140,9 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
         elif flight is not None:
             foot = flight.swing(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
         else:
-            foot = swing_foot(leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase)
+            foot = swing_foot(
+                leg.right_from, leg.right_to, right_y, right_z, leg.lift, leg.duration, phase, leg.landing_m_s
+            )
         hip, angles = interpolate_states(leg.start, leg.end, leg.duration, phase)
         return body.plan(hip, body.cycle_angles(angles), {"L": left, "R": foot}, at[REACH_MARGIN], ops)
 
@@ -133,12 +151,15 @@ def make_planner(body: Body, read: Callable[[InstantPoint], PhaseMotion], flight
 
 def read_state(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> SwitchState:
     """State of the variables whose names contain ``name``."""
-    return SwitchState(
-        vertcat(*(at[f"hip_{axis}_{name}_m"] for axis in "xyz")),
-        vertcat(*(at[f"hip_v{axis}_{name}_m_s"] for axis in "xyz")),
-        vertcat(*(at[f"{c.name}_{name}_rad"] for c in coordinates)),
-        vertcat(*(at[f"{c.rate}_{name}_rad_s"] for c in coordinates)),
-    )
+    velocity, rates = read_rates(at, name, coordinates)
+    hip = vertcat(*(at[f"hip_{axis}_{name}_m"] for axis in "xyz"))
+    return SwitchState(hip, velocity, vertcat(*(at[f"{c.name}_{name}_rad"] for c in coordinates)), rates)
+
+
+def read_rates(at: InstantPoint, name: str, coordinates: Sequence[Coordinate]) -> tuple[SX, SX]:
+    """Return velocity of the hip (3,) [m/s] and rates of all coordinates (k,) [rad/s] at the state of a name."""
+    velocity = vertcat(*(at[f"hip_v{axis}_{name}_m_s"] for axis in "xyz"))
+    return velocity, vertcat(*(at[f"{c.rate}_{name}_rad_s"] for c in coordinates))
 
 
 def interpolate_states(

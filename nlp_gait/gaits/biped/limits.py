@@ -18,7 +18,7 @@ from nlp_gait.symbolic.nonsmooth import Nonsmooth
 
 # Violations that count alike in the total, by unit: 10 mm of a margin or a height count like 1 rad, and like a change of a
 # foot's load that is too fast by a weight in 0.1 s.
-SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0}
+SCALES = {"rad": 1.0, "rad/s": 1.0, "Nm": 1.0, "N": 10.0, "m": 0.01, "1": 1.0, "1/s": 10.0, "N s": 0.1, "Nm s": 0.01}
 REACH_MARGIN = "reach_margin"
 TORQUE_CHANGE_NM = 1.2  # of NAO, over one interval
 LEGS = ("left leg", "right leg")

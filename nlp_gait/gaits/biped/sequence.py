@@ -50,19 +50,26 @@ CYCLE = (
 )
 
 
-class Switch(NamedTuple):
+TORQUE_JUMP = "torque_jump_limit_Nm"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switch:
     """A switch to a phase from the one before it, at which positions and rates are continuous and torques may jump."""
 
     name: str
     mirrored: bool = False  # the mirror image of the phase follows, as after the last one of a cycle
 
-    def limit_jump(self, before: Samples, after: Samples, body: Body, limit: MX) -> tuple[Constraint, MX]:
-        """Return the rows that keep the jumps of all torques within a limit, and the largest jump [Nm]."""
+    def join(
+        self, phases: Mapping[Support, Phase], at: Point, before: Samples, after: Samples, ops: Nonsmooth
+    ) -> tuple[list[Constraint], dict[str, MX]]:
+        """Return the rows that join two phases, here those that limit the torques' jumps, and indexes, their largest [Nm]."""
+        body, limit = phases[Support.SINGLE].body, at[TORQUE_JUMP]
         images, signs = body.mirror
         first = DM(signs) * after.torque[images, 0] if self.mirrored else after.torque[:, 0]
         jump, size = first - before.torque[:, -1], body.torque_scale
         rows = make_rows(f"{self.name}_torque_jump", "Nm", jump, -limit, limit, body.joints, "once", size)
-        return rows, ca.mmax(ca.fabs(jump))
+        return [rows], {f"{self.name}_torque_jump_Nm": ca.mmax(ca.fabs(jump))}
 
 
 class AssembledParts(NamedTuple):
@@ -167,7 +174,7 @@ class Sequence:
 
 
 def join_phases(phases: Iterable[Signals]) -> Signals:
-    """Join phases that begin at time zero; of both samples at a switch, equal in positions and rates, the earlier one is kept."""
+    """Join phases that begin at time zero; of both samples at a switch, equal without an impact, the earlier one is kept."""
     first, *others = phases
     arrays = {name: [array] for name, array in first.arrays.items()}
     for other in others:

@@ -21,5 +21,7 @@ Options that the problems share:
     motors                 features of the real motors, see ``gaits.biped.motors``, if the file has their data
     torso_share            in double support: lever shares the torso's mass by the lever rule, free plans the ground's wrench
     load_degree            of that wrench's polynomials over double support
+    landing                of a cycle's swinging foot: soft, at rest; or inelastic, an impact at touch-down after which all joints
+                           go on with other rates, see ``gaits.biped.impact``
     limits                 more limits of every phase, see ``nlp_gait.limits``
 """

@@ -8,7 +8,7 @@ from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.curves import Trajectory, make_grid
-from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
+from nlp_gait.gaits.biped.cycle import CycleObjective, Landing, plan_cycle
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
@@ -89,6 +89,7 @@ def humanoid_cycle(
     drive_limits: bool = True,
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
+    landing: Landing = "soft",
     limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one.
@@ -102,7 +103,7 @@ def humanoid_cycle(
     """
     body = make_humanoid(robot, drive_limits=drive_limits, motors=motors, limits=limits)
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free", rule=rule)
-    return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
+    return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree), landing)
 
 
 @maker

@@ -28,6 +28,8 @@ Options that the problems share:
     zmp_masses             23: neck and head of double support are at the torso's centre of mass in the ZMP, as the text
                            counts there (25 in single support); moves the least margins by up to 0.3 mm
     motors                 features of the real motors, separated by commas, see ``gaits.biped.motors``; none by default
+    landing                of a cycle's swinging foot: soft, at rest; or inelastic, an impact at touch-down after which all joints
+                           go on with other rates, see ``gaits.biped.impact``
     limits                 more limits of every phase, separated by commas: FrictionCone, FootClearance, or your own,
                            FILE.py:NAME; see ``nlp_gait.limits``
 """

@@ -13,7 +13,7 @@ from nlp_gait.formulation.assembly import Quadrature
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.curves import SPLINE_SAMPLES, Trajectory, make_grid
-from nlp_gait.gaits.biped.cycle import CycleObjective, plan_cycle
+from nlp_gait.gaits.biped.cycle import CycleObjective, Landing, plan_cycle
 from nlp_gait.gaits.biped.footholds import parse_footholds
 from nlp_gait.gaits.biped.footstep_walk import plan_footstep_walk
 from nlp_gait.gaits.biped.goals import Goal
@@ -139,6 +139,7 @@ def nao_cycle(
     rule: Quadrature = "trapezoid",
     motors: str = "",
     load_degree: int = LOAD_DEGREE,
+    landing: Landing = "soft",
     limits: str | AddedLimits = "",
 ) -> GaitProblem:
     """Walking cycle of NAO: one step, whose mirror image is the next one.
@@ -156,7 +157,7 @@ def nao_cycle(
     """
     body = make_nao(robot, rotational_inertia=rotational_inertia, motors=motors, limits=limits)
     grid = make_grid("cubic", intervals, samples_per_interval, planned_loads=torso_share == "free", rule=rule)
-    return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree))
+    return plan_cycle(body, grid, objective, share_load(body, torso_share, load_degree), landing)
 
 
 @maker

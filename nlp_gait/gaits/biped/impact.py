@@ -1,0 +1,79 @@
+"""Inelastic impact of the landing foot: momentum, energy and rates at touch-down.
+
+The left sole stands, the right one lands with a velocity and stays on the ground at once: it neither slips nor rebounds, and the
+standing sole is not lifted. Positions do not change. Afterwards the robot moves as double support plans it, by velocities v of
+hip and planned angles, both soles at rest, so that the rates of all joints are qd+ = D v. The drives that keep the robot to this
+plan do no work on such motions, and the momentum along each of them is kept (Gauss's principle, as for any inelastic impact):
+
+    D' M(q) (qd+ - qd-) = 0,        loss of energy = (qd+ - qd-)' M(q) (qd+ - qd-) / 2        (Carnot's theorem)
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import casadi as ca
+from casadi import MX, SX
+
+from nlp_gait.formulation import Constraint, Point
+from nlp_gait.gaits.biped.body import Body, Support
+from nlp_gait.gaits.biped.cycle_motion import AFTER, make_landing_rates
+from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows
+from nlp_gait.gaits.biped.phase import Phase
+from nlp_gait.gaits.biped.samples import Samples
+from nlp_gait.gaits.biped.sequence import Switch
+from nlp_gait.robots.tree import make_tree
+from nlp_gait.symbolic.dynamics import newton_euler
+from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+
+class ReadRates(Limit):
+    """Not a limit: it asks a phase for the angles of all joints and their rates."""
+
+    def add(self, at: Point, samples: Samples, ops: Nonsmooth) -> RowsAndIndexes:
+        for name in ("all_q", "all_qd"):
+            samples.read(name)
+        return (), {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impact(Switch):
+    """A touch-down at which the landing foot stops at once, and all joints go on with other rates."""
+
+    def join(
+        self, phases: Mapping[Support, Phase], at: Point, before: Samples, after: Samples, ops: Nonsmooth
+    ) -> tuple[list[Constraint], dict[str, MX]]:
+        """Return the rows and indexes of any switch, and of the impact: momentum [N s], energy [J], rates [rad/s]."""
+        rows, indexes = super().join(phases, at, before, after, ops)
+        single, double = (replace(phases[kind], limits=(ReadRates(),)) for kind in (Support.SINGLE, Support.DOUBLE))
+        body = single.body
+        landing = single.sample(at, ops, MX(1.0)).read("all_qd")[:, 0]
+        variables = make_landing_rates(body)
+        names = [variable.name for variable in variables]
+        # The rates of joints are linear in the planned velocities: one instant for each unit velocity.
+        units = [at.with_values({name: MX(float(name == unit)) for name in names}) for unit in names]
+        instants = double.sample_several(units, ops, MX(0.0))
+        directions = ca.horzcat(*(instant.read("all_qd") for instant in instants))
+        jump = directions @ ca.vertcat(*(at[name] for name in names)) - landing
+        impulses, force = make_impulses(body)(instants[0].read("all_q"), jump)
+        for variable, change in zip(variables, ca.vertsplit(directions.T @ impulses), strict=True):
+            unit = "N s" if variable.unit == "m/s" else "Nm s"
+            name = f"{self.name}_momentum_{variable.name.split(AFTER)[0].removesuffix('_')}"
+            rows.append(make_rows(name, unit, change, MX(0.0), MX(0.0), over="once", size=body.torque_scale))
+        return rows, indexes | {
+            f"{self.name}_energy_loss_J": ca.dot(jump, impulses) / 2,
+            f"{self.name}_impulse_Ns": ca.norm_2(force),
+            f"{self.name}_rate_jump_rad_s": ca.norm_inf(jump),
+        }
+
+
+def make_impulses(body: Body) -> ca.Function:
+    """Return the function of angles and jumps of rates (J, 1) to M(q) times the jumps [Nm s] and the ground's impulse (3,) [N s].
+
+    The robot stands on its left sole. They are the torques and the force of inverse dynamics without gravity and velocities, in
+    which the jumps take the place of accelerations.
+    """
+    q, jump = (SX.sym(name, len(body.joints)) for name in ("q", "jump"))
+    tree = make_tree(body.robot, body.robot.feet["left"].link, body.joints)
+    at, moved = (dict(zip(body.joints, ca.vertsplit(part), strict=True)) for part in (q, jump))
+    torques, wrench = newton_euler(tree, at, dict.fromkeys(body.joints, SX(0)), moved, 0.0)
+    return ca.Function("impulses", [q, jump], [ca.vertcat(*(torques[name] for name in body.joints)), wrench.force])
