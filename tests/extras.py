@@ -17,7 +17,7 @@ PACKAGES = {
     "docs": ("sphinx_gallery", "nbclient", "latex2mathml", "ziglang"),
     "sim": ("mujoco",),
     "test": ("flint", "pandas", "pinocchio"),
-    "urdf": ("urdf_parser_py", "lxml"),
+    "urdf": ("lxml",),
 }
 EXTRAS = {module: extra for extra, modules in PACKAGES.items() for module in modules}
 EXTRA = re.compile(r"nlp-gait\[(\w+)\]")

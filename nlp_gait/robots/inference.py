@@ -1,7 +1,7 @@
 """Feet of a robot whose file does not state them: their links and soles, and the forward direction."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import combinations
 from typing import Any, Literal, NamedTuple
 
@@ -9,13 +9,13 @@ import numpy as np
 
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots.leg import LEG_JOINT_COUNT, find_bend
-from nlp_gait.robots.meshes import FootShapes
-from nlp_gait.robots.tree import Array, are_mirror_images
-from nlp_gait.robots.welding import Records, turn_records
+from nlp_gait.robots.robot import Joint
+from nlp_gait.robots.tree import Array, are_mirror_images, turn_parts
+from nlp_gait.robots.welding import Joints, Links, ReadShapes
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
-ReadShapes = Callable[[str], FootShapes]  # shapes that move with a link
+Feet = dict[str, dict[str, Any]]  # by side, as in a robot file
 
 # Keys of a foot in a robot file, except its link.
 EXTENTS = ("ankle_height_m", "front_m", "back_m", "left_m", "right_m")
@@ -26,16 +26,14 @@ CLEAR_LEAD_M = 0.03  # soles whose parts in front of and behind the ankle differ
 LEAST_WIDTH_M = 0.01  # a narrower sole is a line or a point
 
 
-class JointPlace(NamedTuple):
-    """A joint at zero angles, in the root's axes."""
+class PlacedJoint(NamedTuple):
+    """A joint at zero angles."""
 
-    child: str
+    joint: Joint
     place: Array  # (3,) from the root's origin [m]
-    axis: Array  # (3,) unit vector
-    limits: tuple[float, float]  # least and greatest angle [rad]
 
 
-Chain = list[JointPlace]  # joints from a link towards the root
+Chain = list[PlacedJoint]  # joints from a link towards the root
 
 
 class InferredSole(NamedTuple):
@@ -57,10 +55,10 @@ class Legs(NamedTuple):
     @property
     def links(self) -> set[str]:
         """Links that the joints of the legs carry."""
-        return {joint.child for chain in self.chains for joint in chain}
+        return {placed.joint.child for chain in self.chains for placed in chain}
 
 
-def find_legs(robot: str, links: Records, joints: Records, feet: Mapping[str, Mapping[str, Any]]) -> Legs:
+def find_legs(robot: str, links: Links, joints: Joints, feet: Feet) -> Legs:
     """Find the legs by the feet of the robot file, by side, or else by geometry.
 
     The feet are the lowest pair of mirrored links with six turning joints each to where their legs meet, below the centre of mass
@@ -113,14 +111,14 @@ def find_legs(robot: str, links: Records, joints: Records, feet: Mapping[str, Ma
 def infer_feet(
     robot: str,
     legs: Legs,
-    links: Records,
-    joints: Records,
-    feet: Mapping[str, Mapping[str, Any]],
+    links: Links,
+    joints: Joints,
+    feet: Feet,
     read_shapes: ReadShapes,
     forward: str | None,
     notes: list[str],
-) -> Records:
-    """Return the records of both feet with their soles, and turn the robot's records so that it faces along x.
+) -> Feet:
+    """Return both feet with their soles, and turn links and joints so that the robot faces along x.
 
     What the robot file states about the feet and the forward direction has precedence; ``notes`` receive what was inferred.
     Raises RobotDataError for a leg without six joints, without a flat sole, or without a clear forward direction.
@@ -129,7 +127,7 @@ def infer_feet(
         if len(chain) != LEG_JOINT_COUNT:
             raise RobotDataError(
                 f"robot {robot!r}: a leg must have {LEG_JOINT_COUNT} turning joints from where both legs meet to the foot, "
-                f"{link!r} has {len(chain)}: {', '.join(joint.child for joint in chain) or 'none'}"
+                f"{link!r} has {len(chain)}: {', '.join(placed.joint.child for placed in chain) or 'none'}"
             )
     _check_knees(robot, legs.chains)
     soles = [_find_sole(robot, link, read_shapes) for link in legs.feet]
@@ -139,7 +137,7 @@ def infer_feet(
     if angle:
         degrees = math.degrees(angle)
         notes.append(f"forward is not along the root's x axis: the robot was turned by {degrees:.0f} degrees about z")
-        turn_records(links, joints, turn)
+        turn_parts(links, joints, turn)
     across = [float((turn @ chain[0].place)[1]) for chain in legs.chains]
     sides = SIDES if across[0] > across[1] else SIDES[::-1]
     if feet and sides[0] != "left":
@@ -147,7 +145,7 @@ def infer_feet(
             f"robot {robot!r}: {legs.feet[0]!r} is named the left foot, but it is to the right of {legs.feet[1]!r}; "
             'exchange them, or write the forward direction: "forward": "x", "-x", "y" or "-y"'
         )
-    found: Records = {}
+    completed: Feet = {}
     for link, side, sole in zip(legs.feet, sides, soles, strict=True):
         corners = np.array([sole.low, sole.high]) @ turn[:2, :2].T
         (back, right), (front, left) = corners.min(axis=0), corners.max(axis=0)
@@ -158,45 +156,45 @@ def infer_feet(
             f"{side} foot: {link!r}, its sole {foot['back_m'] + foot['front_m']:.3f} m by "
             f"{foot['left_m'] + foot['right_m']:.3f} m, from {sole.points} lowest points of its {sole.kind} shapes"
         )
-        found[side] = foot
-    return found
+        completed[side] = foot
+    return completed
 
 
-def _find_chains(joints: Records) -> dict[str, Chain]:
+def _find_chains(joints: Joints) -> dict[str, Chain]:
     """Return the joints from each link towards the root."""
-    joint_to = {raw["child"]: raw for raw in joints.values()}
-    paths: dict[str, list[str]] = {child: [] for child in joint_to}
+    joint_to = {joint.child: joint for joint in joints.values()}
+    paths: dict[str, list[Joint]] = {child: [] for child in joint_to}
     for link, path in paths.items():
         while link in joint_to and len(path) <= len(joint_to):  # joints may form a ring
-            path.append(link)
-            link = joint_to[link]["parent"]
-    placed = {}
-    for child, path in paths.items():
-        place = np.sum([joint_to[link]["origin_m"] for link in path], axis=0, dtype=float)
-        raw = joint_to[child]
-        placed[child] = JointPlace(child, place, np.array(raw["axis"], dtype=float), tuple(raw["limits_rad"]))
-    return {child: [placed[link] for link in path] for child, path in paths.items()}
+            path.append(joint_to[link])
+            link = joint_to[link].parent
+    places = {child: np.sum([j.origin_m for j in path], axis=0, dtype=float) for child, path in paths.items()}
+    return {child: [PlacedJoint(j, places[j.child]) for j in path] for child, path in paths.items()}
 
 
 def _split_chains(first: Chain, second: Chain) -> tuple[Chain, Chain]:
-    shared = {joint.child for joint in first} & {joint.child for joint in second}
-    return [j for j in first if j.child not in shared], [j for j in second if j.child not in shared]
+    shared = {placed.joint.name for placed in first} & {placed.joint.name for placed in second}
+    one, other = ([p for p in chain if p.joint.name not in shared] for chain in (first, second))
+    return one, other
 
 
 def _are_mirror_chains(one: Chain, other: Chain) -> bool:
     return any(
-        all(are_mirror_images(a.place, a.axis, b.place, b.axis, across) for a, b in zip(one, other, strict=True))
+        all(
+            are_mirror_images(a.place, np.array(a.joint.axis), b.place, np.array(b.joint.axis), across)
+            for a, b in zip(one, other, strict=True)
+        )
         and abs(one[0].place[across] - other[0].place[across]) > LEAST_WIDTH_M
         for across in (1, 0)
     )
 
 
-def _are_arms(legs: Legs, links: Records, chains: Mapping[str, Chain]) -> bool:
+def _are_arms(legs: Legs, links: Links, chains: Mapping[str, Chain]) -> bool:
     """Return whether the limbs begin above the centre of mass of all other links, at zero angles."""
-    others = [(float(links[name]["mass_kg"]), name) for name in links if name not in legs.links]
-    mass = sum(own for own, _ in others)
+    others = [link for name, link in links.items() if name not in legs.links]
+    mass = sum(link.mass_kg for link in others)
     heights = {name: chain[0].place[2] for name, chain in chains.items()}
-    moment = sum(own * (heights.get(name, 0.0) + links[name]["com_m"][2]) for own, name in others)
+    moment = sum(link.mass_kg * (heights.get(link.name, 0.0) + link.com_m[2]) for link in others)
     return bool(mass > 0.0 and legs.chains[0][-1].place[2] > moment / mass)
 
 
@@ -241,7 +239,7 @@ def _find_forward(robot: str, chains: tuple[Chain, Chain], soles: list[InferredS
             "contradict each other" if knee else "do not show it: knees turn equally far both ways, soles are centred"
         )
         raise RobotDataError(
-            f"robot {robot!r}: knees {chains[0][2].child!r} and {chains[1][2].child!r} and the soles {fault}; "
+            f"robot {robot!r}: knees {chains[0][2].joint.child!r} and {chains[1][2].joint.child!r} and the soles {fault}; "
             'write the forward direction: "forward": "x", "-x", "y" or "-y" into the JSON file next to the model'
         )
     return FORWARD_ANGLES[f"{'' if (knee or lead) > 0 else '-'}{'xy'[axis]}"]
@@ -252,8 +250,8 @@ def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
     one, other = (_find_knee_direction(chain) for chain in chains)
     if float(one @ other) < 0:
         ranges = " and ".join(
-            f"{knee.child!r} by {knee.limits[0]:.3g} to {knee.limits[1]:.3g} rad about {np.round(knee.axis, 3) + 0.0}"
-            for knee in (chain[2] for chain in chains)
+            f"{knee.child!r} by {knee.limits_rad[0]:.3g} to {knee.limits_rad[1]:.3g} rad about {np.round(knee.axis, 3) + 0.0}"
+            for knee in (chain[2].joint for chain in chains)
         )
         raise RobotDataError(
             f"robot {robot!r}: its knees bend in opposite directions, {ranges}; correct the axis or the limits of one of them"
@@ -263,4 +261,4 @@ def _check_knees(robot: str, chains: tuple[Chain, Chain]) -> None:
 def _find_knee_direction(chain: Chain) -> Array:
     """Return the direction (3,) in which the knee points when it bends, 0 if its limits do not show it."""
     _, fifth, knee, *_ = chain
-    return np.asarray(-find_bend(*knee.limits) * np.cross(knee.axis, fifth.place - knee.place))
+    return np.asarray(-find_bend(*knee.joint.limits_rad) * np.cross(knee.joint.axis, fifth.place - knee.place))

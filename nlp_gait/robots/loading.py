@@ -1,27 +1,26 @@
 """Robots from files: JSON, URDF and MJCF. A JSON file may extend any of them and replace some of its records."""
 
 import hashlib
-import math
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from importlib import resources
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal
 
-from nlp_gait.decoding import decode, decode_value, read_dataclass
-from nlp_gait.errors import GaitError, RobotDataError, UnknownNameError, format_value, unknown, warn_once
+from nlp_gait.decoding import decode, read_dataclass
+from nlp_gait.errors import RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
-from nlp_gait.robots.inference import EXTENTS, SIDES, Side, find_legs, infer_feet
-from nlp_gait.robots.mjcf import list_dependencies, read_foot_geoms, read_mjcf
+from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Side, find_legs, infer_feet
+from nlp_gait.robots.mjcf import list_dependencies, read_mjcf
 from nlp_gait.robots.perturbation import perturb, split_name
-from nlp_gait.robots.robot import Foot, Joint, Link, Robot, Vector, check_robot_name
+from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, normalise_axis
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
-from nlp_gait.robots.urdf import find_moving_link, list_meshes, read_foot_shapes, read_urdf
-from nlp_gait.robots.welding import FindFault, weld_faults
+from nlp_gait.robots.urdf import list_meshes, read_urdf
+from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
 MODEL_ENDINGS = (".urdf", ".xml")
 FILE_ENDINGS = (".json", *MODEL_ENDINGS)
@@ -31,15 +30,12 @@ MOST_JOINTS = 400  # among which legs are searched, which takes 2 s then, and ei
 # Fields that replace those of the extended file.
 REPLACED = ("name", "description", "root", "forward", "heat_loss_W_per_Nm2")
 
-T = TypeVar("T")
-About = Literal["com", "joint"] | None
-
 _DATA = resources.files("nlp_gait.robots") / "data"
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotFile:
-    """Content of a robot file. Links, joints and feet are decoded later, when the replaced ones are known."""
+    """Content of a robot file."""
 
     schema: Literal[1] = 1
     name: str | None = None
@@ -47,12 +43,12 @@ class RobotFile:
     description: str | None = None
     conventions: Any = None
     sources: Mapping[str, str] = field(default_factory=dict)
-    inertia_about: About = None
+    inertia_about: Literal["com", "joint"] | None = None
     joint_names: Mapping[str, str] = field(default_factory=dict)
     root: str | None = None
     links: Mapping[str, Any] = field(default_factory=dict)
     joints: Mapping[str, Any] = field(default_factory=dict)
-    feet: Mapping[str, Any] = field(default_factory=dict)
+    feet: Mapping[Side, Mapping[str, Any]] = field(default_factory=dict)
     forward: Literal["x", "-x", "y", "-y"] | None = None
     posture_rad: Mapping[str, float] = field(default_factory=dict)
     heat_loss_W_per_Nm2: float | None = None
@@ -63,20 +59,18 @@ class RobotFile:
         for group in ("links", "joints", "joint_names"):
             for name in getattr(self, group):
                 check_robot_name(name, group)
-        for side in self.feet:
-            decode_value(Side, side, "a key of feet")
 
 
-class _Record(NamedTuple):
-    """A link, joint or foot as a file describes it."""
+@dataclass(frozen=True, kw_only=True)
+class Description:
+    """What files say about a robot, before the rest is inferred; a hash of the robot takes its text."""
 
-    raw: Any
-    file: str
-    about: About = None  # reference point of the file's inertia tensors, if it states one
-    reversed: bool = False  # the joint's angle is counted in the opposite direction
-
-    def __repr__(self) -> str:  # of the content, which a hash of the robot takes: the file may be moved
-        return repr((self.raw, self.about, self.reversed))
+    file: RobotFile
+    links: Mapping[str, Link]
+    joints: Mapping[str, Joint]
+    unstated: tuple[str, ...]  # links whose file does not state the reference point of tensors
+    model: RobotParts | None = field(default=None, repr=False)  # the URDF or MJCF that it extends
+    model_path: str = field(default="", repr=False)  # the file may be moved
 
 
 def list_robots() -> tuple[str, ...]:
@@ -131,7 +125,7 @@ def hash_robot(name_or_path: object) -> str:
     """Return a hash of all files that describe a robot, "" for one of the package; raises as ``load_robot``."""
     if not isinstance(name_or_path, str) or not is_robot_file(name_or_path):
         return ""
-    return hashlib.sha256(repr(_read_merged(_find_description(split_name(name_or_path)[0]))).encode()).hexdigest()
+    return hashlib.sha256(repr(_describe(_find_description(split_name(name_or_path)[0]))).encode()).hexdigest()
 
 
 def list_robot_files(name_or_path: str) -> set[str]:
@@ -149,7 +143,7 @@ def list_robot_files(name_or_path: str) -> set[str]:
 def _load(name_or_path: str) -> Robot:
     source, changes = split_name(name_or_path)
     path = _find_description(source)
-    return perturb(_make_robot(_read_merged(path), path), changes)
+    return perturb(_make_robot(_describe(path), path), changes)
 
 
 _load_shipped = cache(_load)
@@ -169,47 +163,67 @@ def _find_description(source: str) -> str:
     return str(partner)
 
 
-def _read_merged(source: str, seen: tuple[str, ...] = ()) -> RobotFile:
-    """Return the content of a robot file and those that it extends; links, joints and feet are ``_Record``."""
+def _describe(source: str, seen: tuple[str, ...] = ()) -> Description:
+    """Return what a file, and the files that it extends, say about a robot."""
     if source.endswith(MODEL_ENDINGS):
         return _read_model(source, None)
-    own = _read(source)
-    file = _with_records(own, source)
-    if own.extends is None:
-        return file
-    base_source = _resolve(own.extends, source)
+    file = _read(source)
+    description = _decode_parts(file, source)
+    if file.extends is None:
+        return description
+    base_source = _resolve(file.extends, source)
     if base_source in seen or len(seen) >= LONGEST_CHAIN:
-        raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {own.extends!r}")
+        raise RobotDataError(f"robot {source!r}: 'extends' must name another robot, got {file.extends!r}")
     if base_source.endswith(MODEL_ENDINGS):
-        base = _read_model(base_source, own.inertia_about)
+        base = _read_model(base_source, file.inertia_about)
     else:
-        base = _read_merged(base_source, (*seen, source))
+        base = _describe(base_source, (*seen, source))
+    merged = replace(
+        base.file,
+        **{key: getattr(file, key) for key in REPLACED if getattr(file, key) is not None},
+        sources={**base.file.sources, **file.sources},
+        posture_rad={**base.file.posture_rad, **file.posture_rad},
+        feet={**base.file.feet, **file.feet},
+    )
     return replace(
         base,
-        **{key: getattr(file, key) for key in REPLACED if getattr(file, key) is not None},
-        sources={**base.sources, **file.sources},
-        posture_rad={**base.posture_rad, **file.posture_rad},
-        links={**base.links, **file.links},
-        joints={**_rename(base.joints, file.joint_names, source), **file.joints},
-        feet={**base.feet, **file.feet},
+        file=merged,
+        links={**base.links, **description.links},
+        joints={**_rename(base.joints, file.joint_names, source), **description.joints},
+        unstated=(*(name for name in base.unstated if name not in description.links), *description.unstated),
     )
 
 
-def _read_model(source: str, about: About) -> RobotFile:
+def _read_model(source: str, inertia_about: str | None) -> Description:
     with convert_errors(f"robot file {source!r}", RobotDataError):
-        raw = read_mjcf(source) if source.endswith(".xml") else read_urdf(source, about_joint=about == "joint")
-        return _with_records(decode(RobotFile, {**raw, "inertia_about": about and "com"}), source)
+        if source.endswith(".xml"):
+            model = read_mjcf(source)
+        else:
+            model = read_urdf(source, about_joint=inertia_about == "joint")
+        # The constructor checks the names.
+        file = RobotFile(name=model.name, description=f"from {Path(source).name}", root=model.root)
+        replace(file, links=model.links, joints=model.joints)
+    unstated = tuple(model.links if inertia_about is None else ())
+    return Description(
+        file=file, links=model.links, joints=model.joints, unstated=unstated, model=model, model_path=source
+    )
 
 
-def _with_records(file: RobotFile, source: str) -> RobotFile:
-    records = {
-        group: {name: _Record(raw, source, file.inertia_about) for name, raw in getattr(file, group).items()}
-        for group in ("links", "joints", "feet")
-    }
-    return replace(file, **records)  # type: ignore[arg-type]
+def _decode_parts(file: RobotFile, source: str) -> Description:
+    """Return the links and joints of a JSON file; raises RobotDataError for one that is faulty."""
+    with convert_errors(f"robot file {source!r}", RobotDataError):
+        links = {name: decode(Link, raw, f"links.{name}", given={"name": name}) for name, raw in file.links.items()}
+        joints = {name: decode(Joint, raw, f"joints.{name}", given={"name": name}) for name, raw in file.joints.items()}
+    if file.inertia_about == "joint":
+        links = {name: shift_to_com(link) for name, link in links.items()}
+    joints = {name: replace(joint, axis=normalise_axis(joint.axis)) for name, joint in joints.items()}
+    for fault in (*find_faults(links).values(), *find_faults(joints).values()):
+        raise fault
+    unstated = tuple(links if file.inertia_about is None else ())
+    return Description(file=replace(file, links={}, joints={}), links=links, joints=joints, unstated=unstated)
 
 
-def _rename(joints: Mapping[str, _Record], names: Mapping[str, str], source: str) -> dict[str, _Record]:
+def _rename(joints: Mapping[str, Joint], names: Mapping[str, str], source: str) -> Joints:
     """Return joints with new names, given as new to old; a minus sign in front of the old name reverses the joint."""
     old = {new: name.removeprefix("-") for new, name in names.items()}
     for name in old.values():
@@ -219,7 +233,8 @@ def _rename(joints: Mapping[str, _Record], names: Mapping[str, str], source: str
     for new, name in old.items():
         if new in renamed:
             raise RobotDataError(f"robot {source!r}: joint_names gives {new!r} to {name!r}, but that name is taken")
-        renamed[new] = joints[name]._replace(reversed=names[new].startswith("-"))
+        joint = reverse_joint(joints[name]) if names[new].startswith("-") else joints[name]
+        renamed[new] = replace(joint, name=new)
     return renamed
 
 
@@ -240,100 +255,50 @@ def _read(name_or_path: str) -> RobotFile:
     return file
 
 
-def _make_robot(file: RobotFile, source: str) -> Robot:
+def _make_robot(description: Description, source: str) -> Robot:
+    file = description.file
     if file.name is None or file.root is None:
         missing = "name" if file.name is None else "root"
         raise RobotDataError(f"robot file {source!r}: {missing!r} is missing")
-    file, notes = _complete(file, file.name)
-    links = _decode(_decode_link, file.links)
-    check_inertias(str(file.name), [links[name] for name, record in file.links.items() if record.about is None])
+    links, joints = dict(description.links), dict(description.joints)
+    feet: Feet = {side: dict(foot) for side, foot in file.feet.items()}
+    notes: list[str] = []
+    if description.model is not None:
+        with convert_errors(f"robot file {description.model_path!r}", RobotDataError):
+            feet = _complete(description, description.model, links, joints, feet, notes)
+    with convert_errors(f"robot file {source!r}", RobotDataError):
+        soles = {side: decode(Foot, foot, f"feet.{side}") for side, foot in feet.items()}
+    check_inertias(file.name, [link for name, link in links.items() if name in description.unstated])
     return Robot(
-        name=str(file.name),
+        name=file.name,
         description=file.description or "",
         sources=file.sources,
-        root=str(file.root),
+        root=file.root,
         links=links,
-        joints=_decode(_decode_joint, file.joints),
-        feet=_decode(lambda side, record: decode(Foot, record.raw, f"feet.{side}"), file.feet),
+        joints=joints,
+        feet=soles,
         posture_rad=file.posture_rad,
         heat_loss_W_per_Nm2=file.heat_loss_W_per_Nm2,
         notes=tuple(notes),
     )
 
 
-def _complete(file: RobotFile, name: str) -> tuple[RobotFile, list[str]]:
-    """Return a robot from a URDF or MJCF with its feet and without faulty parts, and notes on what was inferred."""
-    models = {record.file for record in file.links.values() if record.file.endswith(MODEL_ENDINGS)}
-    if not models:
-        return file, []
-    model, notes = min(models), list[str]()
-    if len(file.joints) > MOST_JOINTS:
-        raise RobotDataError(
-            f"robot file {model!r} has {len(file.joints)} turning joints, more than {MOST_JOINTS}; remove what no gait needs"
-        )
-
-    def find_fault_in(records: Mapping[str, _Record], decode: Callable[[str, _Record], object]) -> FindFault:
-        # Faults of a robot file are errors; those of a URDF or MJCF may not matter.
-        _decode(decode, {key: record for key, record in records.items() if not record.file.endswith(MODEL_ENDINGS)})
-
-        def find_fault(key: str, raw: Mapping[str, Any]) -> GaitError | None:
-            record = records[key]
-            try:
-                _decode(decode, {key: record._replace(raw=raw)})
-            except GaitError as error:
-                if not record.file.endswith(MODEL_ENDINGS):
-                    raise
-                return error
-            return None
-
-        return find_fault
-
-    faults = find_fault_in(file.links, _decode_link), find_fault_in(file.joints, _decode_joint)
-    for side, record in file.feet.items():
-        with convert_errors(f"robot file {record.file!r}", RobotDataError):
-            decode_value(Mapping[str, Any], record.raw, f"feet.{side}")
-    links, joints, feet = ({k: dict(r.raw) for k, r in group.items()} for group in (file.links, file.joints, file.feet))
-    with convert_errors(f"robot file {model!r}", RobotDataError):
-        for record in feet.values():  # a sole's link is often behind a fixed joint
-            if model.endswith(".urdf") and record.get("link") not in links:
-                record["link"] = find_moving_link(model, str(record.get("link")))
-        legs = find_legs(name, links, joints, feet)
-        weld_faults(links, joints, legs.links, *faults, notes)
-        if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
-            read_shapes = partial(read_foot_geoms if model.endswith(".xml") else read_foot_shapes, model)
-            feet = infer_feet(name, legs, links, joints, feet, read_shapes, file.forward, notes)
-    count = sum("foot:" not in note for note in notes)
-    if count:
+def _complete(
+    description: Description, model: RobotParts, links: Links, joints: Joints, feet: Feet, notes: list[str]
+) -> Feet:
+    """Return the feet of a robot from a URDF or MJCF; weld its faulty parts, and note what was inferred."""
+    name = str(description.file.name)
+    if len(joints) > MOST_JOINTS:
+        raise ValueError(f"it has {len(joints)} turning joints, more than {MOST_JOINTS}; remove what no gait needs")
+    for foot in feet.values():  # a sole's link is often behind a fixed joint
+        if foot.get("link") not in links:
+            foot["link"] = model.carriers.get(str(foot.get("link")), foot.get("link"))
+    legs = find_legs(name, links, joints, feet)
+    weld_faults(links, joints, legs.links, notes)
+    if not all(set(EXTENTS) <= set(feet.get(side, ())) for side in SIDES):
+        forward = description.file.forward
+        feet = infer_feet(name, legs, links, joints, feet, model.read_shapes, forward, notes)
+    if count := sum("foot:" not in note for note in notes):
         parts = f"{count} note{'s' * (count > 1)} on welded parts"
         warn_once("robot %r: %s; see nlp-gait list --robot FILE", name, parts)
-    changed = {
-        "links": {key: file.links[key]._replace(raw=raw) for key, raw in links.items()},
-        "joints": {key: file.joints[key]._replace(raw=raw) for key, raw in joints.items()},
-        "feet": {side: file.feet.get(side, _Record({}, model))._replace(raw=raw) for side, raw in feet.items()},
-    }
-    return replace(file, **changed), notes  # type: ignore[arg-type]
-
-
-def _decode(decode: Callable[[str, _Record], T], records: Mapping[str, _Record]) -> dict[str, T]:
-    found = {}
-    for name, record in records.items():
-        with convert_errors(f"robot file {record.file!r}", RobotDataError):
-            found[name] = decode(name, record)
-    return found
-
-
-def _decode_link(name: str, record: _Record) -> Link:
-    link = decode(Link, record.raw, f"links.{name}", given={"name": name})
-    return shift_to_com(link) if record.about == "joint" else link
-
-
-def _decode_joint(name: str, record: _Record) -> Joint:
-    where = f"joints.{name}"
-    raw = decode_value(Mapping[str, Any], record.raw, where)
-    axis = decode_value(Vector, raw.get("axis"), f"{where}.axis")
-    length = math.hypot(*axis)
-    if not 0.99 < length < 1.01:  # published axes are rounded (0.7071); a larger error is a mistake
-        raise RobotDataError(f"joint {name!r}: axis must be a unit vector, got {list(axis)} of length {length:.3g}")
-    completed = {"planning_limits_rad": raw.get("limits_rad"), **raw, "axis": [a / length for a in axis]}
-    joint = decode(Joint, completed, where, given={"name": name})
-    return reverse_joint(joint) if record.reversed else joint
+    return feet

@@ -1,10 +1,10 @@
-"""MJCF files in the form of a JSON robot file; MuJoCo itself reads them, with all files that they include."""
+"""MJCF files as links and joints of a robot; MuJoCo itself reads them, with all files that they include."""
 
 import json
 import logging
 import math
-import os
-from functools import lru_cache, partial
+from collections.abc import Mapping
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,50 +16,53 @@ from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import FootShapes, list_box_points, list_cylinder_points
-from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
-from nlp_gait.robots.tree import Array, Mass, combine_masses
+from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, normalise_axis
+from nlp_gait.robots.tree import Array, Mass, to_vector
+from nlp_gait.robots.welding import Frame, RobotParts, list_carriers, merge_frames
 
 LOG = logging.getLogger("nlp_gait")
 UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits
 IGNORED = {"armature": "kg m^2", "damping": "Nm s/rad", "frictionloss": "Nm"}  # of a joint
 
 
-def read_mjcf(path: str) -> dict[str, Any]:
-    """Read links and joints of an MJCF file by the schema of a robot file, without feet.
+def read_mjcf(path: str) -> RobotParts:
+    """Read the links and joints of an MJCF file.
 
     The robot is the heaviest tree of bodies in the world. All frames get its root's axes at the reference pose, where all angles
     count as zero. Bodies that do not turn against each other become one. Raises MissingExtraError without MuJoCo, RobotDataError
     if that cannot read the file, or ValueError if it contains no robot, or a body with several hinges.
     """
-    _read.cache_clear()  # the file, or one that it includes, may have changed
     model = _compile(path)
-    root, frames, carriers = _find_tree(model)
+    poses = _place_bodies(model)
     _report_ignored(path, model)
-    names = {i: model.body(i).name or f"body {i}" for i in frames}
+    names = {i: model.body(i).name or f"body {i}" for i in poses}
     if len(set(names.values())) < len(names):
         raise ValueError("two bodies have the same name")
-    origins = {i: _place_joint(model, frames, i) for i in set(carriers.values())}
-    links = {}
-    for carrier, origin in origins.items():
-        parts = [_read_mass(model, i, frames[i]) for i in frames if carriers[i] == carrier]
-        links[names[carrier]] = combine_masses(parts).move(-origin).to_record()
-    joints = {}
-    for carrier in sorted(set(carriers.values()) - {root}):
-        parent = carriers[int(model.body_parentid[carrier])]
-        joint = _list_hinges(model, carrier)[0]
-        low, high = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
-        limited = bool(model.jnt_limited[joint])
-        joints[model.joint(joint).name or f"joint {joint}"] = {
-            "parent": names[parent],
-            "child": names[carrier],
-            "origin_m": (origins[carrier] - origins[parent]).tolist(),
-            "axis": (frames[carrier][:3, :3] @ model.jnt_axis[joint]).tolist(),
-            "limits_rad": [float(low), float(high)] if limited else [-math.pi, math.pi],
-            "velocity_limit_rad_s": UNLIMITED_RAD_S,
-            "torque_limit_Nm": _find_torque_limit(model, joint),
-        }
-    about = {"schema": 1, "name": Path(path).stem, "description": f"from {Path(path).name}"}
-    return {**about, "root": names[root], "links": links, "joints": joints}
+    root = min(poses)
+    frames, turning = {}, []
+    for i, pose in poses.items():
+        hinge = None if i == root else _find_hinge(model, i)
+        parent = None if i == root else names[int(model.body_parentid[i])]
+        origin = pose[:3, :3] @ (np.zeros(3) if hinge is None else model.jnt_pos[hinge]) + pose[:3, 3]
+        frames[names[i]] = Frame(parent, hinge is not None, origin, _read_mass(model, i, pose))
+        if hinge is not None:
+            turning.append(_read_turning(model, hinge, str(parent), names[i], pose))
+    read_shapes = partial(_read_foot_shapes, model, poses, names, frames)
+    return merge_frames(Path(path).stem, frames, turning, read_shapes)
+
+
+def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) -> Joint:
+    low, high = model.jnt_range[hinge] - model.qpos0[model.jnt_qposadr[hinge]]
+    return Joint(
+        name=model.joint(hinge).name or f"joint {hinge}",
+        parent=parent,
+        child=child,
+        origin_m=(0.0, 0.0, 0.0),  # ``merge_frames`` places it
+        axis=normalise_axis(to_vector(pose[:3, :3] @ model.jnt_axis[hinge])),
+        limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else (-math.pi, math.pi),
+        velocity_limit_rad_s=UNLIMITED_RAD_S,
+        torque_limit_Nm=_find_torque_limit(model, hinge),
+    )
 
 
 def _report_ignored(path: str, model: Any) -> None:
@@ -70,21 +73,19 @@ def _report_ignored(path: str, model: Any) -> None:
         warn_once("robot file %r: its joints' %s; neither the model nor the simulation contains it", path, listed)
 
 
-def read_foot_geoms(path: str, link: str) -> FootShapes:
-    """Return the points of all shapes that move with a link, as ``urdf.read_foot_shapes``; MuJoCo reads the meshes."""
-    model = _compile(path)
-    _, frames, carriers = _find_tree(model)
-    found = {kind: [np.zeros((0, 3))] for kind in ("collision", "visual")}
-    for i, frame in frames.items():
-        if (model.body(carriers[i]).name or f"body {carriers[i]}") != link:
-            continue
-        origin = _place_joint(model, frames, carriers[i])
+def _read_foot_shapes(
+    model: Any, poses: Mapping[int, Array], names: Mapping[int, str], frames: Mapping[str, Frame], foot: str
+) -> FootShapes:
+    """Return the points of all shapes that move with a link, as for a URDF; MuJoCo has read the meshes."""
+    carriers = list_carriers(frames)
+    points = {kind: [np.zeros((0, 3))] for kind in ("collision", "visual")}
+    for i in (i for i in poses if carriers[names[i]] == foot):
         for geom in range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i]):
             kind = "collision" if model.geom_contype[geom] or model.geom_conaffinity[geom] else "visual"
-            pose = frame @ _make_pose(model.geom_pos[geom], model.geom_quat[geom])
-            found[kind].append(_list_shape_points(model, geom, pose) - origin)
-    kind = "collision" if len(found["collision"]) > 1 else "visual"
-    return FootShapes(np.concatenate(found[kind]), kind)
+            pose = poses[i] @ _make_pose(model.geom_pos[geom], model.geom_quat[geom])
+            points[kind].append(_list_shape_points(model, geom, pose) - frames[foot].origin_m)
+    kind = "collision" if len(points["collision"]) > 1 else "visual"
+    return FootShapes(np.concatenate(points[kind]), kind)
 
 
 def list_dependencies(path: str) -> list[str]:
@@ -94,20 +95,15 @@ def list_dependencies(path: str) -> list[str]:
 
 
 def _compile(path: str) -> Any:
-    """Return MuJoCo's model of a file, the same for its links and its points."""
+    """Return MuJoCo's model of a file, compiled in a child process."""
     if find_spec("mujoco") is None:
         raise MissingExtraError(
             f"robot file {path!r}: MJCF files need MuJoCo, which is not installed: pip install 'nlp-gait[sim]'"
         )
     read_bytes(Path(path), "robot file", error=RobotDataError)  # refuses special files
-    return _read(os.path.abspath(path), path)
-
-
-@lru_cache(maxsize=4)
-def _read(place: str, path: str) -> Any:
     mujoco = import_module("mujoco")  # before the fork, which would import it in vain
-    told, _, data = read_in_child(f"robot file {path!r}", partial(_compile_binary, mujoco, path)).partition(b"\n")
-    warnings, files = json.loads(told)
+    texts, _, data = read_in_child(f"robot file {path!r}", partial(_compile_binary, mujoco, path)).partition(b"\n")
+    warnings, files = json.loads(texts)
     for text in warnings:
         LOG.warning("robot file %r: %s", path, text)
     for file in files:
@@ -149,45 +145,34 @@ def _convert(path: str, error: Exception) -> RobotDataError:
     return RobotDataError(f"robot file {path!r} is not read by MuJoCo: {reason}{remedy}")
 
 
-def _find_tree(model: Any) -> tuple[int, dict[int, Array], dict[int, int]]:
-    """Return the root body, poses (4, 4) of its tree in its frame, and the body with the hinge that carries each."""
+def _place_bodies(model: Any) -> dict[int, Array]:
+    """Return the poses (4, 4) of the bodies of the heaviest tree in the frame of its root, which is the first one."""
     tops = [i for i in range(1, model.nbody) if model.body_parentid[i] == 0]
     if not tops:
         raise ValueError("it contains no body")
     root = max(tops, key=lambda i: float(model.body_subtreemass[i]))
-    frames: dict[int, Array] = {root: np.eye(4)}
-    carriers = {root: root}
+    poses: dict[int, Array] = {root: np.eye(4)}
     for i in range(root + 1, model.nbody):
-        parent = int(model.body_parentid[i])
-        if parent not in frames:
-            continue
-        frames[i] = frames[parent] @ _make_pose(model.body_pos[i], model.body_quat[i])
-        hinges = _list_hinges(model, i)
-        if len(hinges) > 1:
-            raise ValueError(
-                f"body {model.body(i).name!r} has {len(hinges)} hinges; give each its own body with a small mass"
-            )
-        carriers[i] = i if hinges else carriers[parent]
-    return root, frames, carriers
+        if (parent := int(model.body_parentid[i])) in poses:
+            poses[i] = poses[parent] @ _make_pose(model.body_pos[i], model.body_quat[i])
+    return poses
 
 
-def _list_hinges(model: Any, body: int) -> list[int]:
+def _find_hinge(model: Any, body: int) -> int | None:
+    """Return the hinge that carries a body, None without one; raises ValueError for several."""
     first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
     hinge = int(import_module("mujoco").mjtJoint.mjJNT_HINGE)
-    return [j for j in range(first, first + count) if model.jnt_type[j] == hinge]
-
-
-def _place_joint(model: Any, frames: dict[int, Array], body: int) -> Array:
-    """Return the place (3,) of the joint that carries a body; of the root its origin."""
-    hinges = _list_hinges(model, body)
-    local = model.jnt_pos[hinges[0]] if hinges and model.body_parentid[body] else np.zeros(3)
-    return np.asarray(frames[body][:3, :3] @ local + frames[body][:3, 3])
+    hinges = [j for j in range(first, first + count) if model.jnt_type[j] == hinge]
+    if len(hinges) > 1:
+        name = model.body(body).name
+        raise ValueError(f"body {name!r} has {len(hinges)} hinges; give each its own body with a small mass")
+    return hinges[0] if hinges else None
 
 
 def _read_mass(model: Any, body: int, frame: Array) -> Mass:
     pose = frame @ _make_pose(model.body_ipos[body], model.body_iquat[body])
-    own = Mass(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body]))
-    return own.turn(pose[:3, :3]).move(pose[:3, 3])
+    mass = Mass(float(model.body_mass[body]), np.zeros(3), np.diag(model.body_inertia[body]))
+    return mass.turn(pose[:3, :3]).move(pose[:3, 3])
 
 
 def _find_torque_limit(model: Any, joint: int) -> float:

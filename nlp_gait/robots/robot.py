@@ -1,7 +1,7 @@
 """Frozen, validated data of a legged robot: links, joints, motors, feet."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -40,10 +40,11 @@ def are_plausible(numbers: Any) -> bool:
     return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not
 
 
-def make_tensor(moments: Sequence[float]) -> np.ndarray:
-    """Return the symmetric tensor (3, 3) of (ixx, iyy, izz, ixy, ixz, iyz)."""
-    ixx, iyy, izz, ixy, ixz, iyz = moments
-    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], dtype=float)
+def normalise_axis(axis: Vector) -> Vector:
+    """Return a unit vector of rounded digits (0.7071) as an exact one, and any other vector as it is."""
+    x, y, z = axis
+    length = math.hypot(*axis)
+    return (x / length, y / length, z / length) if 0.99 < length < 1.01 else axis
 
 
 # Smaller moments are placeholders, without influence on any motion: a sphere of 1 mg and 1 mm has 4e-13.
@@ -52,7 +53,7 @@ NEGLIGIBLE_KGM2 = 1e-12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """Rigid link."""
+    """Rigid link; a file's may be faulty until it is part of a ``Robot``."""
 
     name: str
     mass_kg: float
@@ -60,7 +61,8 @@ class Link:
     #: (ixx, iyy, izz, ixy, ixz, iyz) about the centre of mass, link axes [kg m^2]
     inertia_com_kgm2: tuple[float, float, float, float, float, float]
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Raise RobotDataError unless a rigid body can have this mass and inertia."""
         owner = f"link {self.name!r}"
         check_numbers(owner, self, positive=("mass_kg",))
         low, middle, high = np.linalg.eigvalsh(self.inertia_matrix)
@@ -75,7 +77,8 @@ class Link:
     @property
     def inertia_matrix(self) -> np.ndarray:
         """(3, 3) inertia about the centre of mass, link axes [kg m^2]."""
-        return make_tensor(self.inertia_com_kgm2)
+        ixx, iyy, izz, ixy, ixz, iyz = self.inertia_com_kgm2
+        return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]], dtype=float)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +129,7 @@ class Motor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """Revolute joint; at q = 0 the child frame is at its origin with the parent's axes."""
+    """Revolute joint; at q = 0 the child frame is at its origin with the parent's axes. A file's may be faulty, as a link."""
 
     name: str
     parent: str
@@ -135,12 +138,17 @@ class Joint:
     axis: Vector  #: unit vector of positive rotation
     limits_rad: tuple[float, float]  #: (lower, upper) mechanical limits [rad]
     #: (lower, upper) limits of planned gaits [rad]; by default the mechanical ones
-    planning_limits_rad: tuple[float, float]
+    planning_limits_rad: tuple[float, float] = ()  # type: ignore[assignment]
     velocity_limit_rad_s: float
     torque_limit_Nm: float
     motor: Motor | None = None
 
     def __post_init__(self) -> None:
+        if not self.planning_limits_rad:
+            object.__setattr__(self, "planning_limits_rad", self.limits_rad)
+
+    def check(self) -> None:
+        """Raise RobotDataError for an axis that is no unit vector, or limits that are not allowed."""
         owner = f"joint {self.name!r}"
         check_numbers(owner, self, positive=("velocity_limit_rad_s", "torque_limit_Nm"))
         if abs(math.hypot(*self.axis) - 1.0) > 1e-9:
@@ -148,21 +156,6 @@ class Joint:
         for name, (low, high) in (("limits_rad", self.limits_rad), ("planning_limits_rad", self.planning_limits_rad)):
             if not low < high:
                 raise RobotDataError(f"{owner}: {name} must be ordered (lower < upper), got [{low}, {high}]")
-
-
-def make_free_joint(name: str, parent: str, child: str, origin_m: Vector, axis: Vector, torque_Nm: float) -> Joint:
-    """Return a joint of a robot whose source has no limits of angles and speeds."""
-    return Joint(
-        name=name,
-        parent=parent,
-        child=child,
-        origin_m=origin_m,
-        axis=axis,
-        limits_rad=(-math.pi, math.pi),
-        planning_limits_rad=(-math.pi, math.pi),
-        velocity_limit_rad_s=100.0,
-        torque_limit_Nm=torque_Nm,
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,7 +181,7 @@ class Foot:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robot:
-    """Tree of links joined by revolute joints."""
+    """Tree of links joined by revolute joints; raises RobotDataError unless they are one, and free of faults."""
 
     name: str  #: for example ``"nao-v5"``
     description: str  #: one sentence
@@ -207,6 +200,9 @@ class Robot:
     notes: tuple[str, ...] = ()  #: what was inferred or changed when the robot was read; a sentence each
 
     def __post_init__(self) -> None:
+        parts: tuple[Link | Joint, ...] = (*self.links.values(), *self.joints.values())
+        for part in parts:
+            part.check()
         if self.root not in self.links:
             raise RobotDataError(f"robot {self.name!r}: root {self.root!r} is not a link")
         children: set[str] = set()

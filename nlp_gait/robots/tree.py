@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from nlp_gait.errors import InputError, RobotDataError
-from nlp_gait.robots.robot import Joint, Link, Robot, Vector, make_tensor
+from nlp_gait.robots.robot import Joint, Link, Robot, Vector
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -28,15 +28,14 @@ class Mass(NamedTuple):
     tensor_kgm2: Array  # (3, 3) inertia about the centre of mass
 
     @classmethod
-    def from_record(cls, raw: Mapping[str, Any]) -> Self:
-        """Return the mass of a link as a robot file describes it."""
-        tensor = make_tensor(raw["inertia_com_kgm2"])
-        return cls(float(raw["mass_kg"]), np.array(raw["com_m"], dtype=float), tensor)
+    def of_link(cls, link: Link) -> Self:
+        """Return the mass of a link."""
+        return cls(link.mass_kg, np.array(link.com_m), link.inertia_matrix)
 
-    def to_record(self) -> dict[str, Any]:
-        """Return the fields of a link in a robot file."""
-        moments = list(list_moments(self.tensor_kgm2))
-        return {"mass_kg": float(self.mass_kg), "com_m": self.com_m.tolist(), "inertia_com_kgm2": moments}
+    def to_link(self, name: str) -> Link:
+        """Return the mass as a link, which may be faulty."""
+        moments = list_moments(self.tensor_kgm2)
+        return Link(name=name, mass_kg=float(self.mass_kg), com_m=to_vector(self.com_m), inertia_com_kgm2=moments)
 
     def move(self, offset: Array) -> Self:
         """Return the mass in a frame from which its own is ``offset`` (3,) away [m]."""
@@ -106,7 +105,7 @@ def check_inertias(robot: str, links: Sequence[Link]) -> None:
 
 
 def shift_to_com(link: Link) -> Link:
-    """Return the link whose tensor was taken about its joint; raises RobotDataError if no rigid body has such a tensor."""
+    """Return the link whose tensor was taken about its joint, shifted to the centre of mass."""
     about_com = link.inertia_matrix - compute_point_inertia(link.mass_kg, np.array(link.com_m))
     return replace(link, inertia_com_kgm2=list_moments(about_com))
 
@@ -152,8 +151,8 @@ def make_tree(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
             parent=parent,
             joint=joint,
             direction=1 if forward else -1,
-            offset_m=_to_vector(np.subtract(centre_in_parent, parent_reference)),
-            com_offset_m=_to_vector(np.subtract(link.com_m, reference)),
+            offset_m=to_vector(np.subtract(centre_in_parent, parent_reference)),
+            com_offset_m=to_vector(np.subtract(link.com_m, reference)),
             armature_kgm2=0.0 if joint is None else robot.armatures_kgm2.get(joint.name, 0.0),
         )
         bodies.append(body)
@@ -164,24 +163,30 @@ def make_tree(robot: Robot, fixed_link: str, joints: Collection[str] | None = No
 
 def weld(robot: Robot, joints: Collection[str]) -> Robot:
     """Return the robot with some joints locked at zero: their child links become part of the parents."""
-    links = dict(robot.links)
-    remaining = dict(robot.joints)
+    links, remaining = dict(robot.links), dict(robot.joints)
     # From the leaves inwards, so that a welded child already contains its own welded children.
     for name in sorted(joints, key=lambda name: -len(robot.path_to_root(robot.joint(name).child))):
-        joint = remaining.pop(name)
-        child = _read_mass(links.pop(joint.child)).move(np.array(joint.origin_m))
-        total = combine_masses([_read_mass(links[joint.parent]), child])
-        com, tensor = _to_vector(total.com_m), list_moments(total.tensor_kgm2)
-        links[joint.parent] = replace(links[joint.parent], mass_kg=total.mass_kg, com_m=com, inertia_com_kgm2=tensor)
-        for other in [j for j in remaining.values() if j.parent == joint.child]:
-            remaining[other.name] = replace(
-                other, parent=joint.parent, origin_m=add_vectors(joint.origin_m, other.origin_m)
-            )
+        weld_child(links, remaining, name)
     return replace(robot, links=links, joints=remaining)
 
 
-def _read_mass(link: Link) -> Mass:
-    return Mass(link.mass_kg, np.array(link.com_m), link.inertia_matrix)
+def weld_child(links: dict[str, Link], joints: dict[str, Joint], name: str) -> None:
+    """Lock a joint at zero: its child link becomes part of the parent, and is removed like the joint."""
+    joint = joints.pop(name)
+    child = Mass.of_link(links.pop(joint.child)).move(np.array(joint.origin_m))
+    links[joint.parent] = combine_masses([Mass.of_link(links[joint.parent]), child]).to_link(joint.parent)
+    for other in [j for j in joints.values() if j.parent == joint.child]:
+        origin_m = add_vectors(joint.origin_m, other.origin_m)
+        joints[other.name] = replace(other, parent=joint.parent, origin_m=origin_m)
+
+
+def turn_parts(links: dict[str, Link], joints: dict[str, Joint], rotation: Array) -> None:
+    """Express all links and joints along other axes, by a rotation (3, 3)."""
+    for name, link in links.items():
+        links[name] = Mass.of_link(link).turn(rotation).to_link(name)
+    for name, joint in joints.items():
+        origin, axis = (to_vector(rotation @ np.array(vector)) for vector in (joint.origin_m, joint.axis))
+        joints[name] = replace(joint, origin_m=origin, axis=axis)
 
 
 def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
@@ -197,8 +202,7 @@ def pose_robot(robot: Robot, angles: Mapping[str, float]) -> Robot:
         joints[joint.name] = _turn_joint(joint, before, angle)
         turn, link = turns[joint.child], links[joint.child]
         if not np.array_equal(turn, np.eye(3)):
-            tensor = list_moments(turn @ link.inertia_matrix @ turn.T)
-            links[joint.child] = replace(link, com_m=_to_vector(turn @ np.array(link.com_m)), inertia_com_kgm2=tensor)
+            links[joint.child] = Mass.of_link(link).turn(turn).to_link(link.name)
         waiting += [other for other in robot.joints.values() if other.parent == joint.child]
     return replace(robot, links=links, joints={name: joints[name] for name in robot.joints})
 
@@ -211,14 +215,15 @@ def _turn_joint(joint: Joint, turn: np.ndarray, angle: float) -> Joint:
     (low, high), (plan_low, plan_high) = joint.limits_rad, joint.planning_limits_rad
     return replace(
         joint,
-        origin_m=_to_vector(turn @ np.array(joint.origin_m)),
-        axis=_to_vector(axis / np.linalg.norm(axis)),
+        origin_m=to_vector(turn @ np.array(joint.origin_m)),
+        axis=to_vector(axis / np.linalg.norm(axis)),
         limits_rad=(low - angle, high - angle),
         planning_limits_rad=(plan_low - angle, plan_high - angle),
     )
 
 
-def _to_vector(values: np.ndarray) -> Vector:
+def to_vector(values: np.ndarray) -> Vector:
+    """Return an array (3,) as a tuple."""
     x, y, z = values.tolist()
     return x, y, z
 

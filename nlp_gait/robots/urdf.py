@@ -1,12 +1,11 @@
-"""URDF files in the form of a JSON robot file; ``urdf_parser_py`` of ROS (extra ``urdf``) refuses incomplete links and joints."""
+"""URDF files as links and joints of a robot; what a gait does not need, such as transmissions and plugins, is not read."""
 
 import math
-import re
+from collections.abc import Mapping
 from functools import partial
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,74 +20,63 @@ from nlp_gait.robots.meshes import (
     parse_xml,
     read_mesh_points,
 )
-from nlp_gait.robots.robot import LARGEST_NUMBER, are_plausible
-from nlp_gait.robots.tree import Array, Mass, combine_masses, compute_point_inertia
+from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, normalise_axis
+from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
+from nlp_gait.robots.welding import Frame, RobotParts, list_carriers, merge_frames
 
-# Elements that are read; shapes, transmissions and plugins are removed before parsing.
-READ = {"link": {"inertial"}, "joint": {"origin", "parent", "child", "axis", "limit", "mimic"}}
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+OWNERS = ("robot", "link", "joint")
+# Attributes of the elements that are read.
+ATTRIBUTES = {
+    "robot": {"name", "version"},
+    "link": {"name"},
+    "joint": {"name", "type"},
+    "inertial": set[str](),
+    "origin": {"xyz", "rpy"},
+    "mass": {"value"},
+    "inertia": set(MOMENTS),
+    "parent": {"link"},
+    "child": {"link"},
+    "axis": {"xyz"},
+    "limit": {"lower", "upper", "effort", "velocity"},
+}
 TURNING = ("revolute", "continuous")
+KINDS = (*TURNING, "prismatic", "floating", "planar", "fixed", "unknown")
 SHAPES = ("collision", "visual")
 MOST_PARTS = 2000  # links and joints; the time to read them grows with the square
-# The parser's message for an unknown attribute of an element without numbers.
-OWNER = re.compile(r"^Unknown attribute .* in (/robot[^/]*)?/?(robot|link|joint)(\[[^\]]*\])?$")
 
 
-def read_urdf(path: str, *, about_joint: bool = False) -> dict[str, Any]:
-    """Read links and joints of a URDF by the schema of a robot file, without feet.
+def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
+    """Read the links and joints of a URDF.
 
     All frames get the root's axes at the zero pose. Links that do not turn against each other become one: those behind fixed,
     prismatic, planar and floating joints, which stay at zero. With ``about_joint``, the tensors refer to the origins of the
-    link frames instead of the centres of mass. Raises MissingExtraError without the parser, RobotDataError if the file cannot be
-    read or is not a URDF, or ValueError if its links do not form a tree, or a value is missing or not allowed.
+    link frames instead of the centres of mass. Raises MissingExtraError without lxml, RobotDataError if the file cannot be
+    read, or ValueError if it is not a URDF, its links do not form a tree, or a value is missing or not allowed.
     """
-    model = _parse(_read_xml(path), path)
-    joints = {joint.child: joint for joint in model.joints}
-    frames = _place_links(model, joints)
-    carriers = {name: _find_carrier(name, joints) for name in frames}
-    bodies: dict[str, list[Mass]] = {}
-    for link in model.links:
-        bodies.setdefault(carriers[link.name], []).append(_read_mass(link, frames[link.name], about_joint))
-    return {
-        "schema": 1,
-        "name": model.name,
-        "description": f"from {Path(path).name}",
-        "root": next(name for name in frames if name not in joints),
-        "links": {name: combine_masses(parts).move(-frames[name][:3, 3]).to_record() for name, parts in bodies.items()},
-        "joints": {j.name: _describe_joint(j, frames, carriers) for j in model.joints if j.type in TURNING},
-    }
+    robot = _read_xml(path)
+    name = _read_text(robot, "name")
+    links = {_read_text(link, "name"): link for link in robot.findall("link")}
+    joints = [_read_joint(element) for element in robot.findall("joint")]
+    poses = _place_links(robot, list(links), joints)
+    joint_to = {joint.child: joint for joint in joints}
+    frames = {}
+    for link, element in links.items():
+        parent, turns = (joint_to[link].parent, joint_to[link].kind in TURNING) if link in joint_to else (None, False)
+        frames[link] = Frame(parent, turns, poses[link][:3, 3], _read_mass(element, poses[link], about_joint))
+    turning = [_read_turning(joint, poses[joint.child]) for joint in joints if joint.kind in TURNING]
+    read_shapes = partial(_read_foot_shapes, Path(path), links, poses, list_carriers(frames))
+    return merge_frames(name, frames, turning, read_shapes)
 
 
-def find_moving_link(path: str, link: str) -> str:
-    """Return the link that turns with a link behind fixed joints, or the link itself; raises as ``read_urdf``."""
-    joints = {joint.child: joint for joint in _parse(_read_xml(path), path).joints}
-    return _find_carrier(link, joints)
+class UrdfJoint(NamedTuple):
+    """A joint of any kind."""
 
-
-def read_foot_shapes(path: str, link: str) -> FootShapes:
-    """Return the points of all shapes that move with a link, from its joint, along the root's axes at zero angles.
-
-    Visual shapes count only if none of these links has a collision shape. Raises as ``read_urdf``, or for a damaged mesh.
-    """
-    tree = _read_xml(path)
-    shapes = {kind: {part.get("name"): part.findall(kind) for part in tree.iter("link")} for kind in SHAPES}
-    model = _parse(tree, path)
-    joints = {joint.child: joint for joint in model.joints}
-    frames = {name: frame for name, frame in _place_links(model, joints).items() if _find_carrier(name, joints) == link}
-    kind = next((kind for kind in SHAPES if any(shapes[kind][name] for name in frames)), SHAPES[0])
-    found, missing = [np.zeros((0, 3))], []
-    for name, frame in frames.items():
-        for shape in shapes[kind][name]:
-            geometries = [part for geometry in shape.findall("geometry") for part in geometry]
-            origin = {} if shape.find("origin") is None else shape.find("origin").attrib
-            place, angles = (_parse_numbers(origin.get(key, "0 0 0"), 3, name) for key in ("xyz", "rpy"))
-            pose = make_pose(-frames[link][:3, 3]) @ frame @ make_pose(place, angles)
-            for geometry in geometries:
-                points = _list_shape_points(geometry, pose, Path(path), name)
-                if points is None:
-                    missing.append(str(geometry.get("filename")))
-                else:
-                    found.append(points)
-    return FootShapes(np.concatenate(found), kind, tuple(missing))
+    element: Any  # of lxml
+    name: str
+    kind: str
+    parent: str
+    child: str
 
 
 def list_meshes(path: str) -> list[str]:
@@ -98,158 +86,187 @@ def list_meshes(path: str) -> list[str]:
     return [str(file) for address in addresses if (file := find_mesh(address, Path(path))) is not None]
 
 
-def _list_shape_points(kind: Any, pose: Array, file: Path, link: str) -> Array | None:
+def _read_foot_shapes(
+    path: Path, links: Mapping[str, Any], poses: Mapping[str, Array], carriers: Mapping[str, str], foot: str
+) -> FootShapes:
+    """Return the points of all shapes that move with a link, from its joint, along the root's axes at zero angles.
+
+    Visual shapes count only if none of these links has a collision shape. Raises RobotDataError for a damaged mesh.
+    """
+    moving = [name for name in links if carriers[name] == foot]
+    kind = next((kind for kind in SHAPES if any(links[name].findall(kind) for name in moving)), SHAPES[0])
+    points, missing = [np.zeros((0, 3))], []
+    for name in moving:
+        for shape in links[name].findall(kind):
+            pose = make_pose(-poses[foot][:3, 3]) @ poses[name] @ _read_pose(shape)
+            for geometry in (part for parent in shape.findall("geometry") for part in parent):
+                corners = _list_shape_points(geometry, pose, path)
+                if corners is None:
+                    missing.append(str(geometry.get("filename")))
+                else:
+                    points.append(corners)
+    return FootShapes(np.concatenate(points), kind, tuple(missing))
+
+
+def _list_shape_points(shape: Any, pose: Array, path: Path) -> Array | None:
     """Return points (N, 3) of a shape at a pose (4, 4); None for a mesh that does not exist."""
-    if kind.tag == "mesh":
-        mesh = find_mesh(kind.get("filename", ""), file)
+    if shape.tag == "mesh":
+        mesh = find_mesh(shape.get("filename", ""), path)
         if mesh is None:
             return None
-        points = read_mesh_points(mesh) * _parse_numbers(kind.get("scale", "1 1 1"), 3, link)
-    elif kind.tag == "box":
-        points = list_box_points(np.array(_parse_numbers(kind.get("size", ""), 3, link)) / 2)
-    elif kind.tag == "sphere":
-        centre, (radius,) = pose[:3, 3], _parse_numbers(kind.get("radius", ""), 1, link)
-        return np.array([centre - [0.0, 0.0, radius]])
-    elif kind.tag in ("cylinder", "capsule"):
-        (radius,), (length,) = (_parse_numbers(kind.get(name, ""), 1, link) for name in ("radius", "length"))
-        points = list_cylinder_points(radius, length / 2)
+        points = read_mesh_points(mesh) * _read_numbers(shape, "scale", 3, "1 1 1")
+    elif shape.tag == "box":
+        points = list_box_points(np.array(_read_numbers(shape, "size", 3)) / 2)
+    elif shape.tag == "sphere":
+        return np.array([pose[:3, 3] - [0.0, 0.0, _read_number(shape, "radius")]])
+    elif shape.tag in ("cylinder", "capsule"):
+        points = list_cylinder_points(_read_number(shape, "radius"), _read_number(shape, "length") / 2)
     else:
         return np.zeros((0, 3))
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
-def _parse_numbers(text: str, count: int, link: str) -> list[float]:
-    values = [float(word) for word in text.split()]
-    if len(values) != count or not are_plausible(values):
-        raise ValueError(f"link {link!r}: a shape needs {count} finite numbers, got {text[:60]!r}")
-    return values
-
-
 def _read_xml(path: str) -> Any:
-    if find_spec("urdf_parser_py") is None:
+    if find_spec("lxml") is None:
         raise MissingExtraError(
-            f"robot file {path!r}: URDF files need the package urdfdom-py, which is not installed: "
-            "pip install 'nlp-gait[urdf]'"
+            f"robot file {path!r}: URDF files need the package lxml, which is not installed: pip install 'nlp-gait[urdf]'"
         )
     data = read_bytes(Path(path), "robot file", error=RobotDataError)
     try:
-        root = parse_xml(data)
+        robot = parse_xml(data)
     except ValueError as error:
         raise RobotDataError(f"robot file {path!r} is not valid XML: {error}") from error
-    if root.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
+    if robot.getroottree().docinfo.internalDTD is not None:  # a URDF has none; entities could read other files
         raise ValueError("a URDF must not have a DOCTYPE or entities; remove them")
-    parts = len(root.findall("link")) + len(root.findall("joint"))
-    if parts > MOST_PARTS:
-        raise ValueError(f"it has {parts} links and joints, more than {MOST_PARTS}; simplify the file")
-    for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in root.iter("mesh"))):
+    if robot.tag != "robot":
+        raise ValueError(f"it is not a URDF of a robot: it begins with <{robot.tag}>, not <robot>")
+    parts = robot.findall("link") + robot.findall("joint")
+    if len(parts) > MOST_PARTS:
+        raise ValueError(f"it has {len(parts)} links and joints, more than {MOST_PARTS}; simplify the file")
+    for element in (robot, *parts):
+        _check_attributes(element, path)
+    for mesh in filter(None, (find_mesh(element.get("filename", ""), Path(path)) for element in robot.iter("mesh"))):
         protect_input(mesh)
-    return root
+    return robot
 
 
-def _parse(root: Any, path: str) -> Any:
-    """Return a ``urdf_parser_py.urdf.Robot``, after removing all elements that are not read."""
-    etree = import_module("lxml.etree")
-    parser: Any = import_module("urdf_parser_py.xml_reflection.core")
-    for element in list(root):
-        if element.tag not in READ:
-            root.remove(element)
-            continue
-        for part in list(element):
-            if part.tag not in READ[element.tag]:
-                element.remove(part)
-    tolerant, parser.on_error = parser.on_error, partial(_handle_message, path)
-    try:
-        return import_module("urdf_parser_py.urdf").URDF.from_xml_string(etree.tostring(root))
-    except Exception as error:  # the parser raises its own, KeyError, ValueError and AssertionError
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise RobotDataError(f"robot file {path!r} is not a URDF of a robot: {reason}") from error
-    finally:
-        parser.on_error = tolerant
+def _check_attributes(element: Any, path: str) -> None:
+    """Warn of an unknown attribute of a link or joint; refuse those of elements with numbers, which may be misspelt."""
+    if odd := set(element.attrib) - ATTRIBUTES[element.tag]:
+        text = f"unknown attribute {min(odd)!r} of {_name_owner(element)}"
+        warn_once("robot file %r: %s; it is ignored, and may be removed", path, text)
+    for part in (*element, *element.findall("inertial/*")):
+        if part.tag in ATTRIBUTES and part.tag not in OWNERS and (odd := set(part.attrib) - ATTRIBUTES[part.tag]):
+            raise ValueError(f"{_name_owner(part)}: unknown attribute {min(odd)!r} of <{part.tag}>")
 
 
-def _handle_message(path: str, message: str) -> None:
-    """Warn of an unknown attribute of a link or joint; raise for other messages, such as a misspelt number of a limit."""
-    if not OWNER.search(message):
-        raise RobotDataError(message)
-    warn_once("robot file %r: %s; it is ignored, and may be removed", path, message)
+def _read_joint(element: Any) -> UrdfJoint:
+    kind = _read_text(element, "type")
+    if kind not in KINDS:
+        raise ValueError(f"{_name_owner(element)}: type must be one of {', '.join(KINDS)}, got {kind[:60]!r}")
+    parent, child = (_read_text(_find_part(element, end, needed=True), "link") for end in ("parent", "child"))
+    return UrdfJoint(element, _read_text(element, "name"), kind, parent, child)
 
 
-def _place_links(model: Any, joints: dict[str, Any]) -> dict[str, Array]:
+def _place_links(robot: Any, names: list[str], joints: list[UrdfJoint]) -> dict[str, Array]:
     """Return the pose (4, 4) of each link's frame in the root's at zero angles, parents first; raises ValueError."""
-    names = [link.name for link in model.links]
-    for kind, found in (("link", names), ("joint", [joint.name for joint in model.joints])):
-        duplicates = sorted({name for name in found if found.count(name) > 1})
-        if duplicates:
+    for kind in ("link", "joint"):
+        listed = [element.get("name") for element in robot.findall(kind)]
+        if duplicates := sorted({name for name in listed if listed.count(name) > 1}):
             raise ValueError(f"{kind} {duplicates[0]!r} appears twice")
-    for joint in model.joints:
+    children = set[str]()
+    for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in names:
                 raise ValueError(f"joint {joint.name!r}: link {end!r} does not exist")
-        if joints[joint.child] is not joint:
+        if joint.child in children:
             raise ValueError(f"joint {joint.name!r}: link {joint.child!r} already has a parent")
-    roots = [name for name in names if name not in joints]
+        children.add(joint.child)
+    roots = [name for name in names if name not in children]
     if len(roots) != 1:
         raise ValueError(f"exactly one link must have no parent, got {', '.join(roots) or 'none'}")
-    frames: dict[str, Array] = {roots[0]: np.eye(4)}
-    waiting = list(model.joints)
+    poses: dict[str, Array] = {roots[0]: np.eye(4)}
+    waiting = joints
     while waiting:
-        ready = [joint for joint in waiting if joint.parent in frames]
+        ready = [joint for joint in waiting if joint.parent in poses]
         if not ready:
             raise ValueError(f"joint {waiting[0].name!r} is part of a ring of joints")
-        for joint in ready:
-            frames[joint.child] = frames[joint.parent] @ _read_pose(joint.origin, f"joint {joint.name!r}")
-        waiting = [joint for joint in waiting if joint.child not in frames]
-    return frames
-
-
-def _find_carrier(link: str, joints: dict[str, Any]) -> str:
-    """Return the first link from this one to the root that turns against its parent, or the root."""
-    while link in joints and joints[link].type not in TURNING:
-        link = joints[link].parent
-    return link
+        poses |= {joint.child: poses[joint.parent] @ _read_pose(joint.element) for joint in ready}
+        waiting = [joint for joint in waiting if joint.child not in poses]
+    return poses
 
 
 def _read_mass(link: Any, frame: Array, about_joint: bool) -> Mass:
-    inertial = link.inertial
+    inertial = _find_part(link, "inertial")
     if inertial is None:
         return Mass(0.0, frame[:3, 3], np.zeros((3, 3)))
-    if inertial.mass is None or inertial.inertia is None:
-        raise ValueError(f"link {link.name!r}: <inertial> must hold <mass> and <inertia>")
-    if not are_plausible([inertial.mass, *np.ravel(inertial.inertia.to_matrix())]):
-        raise ValueError(f"link {link.name!r}: <mass> and <inertia> must hold finite numbers within {LARGEST_NUMBER:g}")
-    pose = frame @ _read_pose(inertial.origin, f"link {link.name!r}")
-    tensor = pose[:3, :3] @ np.array(inertial.inertia.to_matrix()) @ pose[:3, :3].T
+    inertia = _find_part(inertial, "inertia", needed=True)
+    mass_kg = _read_number(_find_part(inertial, "mass", needed=True), "value")
+    ixx, iyy, izz, ixy, ixz, iyz = (_read_number(inertia, key) for key in MOMENTS)
+    pose = frame @ _read_pose(inertial)
+    tensor = pose[:3, :3] @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ pose[:3, :3].T
     if about_joint:
-        tensor = tensor - compute_point_inertia(inertial.mass, pose[:3, 3] - frame[:3, 3])
-    return Mass(inertial.mass, pose[:3, 3], tensor)
+        tensor = tensor - compute_point_inertia(mass_kg, pose[:3, 3] - frame[:3, 3])
+    return Mass(mass_kg, pose[:3, 3], tensor)
 
 
-def _describe_joint(joint: Any, frames: dict[str, Array], carriers: dict[str, str]) -> dict[str, Any]:
-    limit = joint.limit
-    if limit is None:
-        raise ValueError(
-            f"joint {joint.name!r}: <limit> must give effort and velocity, and lower and upper if revolute"
-        )
-    if not are_plausible(joint.axis or ()):
-        raise ValueError(
-            f"joint {joint.name!r}: <axis> must hold finite numbers within {LARGEST_NUMBER:g}, got {joint.axis}"
-        )
-    frame, parent = frames[joint.child], carriers[joint.parent]
-    limits = [limit.lower, limit.upper] if joint.type == "revolute" else [-math.pi, math.pi]
-    return {
-        "parent": parent,
-        "child": joint.child,
-        "origin_m": (frame[:3, 3] - frames[parent][:3, 3]).tolist(),
-        "axis": (frame[:3, :3] @ np.array(joint.axis or (1.0, 0.0, 0.0))).tolist(),
-        "limits_rad": limits,
-        "velocity_limit_rad_s": limit.velocity,
-        "torque_limit_Nm": limit.effort,
-    }
+def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
+    limit, axis = _find_part(joint.element, "limit", needed=True), _find_part(joint.element, "axis")
+    low, high = (_read_number(limit, key, "0", finite=False) for key in ("lower", "upper"))
+    direction = (1.0, 0.0, 0.0) if axis is None else _read_numbers(axis, "xyz", 3)
+    return Joint(
+        name=joint.name,
+        parent=joint.parent,
+        child=joint.child,
+        origin_m=(0.0, 0.0, 0.0),  # ``merge_frames`` places it
+        axis=normalise_axis(to_vector(frame[:3, :3] @ np.array(direction))),
+        limits_rad=(low, high) if joint.kind == "revolute" else (-math.pi, math.pi),
+        velocity_limit_rad_s=_read_number(limit, "velocity", finite=False),
+        torque_limit_Nm=_read_number(limit, "effort", finite=False),
+    )
 
 
-def _read_pose(origin: Any, owner: str) -> Array:
+def _read_pose(element: Any) -> Array:
+    """Return the pose (4, 4) that the <origin> of an element gives, without one the identity."""
+    origin = _find_part(element, "origin")
     if origin is None:
         return np.eye(4)
-    if not are_plausible([*(origin.rpy or ()), *(origin.xyz or ())]):
-        raise ValueError(f"{owner}: <origin> must hold finite numbers, got xyz {origin.xyz}, rpy {origin.rpy}")
-    return make_pose(origin.xyz or (0.0, 0.0, 0.0), origin.rpy or (0.0, 0.0, 0.0))
+    return make_pose(_read_numbers(origin, "xyz", 3, "0 0 0"), _read_numbers(origin, "rpy", 3, "0 0 0"))
+
+
+def _find_part(element: Any, tag: str, *, needed: bool = False) -> Any:
+    """Return the only element of a tag in another one, None without one; raises ValueError for several, or a needed one."""
+    parts = element.findall(tag)
+    if len(parts) > 1 or (needed and not parts):
+        raise ValueError(f"{_name_owner(element)}: <{element.tag}> must have one <{tag}>, got {len(parts)}")
+    return parts[0] if parts else None
+
+
+def _read_text(element: Any, key: str) -> str:
+    if element.get(key) is None:
+        raise ValueError(f"{_name_owner(element)}: <{element.tag}> needs the attribute {key!r}")
+    return str(element.get(key))
+
+
+def _read_number(element: Any, key: str, default: str | None = None, *, finite: bool = True) -> float:
+    return _read_numbers(element, key, 1, default, finite=finite)[0]
+
+
+def _read_numbers(
+    element: Any, key: str, count: int, default: str | None = None, *, finite: bool = True
+) -> list[float]:
+    text = _read_text(element, key) if default is None else element.get(key, default)
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        values = []
+    if len(values) != count or (finite and not are_plausible(values)):
+        wanted = f"{count} finite number{'s' * (count > 1)} within {LARGEST_NUMBER:g}"
+        raise ValueError(f"{_name_owner(element)}: {key} of <{element.tag}> must be {wanted}, got {text[:60]!r}")
+    return values
+
+
+def _name_owner(element: Any) -> str:
+    """Return the link or joint that contains an element, for messages."""
+    owners = [part for part in (element, *element.iterancestors()) if part.tag in OWNERS]
+    return f"{owners[0].tag} {owners[0].get('name')!r}"

@@ -1,71 +1,108 @@
-"""Links and joints of a URDF or MJCF that cannot be used as they are, welded to their parents."""
+"""Links that become one: those of a file that do not turn against each other, and those that cannot be used as they are."""
 
-from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
-import numpy as np
+from nlp_gait.errors import RobotDataError
+from nlp_gait.robots.meshes import FootShapes
+from nlp_gait.robots.robot import Joint, Link
+from nlp_gait.robots.tree import Array, Mass, combine_masses, to_vector, weld_child
 
-from nlp_gait.errors import GaitError, RobotDataError
-from nlp_gait.robots.tree import Array, Mass, combine_masses
-
-Records = dict[str, dict[str, Any]]
-# Returns what is wrong with a record of this name, or None.
-FindFault = Callable[[str, Mapping[str, Any]], GaitError | None]
+Links = dict[str, Link]
+Joints = dict[str, Joint]
+ReadShapes = Callable[[str], FootShapes]  # shapes that move with a link
 
 
-def weld_faults(
-    links: Records,
-    joints: Records,
-    legs: Collection[str],
-    find_link_fault: FindFault,
-    find_joint_fault: FindFault,
-    notes: list[str],
-) -> None:
+class Frame(NamedTuple):
+    """A link of a URDF or a body of an MJCF at zero angles, in the axes and from the origin of the root."""
+
+    parent: str | None  # None for the root
+    turns: bool  # against its parent
+    origin_m: Array  # (3,) the joint to its parent
+    mass: Mass
+
+
+class RobotParts(NamedTuple):
+    """A robot as a URDF or MJCF describes it, in which some links and joints may be faulty."""
+
+    name: str
+    root: str
+    links: Links
+    joints: Joints
+    carriers: Mapping[str, str]  # the link of ``links`` that each link of the file is part of
+    read_shapes: ReadShapes
+
+
+def list_carriers(frames: Mapping[str, Frame]) -> dict[str, str]:
+    """Return the first link from each one to the root that turns against its parent, or the root."""
+
+    def find_carrier(name: str) -> str:
+        while not frames[name].turns and (parent := frames[name].parent) is not None:
+            name = parent
+        return name
+
+    return {name: find_carrier(name) for name in frames}
+
+
+def merge_frames(
+    name: str, frames: Mapping[str, Frame], turning: Sequence[Joint], read_shapes: ReadShapes
+) -> RobotParts:
+    """Return a robot whose links are the frames that do not turn against each other, as one each."""
+    carriers = list_carriers(frames)
+    masses: dict[str, list[Mass]] = {}
+    for link, frame in frames.items():
+        masses.setdefault(carriers[link], []).append(frame.mass)
+    links = {link: combine_masses(parts).move(-frames[link].origin_m).to_link(link) for link, parts in masses.items()}
+    joints = {}
+    for joint in turning:
+        parent = carriers[joint.parent]
+        origin = to_vector(frames[joint.child].origin_m - frames[parent].origin_m)
+        joints[joint.name] = replace(joint, parent=parent, origin_m=origin)
+    root = next(link for link, frame in frames.items() if frame.parent is None)
+    return RobotParts(name, root, links, joints, carriers, read_shapes)
+
+
+def weld_faults(links: Links, joints: Joints, legs: Collection[str], notes: list[str]) -> None:
     """Weld links and joints that cannot be used to their parents; raise RobotDataError for one of a leg."""
-    faults = {name: fault for name, raw in joints.items() if (fault := find_joint_fault(name, raw)) is not None}
+    faults = find_faults(joints)
     for name, fault in faults.items():
-        if joints[name]["child"] in legs:
+        if joints[name].child in legs:
             raise fault
-        _weld(links, joints, name)
+        weld_child(links, joints, name)
     if faults:
         notes.append(
             f"{len(faults)} joint{'s' * (len(faults) > 1)} cannot be driven and stay at zero, welded: {', '.join(faults)}; the "
             f"first: {next(iter(faults.values()))}"
         )
-    while faults := {name: fault for name, raw in links.items() if (fault := find_link_fault(name, raw)) is not None}:
-        loose = (name for name, raw in joints.items() if raw["child"] in faults and raw["child"] not in legs)
+    while faults := find_faults(links):
+        loose = (name for name, joint in joints.items() if joint.child in faults and joint.child not in legs)
         name = next(loose, None) or _find_child_of_root(links, joints, legs, faults)
-        parent, child = joints[name]["parent"], joints[name]["child"]
+        parent, child = joints[name].parent, joints[name].child
         notes.append(f"{child!r} is welded to its parent {parent!r}: {faults.get(child) or faults[parent]}")
-        _weld(links, joints, name)
+        weld_child(links, joints, name)
 
 
-def _find_child_of_root(links: Records, joints: Records, legs: Collection[str], faults: Mapping[str, GaitError]) -> str:
+def find_faults(parts: Mapping[str, Link] | Mapping[str, Joint]) -> dict[str, RobotDataError]:
+    """Return what is wrong with links or joints, by name."""
+    faults = {}
+    for name, part in parts.items():
+        try:
+            part.check()
+        except RobotDataError as fault:
+            faults[name] = fault
+    return faults
+
+
+def _find_child_of_root(
+    links: Links, joints: Joints, legs: Collection[str], faults: Mapping[str, RobotDataError]
+) -> str:
     """Return the joint from the faulty root to its heaviest child outside the legs."""
     root = next((name for name in faults if name not in legs), None)
-    below = [name for name, raw in joints.items() if raw["parent"] == root and raw["child"] not in legs]
+    below = [name for name, joint in joints.items() if joint.parent == root and joint.child not in legs]
     if root is None or not below:
         raise RobotDataError(
             f"{next(iter(faults.values()))}. It moves in every gait, so it matters; correct it, or write the link into the JSON "
             'file next to the model: "links": {"NAME": {"mass_kg": ..., "com_m": ..., "inertia_com_kgm2": ...}}'
         )
-    return max(below, key=lambda name: float(links[joints[name]["child"]]["mass_kg"]))
-
-
-def _weld(links: Records, joints: Records, name: str) -> None:
-    joint = joints.pop(name)
-    origin = np.array(joint["origin_m"], dtype=float)
-    child, parent = links.pop(joint["child"]), links[joint["parent"]]
-    parent |= combine_masses([Mass.from_record(parent), Mass.from_record(child).move(origin)]).to_record()
-    for other in joints.values():
-        if other["parent"] == joint["child"]:
-            moved = np.array(other["origin_m"], dtype=float) + origin
-            other |= {"parent": joint["parent"], "origin_m": moved.tolist()}
-
-
-def turn_records(links: Records, joints: Records, rotation: Array) -> None:
-    """Express all links and joints along other axes, by a rotation (3, 3)."""
-    for raw in links.values():
-        raw |= Mass.from_record(raw).turn(rotation).to_record()
-    for raw in joints.values():
-        raw |= {key: (rotation @ np.array(raw[key], dtype=float)).tolist() for key in ("origin_m", "axis")}
+    return max(below, key=lambda name: links[joints[name].child].mass_kg)

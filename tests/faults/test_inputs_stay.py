@@ -83,7 +83,7 @@ def test_a_file_of_another_program_is_replaced_only_by_force(call: str, suffix: 
 @pytest.mark.parametrize("ending", [".urdf", ".xml"])
 def test_files_that_a_robot_refers_to_stay(ending: str, folder: Path) -> None:
     """Also where the output is not named but made, as in a folder."""
-    pytest.importorskip("mujoco" if ending == ".xml" else "urdf_parser_py")
+    pytest.importorskip("mujoco" if ending == ".xml" else "lxml")
     triangles = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     for name in ("foot.obj", "more.xml"):
         Path(name).write_text(triangles if name == "foot.obj" else "<mujocoinclude><asset/></mujocoinclude>")

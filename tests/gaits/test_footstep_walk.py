@@ -171,7 +171,7 @@ def test_the_sharpest_turn_names_its_limit(body: Humanoid) -> None:
 
 
 def test_a_hip_joint_limits_the_angle_between_the_feet(tmp_path: Path) -> None:
-    pytest.importorskip("urdf_parser_py")
+    pytest.importorskip("lxml")
     biped = make_humanoid(crooked(tmp_path)).biped
     assert find_stiff_joint(biped, 0.0) is None
     joint, allowed = find_stiff_joint(biped, math.pi) or ("", 0.0)

@@ -34,7 +34,7 @@ def test_the_wrong_tensor_of_a_rod_has_three_quarters_and_is_shifted_back() -> N
 
 def test_a_tensor_that_no_body_has_about_its_joint_is_refused() -> None:
     with pytest.raises(RobotDataError, match="link 'rod': inertia_com_kgm2 has principal moments"):
-        shift_to_com(ROD)
+        shift_to_com(ROD).check()
 
 
 @pytest.mark.parametrize("name", list_robots())

@@ -78,7 +78,7 @@ DAMAGES = [
     (set_in("links", to=[1, 2]), r"robot\.json': links must be an object, got \[1, 2\]"),
     (set_in("joints", "LHip", "limits_rad", to=[1.0, -1.0]), r"joint 'LHip': limits_rad must be ordered .* \[1\.0, -1"),
     (set_in("joints", "LHip", "planning_limits_rad", to=[1.0, 1.0]), "planning_limits_rad must be ordered"),
-    (set_in("joints", "LHip", "axis", to=[0.0, 2.0, 0.0]), r"axis must be a unit vector, got \[0\.0, 2\.0, 0\.0\]"),
+    (set_in("joints", "LHip", "axis", to=[0.0, 2.0, 0.0]), r"axis must be a unit vector, got \(0\.0, 2\.0, 0\.0\)"),
     (set_in("joints", "LHip", "velocity_limit_rad_s", to=0), r"velocity_limit_rad_s must be > 0, got 0\.0"),
     (set_in("joints", "LHip", "torque_limit_Nm", to=-2), r"torque_limit_Nm must be > 0, got -2\.0"),
     (set_in("joints", "LHip", "parent", to="tail"), r"joint 'LHip': link 'tail' does not exist"),
@@ -218,15 +218,12 @@ def test_a_file_that_extends_a_robot_replaces_single_records(tmp_path: Path) -> 
 
 
 def test_records_made_in_code_are_checked_like_those_of_a_file() -> None:
-    knee, thigh = load_robot("nao-v5").joint("LKneePitch"), load_robot("nao-v5").links["LThigh"]
+    robot = load_robot("nao-v5")
+    thigh = dataclasses.replace(robot.links["LThigh"], com_m=(0.0, float("nan"), 0.0))
     with pytest.raises(
         RobotDataError, match=r"link 'LThigh': com_m must be finite numbers within 1e\+09, got \(0\.0, nan"
     ):
-        dataclasses.replace(thigh, com_m=(0.0, float("nan"), 0.0))
-    with pytest.raises(
-        RobotDataError, match=r"joint 'LKneePitch': axis must be a unit vector, got \(0\.0, 2\.0, 0\.0\)"
-    ):
-        dataclasses.replace(knee, axis=(0.0, 2.0, 0.0))
+        dataclasses.replace(robot, links={**robot.links, "LThigh": thigh})
 
 
 def test_robots_and_their_records_are_frozen() -> None:

@@ -15,7 +15,7 @@ from nlp_gait.robots.biped import make_biped_model
 from tests.robots.crooked import crooked, crooked_urdf
 
 mujoco = pytest.importorskip("mujoco")
-pytest.importorskip("urdf_parser_py")
+pytest.importorskip("lxml")
 
 DIGITS = 1e-5  # MuJoCo writes six
 

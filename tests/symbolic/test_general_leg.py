@@ -52,7 +52,7 @@ def leg_function(robot: Robot, side: str) -> tuple[Leg, ca.Function]:
 
 @pytest.fixture(scope="module")
 def robots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Robot]:
-    pytest.importorskip("urdf_parser_py")
+    pytest.importorskip("lxml")
     return {
         "nao": load_robot("nao-v5"),
         "crooked": load_robot(crooked(tmp_path_factory.mktemp("crooked"))),

@@ -4,6 +4,7 @@ Both legs lie in one plane and pass through each other. A foot is a rod on the g
 the stairs. The leg with primes, which stands first, is the left one.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import NamedTuple
@@ -17,8 +18,8 @@ from nlp_gait.formulation.display import LEFT, RIGHT, SIMULATED, TRUNK, Limb, Sk
 from nlp_gait.gaits.several_steps import repeat_steps
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.stair import SETBACK
-from nlp_gait.robots import Foot, Link, Robot
-from nlp_gait.robots.robot import Vector, make_free_joint
+from nlp_gait.robots import Foot, Joint, Link, Robot
+from nlp_gait.robots.robot import Vector
 
 LINES = {RIGHT: ("H", "K", "A", "S", "T"), LEFT: ("H", "K'", "A'", "S'", "T'"), TRUNK: ("H", "U")}
 # The paper has no motors. The largest torque of each is the robot's weight at a lever as long as what the joint moves: leg,
@@ -55,9 +56,15 @@ def make_rigid_bodies() -> Robot:
             link, name = biped.get_rod(paper_name), f"{side} {part}"
             along: Vector = (0.0, 0.0, -1.0) if joint in ("Hip", "Knee") else (1.0, 0.0, 0.0)
             links[name] = _link(name, link, along)
-            torque = paper.mass_kg * biped.GRAVITY * levers[joint]
-            joints[f"{letter}{joint}"] = make_free_joint(
-                f"{letter}{joint}", parent, name, origin, (0.0, 1.0, 0.0), torque
+            joints[f"{letter}{joint}"] = Joint(
+                name=f"{letter}{joint}",
+                parent=parent,
+                child=name,
+                origin_m=origin,
+                axis=(0.0, 1.0, 0.0),
+                limits_rad=(-math.pi, math.pi),  # the paper has no limits of angles and speeds
+                velocity_limit_rad_s=100.0,
+                torque_limit_Nm=paper.mass_kg * biped.GRAVITY * levers[joint],
             )
             parent, origin = name, (link.length_m * along[0], link.length_m * along[1], link.length_m * along[2])
         feet[side], toes[side] = (

@@ -112,7 +112,7 @@ def pack_robot(robot: str, folder: Path) -> set[str]:
 
 
 def test_meshes_and_extended_files_travel_with_a_urdf(tmp_path: Path) -> None:
-    pytest.importorskip("urdf_parser_py")
+    pytest.importorskip("lxml")
     package = tmp_path / "legs"
     for folder in (package / "urdf", package / "meshes", package / "variants"):
         folder.mkdir(parents=True)
@@ -132,7 +132,7 @@ def test_meshes_and_extended_files_travel_with_a_urdf(tmp_path: Path) -> None:
 
 def test_included_files_and_meshes_travel_with_an_mjcf(tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco")
-    pytest.importorskip("urdf_parser_py")
+    pytest.importorskip("lxml")
     home = tmp_path / "home"
     (home / "meshes").mkdir(parents=True)
     (home / "meshes" / "sole.obj").write_text(TETRAHEDRON)

@@ -92,7 +92,7 @@ def test_a_problem_without_steps_is_refused() -> None:
 
 
 def test_robots_that_turn_have_a_sharpest_turn(tmp_path: Path) -> None:
-    pytest.importorskip("urdf_parser_py")
+    pytest.importorskip("lxml")
     (sentence,) = describe_sharpest_turn(load("humanoid-cycle", robot=crooked(tmp_path), intervals=2))
     assert sentence.startswith("sharpest turn that joints and soles allow: ") and "if it is sharper, " in sentence
     assert not describe_sharpest_turn(load("humanoid-cycle", intervals=2))

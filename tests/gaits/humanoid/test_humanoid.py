@@ -19,7 +19,7 @@ from nlp_gait.gaits.humanoid.body import GRAVITY
 from tests.pinocchio_oracle import floating_model, stand
 from tests.robots.crooked import crooked
 
-pytest.importorskip("urdf_parser_py")
+pytest.importorskip("lxml")
 
 # Two double-precision algorithms, relative to the largest torque, and on lengths of a metre.
 TORQUE_TOLERANCE, ZMP_TOLERANCE_M = 1e-10, 1e-12

@@ -14,7 +14,7 @@ from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.robots.biped import compare_swing, find_least_swing_time
 from tests.robots.crooked import crooked
 
-pytest.importorskip("urdf_parser_py")
+pytest.importorskip("lxml")
 
 
 @pytest.fixture(scope="module")

@@ -137,7 +137,7 @@ def test_steps_of_no_length_are_refused(name: str, step: Any) -> None:
 
 @pytest.mark.slow
 def test_a_urdf_gives_the_same_problem_as_the_json(tmp_path: Path, path: str) -> None:
-    pytest.importorskip("urdf_parser_py")
+    pytest.importorskip("lxml")
     raw = humanoid()
     (tmp_path / "robot.urdf").write_bytes(ElementTree.tostring(as_urdf(raw)))
     written(tmp_path, partner(raw, "robot.urdf"))
