@@ -17,7 +17,7 @@ from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Side, find_legs, infer_feet
 from nlp_gait.robots.mjcf import list_dependencies, read_mjcf
 from nlp_gait.robots.perturbation import perturb, split_name
-from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, normalise_axis
+from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
 from nlp_gait.robots.urdf import list_meshes, read_urdf
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
@@ -62,7 +62,7 @@ class RobotFile:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Description:
+class RobotDescription:
     """What files say about a robot, before the rest is inferred; a hash of the robot takes its text."""
 
     file: RobotFile
@@ -163,7 +163,7 @@ def _find_description(source: str) -> str:
     return str(partner)
 
 
-def _describe(source: str, seen: tuple[str, ...] = ()) -> Description:
+def _describe(source: str, seen: tuple[str, ...] = ()) -> RobotDescription:
     """Return what a file, and the files that it extends, say about a robot."""
     if source.endswith(MODEL_ENDINGS):
         return _read_model(source, None)
@@ -194,7 +194,7 @@ def _describe(source: str, seen: tuple[str, ...] = ()) -> Description:
     )
 
 
-def _read_model(source: str, inertia_about: str | None) -> Description:
+def _read_model(source: str, inertia_about: str | None) -> RobotDescription:
     with convert_errors(f"robot file {source!r}", RobotDataError):
         if source.endswith(".xml"):
             model = read_mjcf(source)
@@ -204,23 +204,23 @@ def _read_model(source: str, inertia_about: str | None) -> Description:
         file = RobotFile(name=model.name, description=f"from {Path(source).name}", root=model.root)
         replace(file, links=model.links, joints=model.joints)
     unstated = tuple(model.links if inertia_about is None else ())
-    return Description(
+    return RobotDescription(
         file=file, links=model.links, joints=model.joints, unstated=unstated, model=model, model_path=source
     )
 
 
-def _decode_parts(file: RobotFile, source: str) -> Description:
+def _decode_parts(file: RobotFile, source: str) -> RobotDescription:
     """Return the links and joints of a JSON file; raises RobotDataError for one that is faulty."""
     with convert_errors(f"robot file {source!r}", RobotDataError):
         links = {name: decode(Link, raw, f"links.{name}", given={"name": name}) for name, raw in file.links.items()}
         joints = {name: decode(Joint, raw, f"joints.{name}", given={"name": name}) for name, raw in file.joints.items()}
     if file.inertia_about == "joint":
         links = {name: shift_to_com(link) for name, link in links.items()}
-    joints = {name: replace(joint, axis=normalise_axis(joint.axis)) for name, joint in joints.items()}
+    joints = {name: replace(joint, axis=make_unit_axis(joint.axis)) for name, joint in joints.items()}
     for fault in (*find_faults(links).values(), *find_faults(joints).values()):
         raise fault
     unstated = tuple(links if file.inertia_about is None else ())
-    return Description(file=replace(file, links={}, joints={}), links=links, joints=joints, unstated=unstated)
+    return RobotDescription(file=replace(file, links={}, joints={}), links=links, joints=joints, unstated=unstated)
 
 
 def _rename(joints: Mapping[str, Joint], names: Mapping[str, str], source: str) -> Joints:
@@ -255,7 +255,7 @@ def _read(name_or_path: str) -> RobotFile:
     return file
 
 
-def _make_robot(description: Description, source: str) -> Robot:
+def _make_robot(description: RobotDescription, source: str) -> Robot:
     file = description.file
     if file.name is None or file.root is None:
         missing = "name" if file.name is None else "root"
@@ -284,7 +284,7 @@ def _make_robot(description: Description, source: str) -> Robot:
 
 
 def _complete(
-    description: Description, model: RobotParts, links: Links, joints: Joints, feet: Feet, notes: list[str]
+    description: RobotDescription, model: RobotParts, links: Links, joints: Joints, feet: Feet, notes: list[str]
 ) -> Feet:
     """Return the feet of a robot from a URDF or MJCF; weld its faulty parts, and note what was inferred."""
     name = str(description.file.name)

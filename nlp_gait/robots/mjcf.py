@@ -16,9 +16,9 @@ from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import read_in_child
 from nlp_gait.robots.meshes import FootShapes, list_box_points, list_cylinder_points
-from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, normalise_axis
+from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
-from nlp_gait.robots.welding import Frame, RobotParts, list_carriers, merge_frames
+from nlp_gait.robots.welding import LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
 UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits
@@ -44,11 +44,11 @@ def read_mjcf(path: str) -> RobotParts:
         hinge = None if i == root else _find_hinge(model, i)
         parent = None if i == root else names[int(model.body_parentid[i])]
         origin = pose[:3, :3] @ (np.zeros(3) if hinge is None else model.jnt_pos[hinge]) + pose[:3, 3]
-        frames[names[i]] = Frame(parent, hinge is not None, origin, _read_mass(model, i, pose))
+        frames[names[i]] = LinkFrame(parent, hinge is not None, origin, _read_mass(model, i, pose))
         if hinge is not None:
             turning.append(_read_turning(model, hinge, str(parent), names[i], pose))
     read_shapes = partial(_read_foot_shapes, model, poses, names, frames)
-    return merge_frames(Path(path).stem, frames, turning, read_shapes)
+    return join_frames(Path(path).stem, frames, turning, read_shapes)
 
 
 def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) -> Joint:
@@ -57,8 +57,8 @@ def _read_turning(model: Any, hinge: int, parent: str, child: str, pose: Array) 
         name=model.joint(hinge).name or f"joint {hinge}",
         parent=parent,
         child=child,
-        origin_m=(0.0, 0.0, 0.0),  # ``merge_frames`` places it
-        axis=normalise_axis(to_vector(pose[:3, :3] @ model.jnt_axis[hinge])),
+        origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
+        axis=make_unit_axis(to_vector(pose[:3, :3] @ model.jnt_axis[hinge])),
         limits_rad=(float(low), float(high)) if model.jnt_limited[hinge] else (-math.pi, math.pi),
         velocity_limit_rad_s=UNLIMITED_RAD_S,
         torque_limit_Nm=_find_torque_limit(model, hinge),
@@ -74,7 +74,7 @@ def _report_ignored(path: str, model: Any) -> None:
 
 
 def _read_foot_shapes(
-    model: Any, poses: Mapping[int, Array], names: Mapping[int, str], frames: Mapping[str, Frame], foot: str
+    model: Any, poses: Mapping[int, Array], names: Mapping[int, str], frames: Mapping[str, LinkFrame], foot: str
 ) -> FootShapes:
     """Return the points of all shapes that move with a link, as for a URDF; MuJoCo has read the meshes."""
     carriers = list_carriers(frames)

@@ -40,7 +40,7 @@ def are_plausible(numbers: Any) -> bool:
     return bool((np.abs(numbers) <= LARGEST_NUMBER).all())  # NaN is not
 
 
-def normalise_axis(axis: Vector) -> Vector:
+def make_unit_axis(axis: Vector) -> Vector:
     """Return a unit vector of rounded digits (0.7071) as an exact one, and any other vector as it is."""
     x, y, z = axis
     length = math.hypot(*axis)

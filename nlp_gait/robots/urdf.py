@@ -20,9 +20,9 @@ from nlp_gait.robots.meshes import (
     parse_xml,
     read_mesh_points,
 )
-from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, normalise_axis
+from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
-from nlp_gait.robots.welding import Frame, RobotParts, list_carriers, merge_frames
+from nlp_gait.robots.welding import LinkFrame, RobotParts, join_frames, list_carriers
 
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 OWNERS = ("robot", "link", "joint")
@@ -63,10 +63,10 @@ def read_urdf(path: str, *, about_joint: bool = False) -> RobotParts:
     frames = {}
     for link, element in links.items():
         parent, turns = (joint_to[link].parent, joint_to[link].kind in TURNING) if link in joint_to else (None, False)
-        frames[link] = Frame(parent, turns, poses[link][:3, 3], _read_mass(element, poses[link], about_joint))
+        frames[link] = LinkFrame(parent, turns, poses[link][:3, 3], _read_mass(element, poses[link], about_joint))
     turning = [_read_turning(joint, poses[joint.child]) for joint in joints if joint.kind in TURNING]
     read_shapes = partial(_read_foot_shapes, Path(path), links, poses, list_carriers(frames))
-    return merge_frames(name, frames, turning, read_shapes)
+    return join_frames(name, frames, turning, read_shapes)
 
 
 class UrdfJoint(NamedTuple):
@@ -218,8 +218,8 @@ def _read_turning(joint: UrdfJoint, frame: Array) -> Joint:
         name=joint.name,
         parent=joint.parent,
         child=joint.child,
-        origin_m=(0.0, 0.0, 0.0),  # ``merge_frames`` places it
-        axis=normalise_axis(to_vector(frame[:3, :3] @ np.array(direction))),
+        origin_m=(0.0, 0.0, 0.0),  # ``join_frames`` places it
+        axis=make_unit_axis(to_vector(frame[:3, :3] @ np.array(direction))),
         limits_rad=(low, high) if joint.kind == "revolute" else (-math.pi, math.pi),
         velocity_limit_rad_s=_read_number(limit, "velocity", finite=False),
         torque_limit_Nm=_read_number(limit, "effort", finite=False),

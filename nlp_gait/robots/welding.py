@@ -14,7 +14,7 @@ Joints = dict[str, Joint]
 ReadShapes = Callable[[str], FootShapes]  # shapes that move with a link
 
 
-class Frame(NamedTuple):
+class LinkFrame(NamedTuple):
     """A link of a URDF or a body of an MJCF at zero angles, in the axes and from the origin of the root."""
 
     parent: str | None  # None for the root
@@ -34,7 +34,7 @@ class RobotParts(NamedTuple):
     read_shapes: ReadShapes
 
 
-def list_carriers(frames: Mapping[str, Frame]) -> dict[str, str]:
+def list_carriers(frames: Mapping[str, LinkFrame]) -> dict[str, str]:
     """Return the first link from each one to the root that turns against its parent, or the root."""
 
     def find_carrier(name: str) -> str:
@@ -45,8 +45,8 @@ def list_carriers(frames: Mapping[str, Frame]) -> dict[str, str]:
     return {name: find_carrier(name) for name in frames}
 
 
-def merge_frames(
-    name: str, frames: Mapping[str, Frame], turning: Sequence[Joint], read_shapes: ReadShapes
+def join_frames(
+    name: str, frames: Mapping[str, LinkFrame], turning: Sequence[Joint], read_shapes: ReadShapes
 ) -> RobotParts:
     """Return a robot whose links are the frames that do not turn against each other, as one each."""
     carriers = list_carriers(frames)
