@@ -162,11 +162,11 @@ class Certainty(Question[FoundCertainty]):
         if self.evaluations:
             inputs = {**identity, "evaluations": self.evaluations, "seed": self.seed}
             function = partial(_search, problem, best, self.evaluations, self.seed)
-            search = work.compute(LongSearch, "cma-{key}", inputs, function)
+            search = work.compute(LongSearch, "cma", inputs, function)
             work.progress("long search")
         if self.time_limit_s and (len(problem.names) <= MOST_VARIABLES or has_power_form(problem)):
             inputs = {**identity, **limits, "prover": PROVER}
-            certificate = work.compute(Certificate, "certificate-{key}", inputs, prove)
+            certificate = work.compute(Certificate, "certificate", inputs, prove)
         yield FoundCertainty(
             problem=problem,
             starts=self.starts,

@@ -258,7 +258,7 @@ class Prices(Question[FoundPrices]):
                 work.progress(f"solving again with another {price.name}")
                 return verify_price(optimum, near, price, partial(change, price)).to_json()
 
-            return parse_price(work.store.compute("check-{key}", {**inputs, "quantity": price.name}, compute))
+            return parse_price(work.store.compute("check", {**inputs, "quantity": price.name}, compute))
 
         def compute_robot() -> list[dict[str, Any]]:
             return [price.to_json() for price in price_robot(optimum, work.progress)]
@@ -266,7 +266,7 @@ class Prices(Question[FoundPrices]):
         if optimum.reason is None:
             parameters = _rank(price_parameters(optimum))
             if problem.display.robot is not None:
-                robot = _rank([parse_price(raw) for raw in work.store.compute("robot-{key}", inputs, compute_robot)])
+                robot = _rank([parse_price(raw) for raw in work.store.compute("robot", inputs, compute_robot)])
         limits = [price for price in parameters if abs(price.per_step) > FREE * max(abs(optimum.objective), FREE)]
 
         def perturb(price: Price, change: float) -> GaitProblem:

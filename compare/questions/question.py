@@ -68,11 +68,6 @@ class Question(ABC, Generic[F]):
     problem: GaitProblem  #: with its current parameter values
 
     @property
-    def inputs(self) -> dict[str, Any]:
-        """Inputs next to the problem, as plain data."""
-        return {item.name: getattr(self, item.name) for item in fields(self) if item.name != "problem"}
-
-    @property
     def total(self) -> int | None:
         """Number of progress notes; None if unknown."""
         return None

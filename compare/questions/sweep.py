@@ -100,10 +100,6 @@ class Sweep(Question[list[SweepPoint]]):
             load_mujoco()
 
     @property
-    def inputs(self) -> dict[str, Any]:
-        return {**super().inputs, "axes": {axis.name: list(axis.values) for axis in self.axes}}
-
-    @property
     def total(self) -> int:
         # An NLP solver solves twice at each point of the grid.
         solves = 2 if self.algorithm in GRADIENT_SOLVERS else 1
@@ -238,7 +234,7 @@ def _run_searches(tasks: Sequence[Task], work: Work) -> list[RunRecord]:
     records: list[RunRecord] = []
     try:
         for task in tasks:
-            record = work.store.compute("search-{key}", task.definition(), partial(_run_search, task))
+            record = work.store.compute("search", task.definition(), partial(_run_search, task))
             records.append(parse_record(record))
             work.progress("")
     except KeyboardInterrupt:

@@ -61,7 +61,7 @@ def check_cycle(problem: GaitProblem) -> None:
 def simulate_walk(result: Result, steps: int, work: Work) -> Walk:
     """Simulate so many steps of a gait in open loop; raises MissingExtraError without MuJoCo."""
     inputs = {**fingerprint(result.problem), "x": result.x.tolist(), "steps": steps, "drive": repr(Drive())}
-    return work.compute(Walk, "walk-{key}", inputs, partial(_simulate_walk, result, steps))
+    return work.compute(Walk, "walk", inputs, partial(_simulate_walk, result, steps))
 
 
 def _simulate_walk(result: Result, steps: int) -> Walk:

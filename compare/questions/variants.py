@@ -139,10 +139,6 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
             load_variant(self.problem, variant)
 
     @property
-    def inputs(self) -> dict[str, Any]:
-        return {**super().inputs, "variants": [asdict(variant) for variant in self.variants]}
-
-    @property
     def total(self) -> int:
         return len(self.variants)
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from nlp_gait.backends.identity import PROBES, VALUES, describe_difference, hash_json, make_key
+from nlp_gait.backends.identity import VALUES, describe_difference, hash_json, make_key
 from nlp_gait.user_code import hash_file, shorten_name
 
 SHOWN_DIGITS = 8  # of a hash
@@ -19,11 +19,6 @@ WORDS: Mapping[tuple[str, ...], str] = {
     ("problem", VALUES): MATHEMATICS,
     ("solver", SOURCE): "the solver's source",
     ("polishes", "key"): "the search that it polishes",
-}
-INPUT_WORDS = {
-    VALUES: MATHEMATICS,
-    "parameters": "values of the problem's parameters",  # any of them
-    "code_sha256": "the program has changed",
 }
 
 
@@ -59,13 +54,6 @@ def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     differences = _join(_compare_definitions(old, new))
     changed = describe_difference(old["problem"], new["problem"])
     return f"{MATHEMATICS}: {changed}" if differences in ("", MATHEMATICS) and changed else differences
-
-
-def describe_input_differences(old: Any, new: Any) -> str:
-    """Return the differences of the inputs of a stored result in words: ``starts 5 -> 10``."""
-    places = [place for place in _compare(old, new) if PROBES not in place[0]]
-    differences = _join([place for place in places if place[0][-1] != VALUES])
-    return differences or f"{MATHEMATICS}: {describe_difference(old, new)}"
 
 
 def describe_edition(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -116,7 +104,7 @@ def _list_leaves(data: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple
 def _join(found: list[Difference]) -> str:
     texts = []
     for place, before, after in found:
-        words = WORDS.get(place) or INPUT_WORDS.get(place[-1]) or INPUT_WORDS.get(place[0])
+        words = WORDS.get(place)
         if not words and all(HASH.fullmatch(str(value)) for value in (before, after)):
             words = f"the file of {place[-1]}"
         texts.append(words or f"{place[-1]} {_shorten(before)} -> {_shorten(after)}")

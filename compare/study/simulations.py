@@ -3,17 +3,15 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from compare.study.record import RunRecord, load_gait
-from compare.study.record_files import locate_run
 from compare.study.store import FOLDER as STORE
-from compare.study.store import Store
+from compare.study.store import MISSING, Store
 from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
-from nlp_gait.files import convert_errors
+from nlp_gait.files import convert_errors, make_file_name
 from nlp_gait.progress import ignore_progress
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.engine import load_mujoco
@@ -23,6 +21,7 @@ from nlp_gait.simulation.plan import Plan, make_plan
 from nlp_gait.simulation.simulate import simulate_plan
 
 STEPS = 10  # of a cycle
+DEFAULT_DRIVE = Drive()
 REMEDY = "delete it and rerun with --engine"
 
 
@@ -43,6 +42,12 @@ class SimulatedGait:
     walked_share: float | None  #: walked share of the planned distance; None for a phase and after a fall
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Stored:
+    simulated: str  # hash of model and motion, and the version of the engine
+    gait: SimulatedGait
+
+
 def simulate_records(
     folder: Path, records: Sequence[RunRecord], drive: Drive, progress: Callable[[str], None] | None = None
 ) -> list[SimulatedGait]:
@@ -56,34 +61,38 @@ def simulate_records(
     """
     version = f"mujoco {load_mujoco().__version__}"
     store = Store(folder, ignore_progress)
-    found = []
+    gaits = []
     for record in records:
         result = load_gait(record)
         if (model := result.problem.display.simulation_model) is not None:
             steps = STEPS if model.repeats else None
             plan = make_plan(result, steps)
-            inputs = {**_load_gait(record), "drive": asdict(drive), "model": f"{_hash_plan(plan, drive)}, {version}"}
-            value = store.compute(_name(record), inputs, partial(_simulate, record, plan, steps, drive))
-            found.append(decode(SimulatedGait, value))
+            simulated = f"{_hash_plan(plan, drive)}, {version}"
+            name, inputs = _name(record), _list_inputs(record, drive)
+            stored = store.load(name, inputs)
+            if stored is MISSING or stored.get("simulated") != simulated:
+                gait = _simulate(record, plan, steps, drive)
+                stored = store.save(name, inputs, asdict(_Stored(simulated=simulated, gait=gait)))
+            gaits.append(decode(_Stored, stored).gait)
         if progress is not None:
             progress(f"{record.problem} {record.solver}")
-    return found
+    return gaits
 
 
-def load_simulations(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
-    """Return the stored simulations of records whose gaits have not changed, without MuJoCo; InputError for a damaged file."""
+def load_simulations(folder: Path, records: Sequence[RunRecord], drive: Drive = DEFAULT_DRIVE) -> list[SimulatedGait]:
+    """Return the stored simulations of records, without MuJoCo; raises InputError for a damaged file."""
     if not (folder / STORE).is_dir():
         return []
-    store, found = Store(folder), []
+    store, gaits = Store(folder), []
     for record in records:
-        stored = store.load(_name(record))
-        if stored is not None and _load_gait(record).items() <= stored.inputs.items():
+        stored = store.load(_name(record), _list_inputs(record, drive))
+        if stored is not MISSING:
             with convert_errors(f"simulation {_name(record)!r} in {str(folder)!r} is damaged", InputError, REMEDY):
-                found.append(decode(SimulatedGait, stored.value))
-    return found
+                gaits.append(decode(_Stored, stored).gait)
+    return gaits
 
 
-def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) -> dict[str, Any]:
+def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) -> SimulatedGait:
     trace = simulate_plan(plan, drive=drive)
     if steps is None:
         measured, share = measure(plan, trace, drive), None
@@ -92,28 +101,26 @@ def _simulate(record: RunRecord, plan: Plan, steps: int | None, drive: Drive) ->
         walk = measure_walk(plan, trace, drive, steps)
         model, engine = walk.model_J_per_m, walk.engine_J_per_planned_m
         share = None if walk.walked_m is None else walk.walked_m / walk.planned_m
-    return asdict(
-        SimulatedGait(
-            problem=record.problem,
-            solver=record.solver,
-            run=record.run,
-            drive=drive,
-            steps=steps,
-            unit="W" if steps is None else "J/m",
-            model=model,
-            engine=engine,
-            fell_at_s=trace.fell_at_s,
-            walked_share=share,
-        )
+    return SimulatedGait(
+        problem=record.problem,
+        solver=record.solver,
+        run=record.run,
+        drive=drive,
+        steps=steps,
+        unit="W" if steps is None else "J/m",
+        model=model,
+        engine=engine,
+        fell_at_s=trace.fell_at_s,
+        walked_share=share,
     )
 
 
 def _name(record: RunRecord) -> str:
-    return locate_run(Path("simulations"), record.problem, record.solver, record.run).with_suffix("").as_posix()
+    return f"simulations/{make_file_name(record.problem)}/{make_file_name(record.solver)}-{record.run}"
 
 
-def _load_gait(record: RunRecord) -> dict[str, Any]:
-    return {"problem": record.definition["problem"], "x": dict(record.x)}
+def _list_inputs(record: RunRecord, drive: Drive) -> dict[str, Any]:
+    return {"problem": record.definition["problem"], "x": dict(record.x), "drive": asdict(drive)}
 
 
 def _hash_plan(plan: Plan, drive: Drive) -> str:

@@ -113,7 +113,7 @@ def write_a_record_of_another_definition(folder: Path, finished: Finished) -> No
 def store_results(folder: Path, finished: Finished) -> None:
     for inputs in ({"seed": 1}, {"seed": 2}):
         Store(folder).compute("one", inputs, lambda inputs=inputs: [inputs["seed"]] * 10)
-        finished(folder / "store" / "one.json")
+        finished(max((folder / "store").glob("one-*.json"), key=lambda path: path.stat().st_mtime_ns))
 
 
 def write_sessions(folder: Path, finished: Finished) -> None:

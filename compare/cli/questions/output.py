@@ -47,7 +47,6 @@ class Output:
 
             try:
                 store = Store(self.out, say)
-                store.report_changes(question.name, question.problem, **question.inputs)
                 for found in question.find(Work(store=store, progress=progress)):
                     findings = found
             except KeyboardInterrupt as interrupt:

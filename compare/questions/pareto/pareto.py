@@ -162,14 +162,14 @@ class Pareto(Question[FoundFront]):
         inputs = {**fingerprint(problem), "criterion": criterion.name, **effort}
         solver, progress, code = work.solver(), work.progress, [front_module]
         solve = partial(solve_front, problem, criterion, **effort, solver=solver, progress=progress)
-        front = work.compute(tuple[FrontPoint, ...], f"front-{criterion.name}-{{key}}", inputs, solve, code)
+        front = work.compute(tuple[FrontPoint, ...], f"front-{criterion.name}", inputs, solve, code)
         if not self.searches:
             yield FoundFront(front, find_knees(front))
             return
         searches = self._run_searches(problem, front, work)
         inputs |= {"searches": {name: list(b) for name, b in self.searches.items()}, "runs": self.runs}
         challenge = partial(challenge_front, problem, criterion, front, searches, solver, progress)
-        outcome = work.compute(Challenge, f"challenge-{criterion.name}-{{key}}", inputs, challenge, code)
+        outcome = work.compute(Challenge, f"challenge-{criterion.name}", inputs, challenge, code)
         qualities = tuple(compute_qualities(outcome.front, searches))
         yield FoundFront(outcome.front, find_knees(outcome.front), searches, qualities, outcome)
 
@@ -186,7 +186,7 @@ class Pareto(Question[FoundFront]):
                 seed = self.seed + run
                 inputs = {**identity, "budgets": list(budgets), "algorithm": settings, "seed": seed}
                 search = partial(_run_search, objectives, name, budgets, seed)
-                fronts += work.compute(tuple[SearchFront, ...], f"{name.lower()}-{run}-{{key}}", inputs, search)
+                fronts += work.compute(tuple[SearchFront, ...], f"{name.lower()}-{run}", inputs, search)
                 work.progress(f"{name}, run {run}")
         return fronts
 

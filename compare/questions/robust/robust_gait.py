@@ -231,7 +231,7 @@ def solve_robust(
     effort = {"starts": starts, "seed": seed, "samples": samples}
     inputs = {**fingerprint(problem), "box": dict(box), "name": name, **effort}
     function = partial(_solve_robust, problem, name, box, starts, seed, samples, work)
-    return work.compute(RobustGait, "box-{key}", inputs, function)
+    return work.compute(RobustGait, "box", inputs, function)
 
 
 def _solve_robust(
@@ -287,7 +287,7 @@ def simulate_robots(problem: GaitProblem, gait: RobustGait, work: Work) -> Itera
         for kind, x in (("nominal", gait.nominal_x), ("robust", gait.x)):
             perturbed = rebuild(problem, robot=robot)
             inputs = {**fingerprint(perturbed), "gait": kind, "x": dict(x)}
-            yield work.compute(RobotSimulation, "play-{key}", inputs, partial(_simulate, perturbed, robot, kind, x))
+            yield work.compute(RobotSimulation, "play", inputs, partial(_simulate, perturbed, robot, kind, x))
             work.progress(f"{kind} gait on {robot[:40]}")
 
 

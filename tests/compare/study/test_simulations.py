@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -109,8 +110,8 @@ def test_problems_that_cannot_be_simulated_are_left_out_or_refused(
 
 def test_a_damaged_simulation_is_refused_with_its_remedy(tmp_path: Path) -> None:
     gait = dsp("pso")
-    inputs = {"problem": gait.definition["problem"], "x": dict(gait.x)}
-    Store(tmp_path).save("simulations/nao-dsp/pso-0000", inputs, {})
+    inputs = {"problem": gait.definition["problem"], "x": dict(gait.x), "drive": asdict(Drive())}
+    Store(tmp_path).save("simulations/nao-dsp/pso-0", inputs, {})
     with pytest.raises(InputError, match="delete it and rerun with --engine"):
         load_simulations(tmp_path, [dsp("pso")])
 
