@@ -165,12 +165,14 @@ def test_ctrl_c_in_variants_writes_the_finished_variants(tmp_path: Path, monkeyp
 def test_ctrl_c_before_the_first_result_counts_the_stored_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / "solve-1.json").write_text("{}")
     for module in (variants, robust):
         monkeypatch.setattr(module, "solve", press)
     monkeypatch.setattr(prices, "Continuation", press)
     out = ["--out", tmp_path]
     kept = f"finished results are stored in {tmp_path}; rerun the command to continue\n"
     assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("variants", "--over", "motors", *out, status=130)
-    assert f"interrupted; 2 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
-    assert f"interrupted; 3 {kept}" in one_sentence("prices", "walk12", *out, status=130)
+    assert f"interrupted; 1 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
+    assert f"interrupted; 1 {kept}" in one_sentence("prices", "walk12", *out, status=130)
     assert [path.name for path in tmp_path.iterdir()] == ["store"]
