@@ -18,9 +18,9 @@ from benchmarks.casadi_code import compiled_functions
 from benchmarks.rows import Array, Row, ratio, side_by_side
 from metaheuristics import ParticleSwarm, minimize
 from metaheuristics.interface import BatchObjective
-from nlp_gait.backends.kernel.compiled import NativeKernel
+from nlp_gait.backends.kernel.compiled import SHARED, NativeRows
 from nlp_gait.backends.kernel.compiler import find_compiler, native_lanes
-from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel
+from nlp_gait.backends.kernel.kernel_source import Kernel, build_kernel, write_rows_source
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.gaits.nao.body import GRAVITY, find_upright_links, load_nao
 from nlp_gait.gaits.nao.joints import HELD_ARM_ANGLES, JOINTS, PLANNED_JOINTS
@@ -123,14 +123,8 @@ def _torques(rounds: int, robot: Robot, moving: Sequence[str], upright: Collecti
     tree = make_tree(robot, robot.feet["left"].link)
     torque, _ = newton_euler(tree, held | parts[0], still | parts[1], still | parts[2], GRAVITY, upright=upright)
     outputs = simplify([vertcat(*(torque[name] for name in JOINTS))])
-    empty = SX.sym("p", 0)
-    kernel = Kernel(
-        function=Function("kernel", [state, empty], [SX(0), *outputs]),
-        bounds=Function("bounds", [empty], [SX.inf(22), SX.inf(22)]),
-        weights=np.zeros(22),
-        model=build_kernel(nlp_gait.load("nao-ssp")).model,
-    )
-    native = NativeKernel(kernel, find_compiler(), native_lanes())
+    function = Function("kernel", [state, SX.sym("p", 0)], [SX(0), *outputs])
+    native = NativeRows(write_rows_source(function, objective=True), find_compiler(), native_lanes())
 
     states = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 3, n))
     if upright:  # legs whose joints keep torso and soles level
@@ -153,7 +147,9 @@ def _torques(rounds: int, robot: Robot, moving: Sequence[str], upright: Collecti
     result = np.empty((22, count), order="F")
     times = side_by_side(
         {
-            "kernel": lambda: native(rows, np.empty(0), -limit, limit, f, violation, g),
+            "kernel": lambda: native(
+                (rows, np.empty(0), -limit, limit, np.zeros(22)), SHARED, (f, g, violation), count
+            ),
             "pinocchio": lambda: pin.rneaInParallel(1, pool, *arrays, result),
         },
         rounds,

@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 from nlp_gait.backends.kernel.compiler import BASE_FLAGS, Compiler, find_compiler, lane_flags, native_lanes
-from nlp_gait.backends.kernel.kernel_source import SYMBOLS, Kernel, build_kernel, write_rows_source
+from nlp_gait.backends.kernel.kernel_source import SYMBOLS, build_kernel, write_rows_source
 from nlp_gait.backends.kernel.library_cache import load_library
 from nlp_gait.errors import CompilerError, InputError, check_count, format_value
 from nlp_gait.formulation import Array, GaitProblem
@@ -27,6 +27,8 @@ from nlp_gait.formulation.locking import lock_casadi
 from nlp_gait.formulation.numbers import to_floats
 
 _INTEGER, _POINTER = ctypes.c_longlong, ctypes.c_void_p
+# Of the inputs of an objective, which all candidates share: parameters, lower and upper bounds, weights.
+SHARED = b"\0\1\1\1\1"
 # Candidates in one call of the virtual machine; more would only use more memory.
 BLOCKS = (64, 16, 4, 1)
 
@@ -34,19 +36,22 @@ BLOCKS = (64, 16, 4, 1)
 class NativeRows:
     """Evaluates the rows of a batch in a compiled library; safe to call from several threads at once."""
 
+    backend: Literal["compiled"] = "compiled"
+
     def __init__(self, source: str, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
         """Build the library for 1, 2, 4 or 8 lanes, or load it from the cache; raises CompilerError.
 
         With ``scalar_functions``, sines and the like take one lane after the other, so that no bit depends on the lane count.
         """
-        more = ("-DNO_VECTOR_LIBM",) if scalar_functions else ()
-        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *more)
+        scalar = ("-DNO_VECTOR_LIBM",) if scalar_functions else ()
+        flags = (*BASE_FLAGS, *lane_flags(lanes), f"-DLANES={lanes}", *scalar)
         loaded, self.library = load_library(source, compiler, flags, SYMBOLS)
         self._evaluate = loaded.nlp_gait_evaluate_rows
         self._evaluate.argtypes = [_POINTER, _POINTER, _POINTER, _INTEGER, _POINTER]
         loaded.nlp_gait_rows_memory.restype = _INTEGER
         self._memory_size = int(loaded.nlp_gait_rows_memory())
         self._local = threading.local()
+        self.description = f"compiled by {compiler.summary}, {lanes} rows at a time"
 
     def __call__(self, inputs: Sequence[Array], shared: bytes, outputs: Sequence[Array | None], rows: int) -> None:
         """Fill the outputs that are not None; all arrays contiguous, aligned doubles; 1 in ``shared``: one row for all."""
@@ -61,66 +66,42 @@ class NativeRows:
             raise RuntimeError("the compiled kernel reported a failure")
 
 
-class NativeKernel:
-    """Evaluates a problem's kernel in a compiled library; safe to call from several threads at once."""
-
-    backend: Literal["compiled"] = "compiled"
-
-    def __init__(self, kernel: Kernel, compiler: Compiler, lanes: int, *, scalar_functions: bool = False) -> None:
-        """Build or load the library; arguments and errors as ``NativeRows``."""
-        source = write_rows_source(kernel.function, objective=True)
-        self._rows = NativeRows(source, compiler, lanes, scalar_functions=scalar_functions)
-        self.library = self._rows.library
-        self._weights = kernel.weights
-        self.lanes = lanes
-        self.description = f"compiled by {compiler.summary}, {lanes} candidates at a time"
-
-    def __call__(
-        self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
-    ) -> None:
-        """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n); all arrays contiguous, aligned doubles."""
-        self._rows((X, p, lower, upper, self._weights), b"\0\1\1\1\1", (f, g, violation), len(X))
-
-
 def get_address(array: Array) -> int:
     """Return the address of an array's first number."""
     address: int = array.__array_interface__["data"][0]
     return address
 
 
-class InterpretedKernel:
-    """Evaluates a kernel in CasADi's virtual machine, one thread at a time: many times slower, the same numbers."""
+class InterpretedRows:
+    """Evaluates an objective in CasADi's virtual machine, one thread at a time: many times slower, the same numbers."""
 
     backend: Literal["interpreted"] = "interpreted"
 
     def __init__(self, problem: GaitProblem) -> None:
-        kernel = build_kernel(problem)
-        self._weights = kernel.weights
+        function = build_kernel(problem).function
         self._blocks = {}
         for size in BLOCKS:
-            x = ca.MX.sym("x", kernel.function.size1_in(0), size)
-            p = ca.MX.sym("p", kernel.function.size1_in(1))
-            cost, g = kernel.function.map(size)(x, ca.repmat(p, 1, size))
-            self._blocks[size] = ca.Function("block", [x, p], [cost, g])
+            x, p = ca.MX.sym("x", function.size1_in(0), size), ca.MX.sym("p", function.size1_in(1))
+            self._blocks[size] = ca.Function("block", [x, p], function.map(size)(x, ca.repmat(p, 1, size)))
         self.description = "interpreted by CasADi's virtual machine"
 
     @lock_casadi
-    def __call__(
-        self, X: Array, p: Array, lower: Array, upper: Array, f: Array, violation: Array, g: Array | None
-    ) -> None:
-        """Fill f, violation (P,) and, unless None, g (P, m) for X (P, n)."""
+    def __call__(self, inputs: Sequence[Array], shared: bytes, outputs: Sequence[Array | None], rows: int) -> None:
+        """Fill the outputs as ``NativeRows`` of an objective, whose inputs share all but the first."""
+        (X, p, lower, upper, weights), (f, g, violation) = inputs, outputs
+        assert f is not None and violation is not None  # for the type checker
         first = 0
         for size, block in self._blocks.items():
-            while len(X) - first >= size:
-                rows = slice(first, first + size)
-                cost, values = (np.array(output).T for output in block(X[rows].T, p))
+            while rows - first >= size:
+                cut = slice(first, first + size)
+                cost, values = (np.array(output).T for output in block(X[cut].T, p))
                 # Plain maximum, not fmax: a NaN must not pass for feasible.
                 violations = np.maximum(np.maximum(lower - values, values - upper), 0.0)
-                finite = np.isfinite(X[rows]).all(axis=1)
-                f[rows] = np.where(finite, cost[:, 0], np.inf)
-                violation[rows] = np.where(finite, violations @ self._weights, np.inf)
+                finite = np.isfinite(X[cut]).all(axis=1)
+                f[cut] = np.where(finite, cost[:, 0], np.inf)
+                violation[cut] = np.where(finite, violations @ weights, np.inf)
                 if g is not None:
-                    g[rows] = values
+                    g[cut] = values
                 first += size
 
 
@@ -139,9 +120,9 @@ class RowThreads:
 
     def run(self, rows: int, evaluate: Callable[[slice], None]) -> None:
         """Call ``evaluate`` with slices that together are all rows, from several threads at once."""
-        parts = max(1, min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S)))
+        count = max(1, min(self._threads, int(rows * self._time_per_row_s / LEAST_THREAD_TIME_S)))
         started = time.perf_counter()
-        cuts = [slice(rows * i // parts, rows * (i + 1) // parts) for i in range(parts)]
+        cuts = [slice(rows * i // count, rows * (i + 1) // count) for i in range(count)]
         jobs = [self._get_pool().submit(evaluate, cut) for cut in cuts[1:]]
         evaluate(cuts[0])
         if jobs:
@@ -149,7 +130,7 @@ class RowThreads:
         for job in jobs:
             job.result()
         if rows:
-            self._time_per_row_s = (time.perf_counter() - started) * parts / rows
+            self._time_per_row_s = (time.perf_counter() - started) * count / rows
 
     def _get_pool(self) -> ThreadPoolExecutor:
         pools, process = self._pools, os.getpid()  # a forked process has no threads of its parent, and starts its own
@@ -175,7 +156,7 @@ class CompiledObjective:
     def __init__(
         self,
         problem: GaitProblem,
-        evaluator: NativeKernel | InterpretedKernel,
+        evaluate_rows: NativeRows | InterpretedRows,
         threads: int,
         rebuild: Callable[..., "CompiledObjective"],
     ) -> None:
@@ -186,13 +167,12 @@ class CompiledObjective:
         self.lower = problem.lower  #: (n,) current lower bounds
         self.upper = problem.upper  #: (n,) current upper bounds
         self.row_names = kernel.model.row_names  #: (m,) constraint rows, in the order of ``constraints``
-        self.backend: Literal["compiled", "interpreted"] = evaluator.backend
-        self.description = evaluator.description  #: backend, compiler and lane count, in words
-        self._evaluator = evaluator
-        self._lower, self._upper = kernel.row_bounds(problem)
+        self.backend: Literal["compiled", "interpreted"] = evaluate_rows.backend
+        self.description = evaluate_rows.description  #: backend, compiler and lane count, in words
+        self._evaluate_rows = evaluate_rows
+        self._shared = (np.array(problem.p), *kernel.row_bounds(problem), kernel.weights)
         #: (m - n,) names of the rows without their places, those of the variables left out
         self.groups = tuple(name.partition("[")[0] for name in self.row_names[: -len(self.names)])
-        self._p = np.array(problem.p)
         self._threads = RowThreads(threads)
         self._rebuild = rebuild
 
@@ -220,8 +200,8 @@ class CompiledObjective:
 
     def _evaluate(self, X: Array, f: Array, violation: Array, g: Array | None) -> None:
         def evaluate(cut: slice) -> None:
-            part = None if g is None else g[cut]
-            self._evaluator(X[cut], self._p, self._lower, self._upper, f[cut], violation[cut], part)
+            outputs = (f[cut], None if g is None else g[cut], violation[cut])
+            self._evaluate_rows((X[cut], *self._shared), SHARED, outputs, cut.stop - cut.start)
 
         self._threads.run(len(X), evaluate)
 
@@ -258,44 +238,47 @@ def compile_objective(
         n = len(problem.names)
         raise InputError(f"{problem.name} has {n} variables tied by equations, which no search can satisfy; use solve")
     used, count = check_parallelism(threads, lanes)
-    evaluator: NativeKernel | InterpretedKernel
+    evaluate_rows: NativeRows | InterpretedRows
     try:
-        compiler = find_compiler()
-        evaluator = problem.build_once(_build_native, compiler, count)
+        evaluate_rows = problem.build_once(_build_native, find_compiler(), count)
     except CompilerError as error:
         if require_compiler:
             raise
         slow = "the objective is interpreted, which is many times slower: %s"
         logging.getLogger("nlp_gait").warning(slow, error)
-        evaluator = problem.build_once(InterpretedKernel)
+        evaluate_rows = problem.build_once(InterpretedRows)
         used = 1  # the virtual machine does not release Python's lock
     rebuild = partial(compile_objective, require_compiler=require_compiler, threads=threads, lanes=lanes)
-    return CompiledObjective(problem, evaluator, used, rebuild)
+    return CompiledObjective(problem, evaluate_rows, used, rebuild)
 
 
-def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeKernel:
-    """Build the native kernel, and check that it agrees with the virtual machine at most of some random points.
-
-    Not at all of them: where rounding decides a jump, both may be right.
-    """
+def _build_native(problem: GaitProblem, compiler: Compiler, lanes: int) -> NativeRows:
     kernel = build_kernel(problem)
-    native = NativeKernel(kernel, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
+    source = write_rows_source(kernel.function, objective=True)
+    native = NativeRows(source, compiler, lanes, scalar_functions=problem.hints.amplifies_rounding)
     draw = Random(0).random  # NumPy's generators would take a tenth of a process's start to import
     shares = np.array([[draw() for _ in problem.names] for _ in range(CHECK_POINTS)])
-    X = problem.lower + shares * (problem.upper - problem.lower)
+    X, p = problem.lower + shares * (problem.upper - problem.lower), np.array(problem.p)
     lower, upper = kernel.row_bounds(problem)
     f, violation, g = np.empty(CHECK_POINTS), np.empty(CHECK_POINTS), np.empty((CHECK_POINTS, len(lower)))
-    native(X, np.array(problem.p), lower, upper, f, violation, g)
-    found = np.column_stack([f, g])
-    expected = np.array([np.concatenate([np.array(v).ravel() for v in kernel.function(x, problem.p)]) for x in X])
-    check_agreement(found, expected, native.library)
+    native((X, p, lower, upper, kernel.weights), SHARED, (f, g, violation), CHECK_POINTS)
+    check_agreement(kernel.function, [X, np.tile(p, (CHECK_POINTS, 1))], [f[:, None], g], native.library)
     return native
 
 
-def check_agreement(found: Array, expected: Array, library: Path) -> None:
-    """Raise CompilerError if a library's values (P, m) differ from the virtual machine's at half of the points or more."""
-    alike = np.isclose(found, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
-    if 2 * np.count_nonzero(alike) <= len(found):
+def check_agreement(function: ca.Function, inputs: Sequence[Array], outputs: Sequence[Array], library: Path) -> None:
+    """Raise CompilerError if a library's outputs differ from the virtual machine's at half of the points or more.
+
+    Not at a few of them: where rounding decides a jump, both may be right. Inputs and outputs have a row for each point.
+    """
+    expected = []
+    for point in zip(*inputs, strict=True):
+        arguments = [ca.reshape(ca.DM(row), *function.size_in(i)) for i, row in enumerate(point)]
+        values = [ca.vec(ca.densify(value)).full().ravel() for value in function.call(arguments)]
+        expected.append(np.concatenate(values))
+    computed = np.concatenate(outputs, axis=1)
+    alike = np.isclose(computed, expected, rtol=CHECK_TOLERANCE, atol=CHECK_TOLERANCE, equal_nan=True).all(axis=1)
+    if 2 * np.count_nonzero(alike) <= len(computed):
         raise CompilerError(
             f"{library} computes other values than the virtual machine; delete it, and try another compiler (CXX)"
         )

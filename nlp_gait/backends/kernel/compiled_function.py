@@ -72,10 +72,10 @@ def _expand(function: ca.Function) -> ca.Function:
 def _count_operations(function: ca.Function) -> int:
     if function.is_a("SXFunction"):
         return function.n_instructions()
-    parts = function.find_functions(0)
     if function.class_name() in LOOPS:
-        counts = [function.numel_in(i) // max(1, parts[0].numel_in(i)) for i in range(function.n_in())]
-        return _count_operations(parts[0]) * max(counts)
+        inner = function.find_functions(0)[0]
+        counts = [function.numel_in(i) // max(1, inner.numel_in(i)) for i in range(function.n_in())]
+        return _count_operations(inner) * max(counts)
     total = 0
     for k in range(function.n_instructions()):
         operation, node = function.instruction_id(k), function.instruction_MX(k)
@@ -89,13 +89,13 @@ def _count_operations(function: ca.Function) -> int:
 
 
 def _find_unsupported(function: ca.Function) -> Iterator[str]:
-    for part in (function, *function.find_functions()):
-        kind = part.class_name()
+    for called in (function, *function.find_functions()):
+        kind = called.class_name()
         if kind in OPERATIONS:
-            found = {part.instruction_id(k) for k in range(part.n_instructions())} - OPERATIONS[kind]
-            yield from (f"the operation {NAMES[each][3:].lower()}" for each in sorted(found))
+            operations = {called.instruction_id(k) for k in range(called.n_instructions())} - OPERATIONS[kind]
+            yield from (f"the operation {NAMES[operation][3:].lower()}" for operation in sorted(operations))
         elif kind not in LOOPS:
-            yield f"the function {part.name()} ({kind})"
+            yield f"the function {called.name()} ({kind})"
 
 
 class CompiledFunction:
@@ -106,15 +106,14 @@ class CompiledFunction:
 
     def __init__(self, function: ca.Function, kernel: ca.Function, threads: int, lanes: int) -> None:
         """Use ``compile_function`` instead; ``kernel`` is the function that is compiled."""
-        compiler = find_compiler()
-        self._native = NativeRows(write_rows_source(kernel), compiler, lanes)
+        self._native = NativeRows(write_rows_source(kernel), find_compiler(), lanes)
         self.function = function  #: CasADi's
         self.argument_names = tuple(function.name_in())
         self.result_names = tuple(function.name_out())
         #: shape of one row of each argument and result: () for a scalar, (n,) for a vector, (r, c) for a matrix
         self.argument_shapes = [_find_row_shape(function.size_in(i)) for i in range(function.n_in())]
         self.result_shapes = [_find_row_shape(function.size_out(i)) for i in range(function.n_out())]
-        self.description = f"compiled by {compiler.summary}, {lanes} rows at a time"  #: in words
+        self.description = self._native.description  #: in words
         self._parallelism = threads, lanes
         self._threads = RowThreads(threads)
 
@@ -128,8 +127,9 @@ class CompiledFunction:
         if len(arguments) != len(self.argument_names):
             wanted = ", ".join(self.argument_names)
             raise InputError(f"{self.function.name()} has the arguments {wanted}; got {len(arguments)} arguments")
-        pieces = [self._check(*each) for each in zip(self.argument_names, self.argument_shapes, arguments, strict=True)]
-        counts = {len(values) for values, shared in pieces if not shared}
+        described = zip(self.argument_names, self.argument_shapes, arguments, strict=True)
+        inputs = [self._check(name, shape, values) for name, shape, values in described]
+        counts = {len(values) for values, shared in inputs if not shared}
         if len(counts) > 1:
             raise InputError(
                 f"the arguments of {self.function.name()} must have equally many rows, got {sorted(counts)}; an argument without "
@@ -137,11 +137,11 @@ class CompiledFunction:
             )
         rows = counts.pop() if counts else 1
         results = [np.empty((rows, *shape[::-1])) for shape in self.result_shapes]
-        self._threads.run(rows, lambda cut: self._evaluate(pieces, results, cut))
-        found = [result.swapaxes(1, 2) if result.ndim == 3 else result for result in results]
-        if all(shared for _, shared in pieces):
-            found = [result[0] for result in found]
-        return found[0] if len(found) == 1 else tuple(found)
+        self._threads.run(rows, lambda cut: self._evaluate(inputs, results, cut))
+        results = [result.swapaxes(1, 2) if result.ndim == 3 else result for result in results]
+        if all(shared for _, shared in inputs):
+            results = [result[0] for result in results]
+        return results[0] if len(results) == 1 else tuple(results)
 
     @lock_casadi
     def jacobian(self, result: int | str = 0, argument: int | str = 0) -> "CompiledFunction":
@@ -173,10 +173,10 @@ class CompiledFunction:
             array = array.swapaxes(-2, -1)  # CasADi's order
         return np.require(array, requirements=("C", "A")), array.ndim == len(shape)
 
-    def _evaluate(self, pieces: Sequence[tuple[Array, bool]], results: Sequence[Array], cut: slice) -> None:
-        inputs = [values if shared else values[cut] for values, shared in pieces]
+    def _evaluate(self, inputs: Sequence[tuple[Array, bool]], results: Sequence[Array], cut: slice) -> None:
+        rows = [values if shared else values[cut] for values, shared in inputs]
         outputs = [result[cut] for result in results]
-        self._native(inputs, bytes(shared for _, shared in pieces), outputs, cut.stop - cut.start)
+        self._native(rows, bytes(shared for _, shared in inputs), outputs, cut.stop - cut.start)
 
 
 def compile_function(
@@ -209,12 +209,7 @@ def _compile(function: ca.Function, threads: int, lanes: int) -> CompiledFunctio
     points = [np.array([[draw() for _ in range(math.prod(s))] for _ in range(CHECK_POINTS)]) for s in sizes]
     results = [np.empty((CHECK_POINTS, function.numel_out(i))) for i in range(function.n_out())]
     compiled._evaluate([(values, False) for values in points], results, slice(0, CHECK_POINTS))
-    expected = [
-        function.call([ca.reshape(ca.DM(part), *size) for part, size in zip(point, sizes, strict=True)])
-        for point in zip(*points, strict=True)
-    ]
-    flat = [np.concatenate([ca.vec(ca.densify(value)).full().ravel() for value in values]) for values in expected]
-    check_agreement(np.concatenate(results, axis=1), np.array(flat), compiled._native.library)
+    check_agreement(function, points, results, compiled._native.library)
     return compiled
 
 
