@@ -60,6 +60,8 @@ REPLACEMENTS = {
     "report --hessian-weight": "give --weights GRADIENT,HESSIAN",
     "report --parquet": "--csv writes runs.csv, which pandas converts",
     "report --style": "compare.report.FurtherFiles takes it in Python",
+    "robust --simulate": "simulate takes the gaits that robust writes for each robot",
+    "robust --no-simulate": "robust simulates nothing; its files are for simulate",
     "robust --samples": "compare.questions takes it in Python",
 }
 

@@ -1,15 +1,10 @@
-"""A problem with a perturbed robot or other options: masses, leg lengths and soles are never exactly those of the data."""
+"""A problem with a perturbed robot: masses, leg lengths and soles are never exactly those of the data."""
 
 from collections.abc import Mapping
 
 from compare.study.task import ProblemSpec
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.robots.perturbation import MASS, name_perturbed, split_name
-
-
-def rebuild(problem: GaitProblem, **options: str | int | float | bool) -> GaitProblem:
-    """Return the problem with other options and the same changed parameter values."""
-    return ProblemSpec(name=problem.address, options={**problem.options, **options}, values=problem.values).load()
 
 
 def is_mass(quantity: str) -> bool:
@@ -23,12 +18,9 @@ def get_quantity(problem: GaitProblem, quantity: str) -> float:
     return changes.get(quantity, float(is_mass(quantity)))
 
 
-def name_robot(problem: GaitProblem, values: Mapping[str, float]) -> str:
-    """Return the name of the problem's robot with other values of some quantities."""
-    name, changes = split_name(str(problem.options["robot"]))
-    return name_perturbed(name, {**changes, **values})
-
-
 def perturb_robot(problem: GaitProblem, values: Mapping[str, float]) -> GaitProblem:
     """Return the problem with other values of its robot's quantities; errors in a robot's data do not move the limits."""
-    return rebuild(problem, robot=name_robot(problem, values)).with_values(**problem.parameter_values)
+    name, changes = split_name(str(problem.options["robot"]))
+    robot = name_perturbed(name, {**changes, **values})
+    spec = ProblemSpec(name=problem.address, options={**problem.options, "robot": robot}, values=problem.values)
+    return spec.load().with_values(**problem.parameter_values)

@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.units import (
@@ -18,7 +17,7 @@ from compare.analysis.units import (
     name_in_words,
     with_unit,
 )
-from compare.drawing.figures import make_figure, use_style
+from compare.drawing.figures import make_figure, plot_bars, use_style
 from compare.questions.perturbed_problem import get_quantity, is_mass, perturb_robot
 from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.report.document import Figure, Part, make_text_table
@@ -352,27 +351,16 @@ def _make_row(price: Price, ranges: Mapping[str, float]) -> tuple[str, ...]:
 
 def plot_prices(findings: FoundPrices, problem: GaitProblem) -> Drawing:
     """Plot the effect of a natural step of each limit and of errors of the robot as bars."""
-    titles = ("raising a limit", "another robot with the same limits")
-    groups = [
-        (prices, title) for prices, title in zip((findings.limits, findings.robot), titles, strict=True) if prices
-    ]
-    objective = problem.objective
-    unit, scale = PREFIXED.get(objective.unit, (objective.unit, 1.0))
+    titles = {"raising a limit": findings.limits, "another robot with the same limits": findings.robot}
+    groups = {title: prices[:SHOWN] for title, prices in titles.items() if prices}
+    unit, scale = PREFIXED.get(problem.objective.unit, (problem.objective.unit, 1.0))
     with use_style():
-        height = 1.0 + 0.24 * max(min(SHOWN, len(prices)) for prices, _ in groups)
-        figure = make_figure(3.6 * len(groups), height)
-        for axes, (prices, title) in zip(figure.subplots(1, len(groups), squeeze=False)[0], groups, strict=True):
-            _plot_bars(axes, prices[:SHOWN], scale)
-            axes.set_title(title)
-            axes.set_xlabel(make_heading(f"change of {objective.name}", unit))
+        figure = make_figure(3.6 * len(groups), 1.0 + 0.24 * max(map(len, groups.values())))
+        all_axes = figure.subplots(1, len(groups), squeeze=False)[0]
+        for axes, (title, prices) in zip(all_axes, groups.items(), strict=True):
+            names = [f"{name_in_words(price.name, price.unit)}, {price.words}" for price in prices]
+            values = [scale * price.per_step for price in prices]
+            plot_bars(axes, names, {title: values}, [[UP if value > 0.0 else DOWN for value in values]])
+            axes.axvline(0.0, color="0.3", linewidth=0.6)
+            axes.set(title=title, xlabel=make_heading(f"change of {problem.objective.name}", unit))
     return figure
-
-
-def _plot_bars(axes: Axes, prices: Sequence[Price], scale: float) -> None:
-    values = [scale * price.per_step for price in prices]
-    places = range(len(prices))
-    axes.barh(places, values, color=[UP if value > 0.0 else DOWN for value in values])
-    axes.set_yticks(places, [f"{name_in_words(price.name, price.unit)}, {price.words}" for price in prices])
-    axes.invert_yaxis()
-    axes.axvline(0.0, color="0.3", linewidth=0.6)
-    axes.grid(visible=False, axis="y")

@@ -8,18 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from compare.analysis.units import list_units, make_axis_label, name_in_words, with_unit
-from compare.drawing.figures import add_legend_below, make_figure, use_style
+from compare.analysis.units import make_axis_label, with_unit
+from compare.drawing.figures import add_legend_below, make_axes, plot_bars, use_style
 from compare.judge import evaluate
-from compare.questions.question import (
-    Answer,
-    Question,
-    Work,
-    make_optima_table,
-    make_record_table,
-    make_table,
-)
-from compare.report.document import Figure, Part
+from compare.questions.question import Answer, Question, Work, make_optima_table, make_record_table, make_table
+from compare.report.document import Figure
 from compare.study.task import ProblemSpec
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.backends.solve import solve
@@ -224,7 +217,6 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
 
     def report(self, findings: tuple[SolvedVariant, ...]) -> Answer:
         name, stem, first = self.problem.name, f"{self.problem.name}-variants", findings[0]
-        index = f"{self.problem.objective.name}_{self.problem.objective.unit}"
         changes: dict[str, Any] = {
             "variant": lambda v: v.name,
             "variables": lambda v: str(v.variables),
@@ -237,29 +229,17 @@ class Variants(Question[tuple[SolvedVariant, ...]]):
             "x* moves most in": lambda v: (
                 f"{v.moved_variable} by {v.moved:.0%} of its range" if (v.moved or 0.0) > CONSTANT else "-"
             ),
-        }
-        effort: dict[str, Any] = {
-            "variant": lambda v: v.name,
-            "starts from": lambda v: v.start or "-",
-            "converged": lambda v: f"{v.converged}/{v.starts}",
-            "solver": lambda v: f"{v.time_s:.1f} s, {v.iterations} iterations",
-            index: lambda v: f"{v.indexes[index]:.6f}" if index in v.indexes else "-",
-            f"{index} on the dense grid": lambda v: f"{v.dense[index]:.6f}" if index in (v.dense or {}) else "-",
-            "violated most there": lambda v: v.worst or "nothing",
+            "violated most between samples": lambda v: v.worst or "nothing",
         }
         same = [v for v in findings if v.moved is not None]
-        parts: list[Part] = [
-            make_table("What each variant changes", findings, changes),
-            make_table("How each was solved, and what lies between its samples", findings, effort),
-        ]
-        if len(same) > 1:
-            parts.append(make_optima_table({v.name: v.x for v in same}))
-        shown = "Objective at the optimum and at the first optimum; position of x* in its ranges."
+        optima = (make_optima_table({v.name: v.x for v in same}),) if len(same) > 1 else ()
+        shown = "Objective at the optimum and at the first optimum."
         return Answer(
             stem=stem,
             title=f"{name}: variants",
             parts=(
-                *parts,
+                make_table("What each variant changes; how each was solved is in the CSV file", findings, changes),
+                *optima,
                 Figure(name=stem, caption=shown, drawing=plot_variants(findings, self.problem)),
                 make_record_table(stem, findings),
             ),
@@ -308,30 +288,15 @@ def _group(names: Iterator[str] | Sequence[str] | Mapping[str, float]) -> dict[s
 
 
 def plot_variants(variants: Sequence[SolvedVariant], problem: GaitProblem) -> Drawing:
-    """Plot objectives as bars (left); for variants with the first one's variables also the position of x* (right)."""
-    shown = [v for v in variants if v.unit == variants[0].unit]
-    same = [v for v in shown if v.moved is not None]
-    few = len(problem.names) == variants[0].variables and len(same) == len(shown)
-    places = np.arange(len(shown))
+    """Plot the objectives in the first one's unit, next to those at the first optimum where all have its variables."""
+    shown = [variant for variant in variants if variant.unit == variants[0].unit]
+    groups, colours = {"at the optimum": [variant.objective for variant in shown]}, ["#0072B2"]
+    unchanged = [variant.unchanged for variant in shown if variant.unchanged is not None]
+    if len(unchanged) == len(shown):
+        groups, colours = {"at the first optimum": unchanged, **groups}, ["0.75", *colours]
     with use_style():
-        figure = make_figure(7.6 if few else 4.6, 0.9 + 0.34 * len(shown))
-        left, *others = figure.subplots(1, 1 + few, squeeze=False, width_ratios=(1.0, 1.15)[: 1 + few])[0]
-        if few:
-            unchanged = [v.unchanged for v in shown]
-            left.barh(places - 0.19, unchanged, 0.36, color="0.75", label="at the first optimum")
-        left.barh(places + 0.19 * few, [v.objective for v in shown], 0.36, color="#0072B2", label="at the optimum")
-        left.set_yticks(places, [v.name for v in shown])
-        left.invert_yaxis()
-        left.grid(visible=False, axis="y")
-        left.set_xlabel(make_axis_label(problem.objective.name, shown[0].unit))
+        figure, axes = make_axes(4.6, 0.9 + 0.34 * len(shown))
+        plot_bars(axes, [variant.name for variant in shown], groups, colours)
+        axes.set_xlabel(make_axis_label(problem.objective.name, shown[0].unit))
         add_legend_below(figure)
-        units = list_units(problem)
-        for right in others:
-            shares = np.array([(np.array(list(v.x.values())) - problem.lower) / problem.scale for v in same])
-            image = right.imshow(shares, aspect="auto", cmap="viridis", vmin=0.0, vmax=1.0)
-            words = [name_in_words(name, units[name]) for name in problem.names]
-            right.set_xticks(range(len(words)), words, rotation=40, ha="right")
-            right.set_yticks([])
-            right.grid(visible=False)
-            figure.colorbar(image, ax=right, label="x* from lower to upper bound")
     return figure

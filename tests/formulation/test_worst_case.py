@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from casadi import MX
 
-from compare.questions.robust.robust_gait import make_worst_case
+from compare.questions.robust_gait import make_worst_case
 from nlp_gait import solve
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint, GaitProblem

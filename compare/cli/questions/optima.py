@@ -239,20 +239,18 @@ def robust(
     ] = 2.0,
     starts: Annotated[int, typer.Option(min=1, max=100000, help="Random starts of the nominal problem.")] = 10,
     seed: Seed = 0,
-    simulate: Annotated[
-        bool, typer.Option(help="Simulate both gaits in MuJoCo on the worst robots (extra sim).")
-    ] = True,
     problem: NaoPhase,
     output: Output,
 ) -> None:
     """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
 
-    One motion for all robots of a box, whose worst corners are found one after the other. Example: `nlp-gait robust nao-ssp`
+    One motion for all robots of a box, whose worst corners are found one after the other. Both gaits are written for each corner,
+    for `nlp-gait simulate`. Example: `nlp-gait robust nao-ssp`
     """
-    from compare.questions.robust.robust import Robust
+    from compare.questions.robust import Robust
 
     effort = {"starts": starts, "seed": seed}
-    output.answer(Robust(problem=problem.load(), mass=mass, sole=sole, simulate=simulate, **effort))
+    output.answer(Robust(problem=problem.load(), mass=mass, sole=sole, **effort))
 
 
 @command

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from compare.questions import prices, variants
+from compare.questions import prices, robust_gait, variants
 from compare.questions.pareto import front as pareto_front
-from compare.questions.robust import robust_gait as robust
 from nlp_gait.backends.solvers.solver import IterationWatch
 from tests.compare.cli.calls import nlp_gait, one_sentence
 
@@ -167,12 +166,12 @@ def test_ctrl_c_before_the_first_result_counts_the_stored_results(
 ) -> None:
     (tmp_path / "store").mkdir()
     (tmp_path / "store" / "solve-1.json").write_text("{}")
-    for module in (variants, robust):
+    for module in (variants, robust_gait):
         monkeypatch.setattr(module, "solve", press)
     monkeypatch.setattr(prices, "Continuation", press)
     out = ["--out", tmp_path]
     kept = f"finished results are stored in {tmp_path}; rerun the command to continue\n"
     assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("variants", "--over", "motors", *out, status=130)
-    assert f"interrupted; 1 {kept}" in one_sentence("robust", "--no-simulate", *out, status=130)
+    assert f"interrupted; 1 {kept}" in one_sentence("robust", *out, status=130)
     assert f"interrupted; 1 {kept}" in one_sentence("prices", "walk12", *out, status=130)
     assert [path.name for path in tmp_path.iterdir()] == ["store"]

@@ -1,4 +1,4 @@
-"""A gait that keeps its limits for all masses and soles within their tolerances, and its simulation on the worst robots.
+"""A gait that keeps its limits for all masses and soles within their tolerances.
 
 The uncertain robots form a box: each mass within a share, each sole within a distance. A scenario problem over a few of its
 corners is solved; then the corner that is worst for each limit, by the rows' derivatives, is added, until no corner found in this
@@ -9,27 +9,30 @@ Source:
     that is not convex: the corners are evaluated exactly, but it is not proven that the box contains no worse point.
 """
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import reduce
 
 import numpy as np
 
-from compare.questions.perturbed_problem import get_quantity, name_robot, perturb_robot, rebuild
+from compare.questions.perturbed_problem import get_quantity, perturb_robot
 from compare.questions.question import Work
 from nlp_gait.backends.exact import ExactValues, build_exact_model
-from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solve import solve
 from nlp_gait.errors import InputError
-from nlp_gait.formulation import Array, GaitProblem, Result
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.assembly import Assembly, Point
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE, Solution
-from nlp_gait.simulation.drive import Drive
-from nlp_gait.simulation.measurements import average_pressure
-from nlp_gait.simulation.plan import SIDES, Plan, make_plan
-from nlp_gait.simulation.simulate import simulate_plan
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
+
+# Number of limits for which a round looks for the worst corner: those violated most, one of each group of rows.
+CORNERS_IN_ROUND = 3
+# A corner costs more than the worst known one if it does so by more than this share.
+COST_TOLERANCE = 1e-6
+ROUNDS = 8
+
+Box = Mapping[str, float]  # half-widths by the robot's quantity
+Corner = tuple[int, ...]  # +1 or -1 for each quantity of the box
 
 
 def make_worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
@@ -67,15 +70,6 @@ def make_worst_case(scenarios: Sequence[GaitProblem]) -> GaitProblem:
     return replace(worst, refine=None)  # refining the first scenario only would be another problem
 
 
-# Number of limits for which a round looks for the worst corner: those violated most, one of each group of rows.
-CORNERS_IN_ROUND = 3
-# A corner costs more than the worst known one if it does so by more than this share.
-COST_TOLERANCE = 1e-6
-
-Box = Mapping[str, float]  # half-widths by the robot's quantity
-Corner = tuple[int, ...]  # +1 or -1 for each quantity of the box
-
-
 @dataclass(frozen=True, kw_only=True)
 class Worst:
     """The worst case of a gait over a set of robots."""
@@ -99,10 +93,6 @@ class RobotBox:
         """Return the changes of the robot's quantities, shares of masses and lengths."""
         return {name: sign * half for (name, half), sign in zip(self._box.items(), corner, strict=True) if sign}
 
-    def name_robot(self, corner: Corner) -> str:
-        """Return the name of a corner's robot."""
-        return name_robot(self.nominal, self._values(corner))
-
     def evaluate(self, corner: Corner, x: Array) -> ExactValues:
         """Return the exact values at x (n,) with a corner's robot."""
         return build_exact_model(self.problem(corner)).at(x, self.nominal.p)
@@ -110,11 +100,9 @@ class RobotBox:
     def problem(self, corner: Corner) -> GaitProblem:
         """Return the problem with a corner's robot."""
         if corner not in self._problems:
-            self._problems[corner] = perturb_robot(self.nominal, self._values(corner))
+            values = {name: get_quantity(self.nominal, name) + by for name, by in self.changes(corner).items()}
+            self._problems[corner] = perturb_robot(self.nominal, values)
         return self._problems[corner]
-
-    def _values(self, corner: Corner) -> dict[str, float]:
-        return {name: get_quantity(self.nominal, name) + by for name, by in self.changes(corner).items()}
 
     def find_worst(self, x: Array, corners: Sequence[Corner]) -> Worst:
         """Return the worst case of a gait over some corners; rows are compared in units of their scales."""
@@ -166,9 +154,6 @@ class RobotBox:
         return not values.violation <= FEASIBILITY_TOLERANCE or values.cost > cost * (1.0 + COST_TOLERANCE)
 
 
-ROUNDS = 8
-
-
 @dataclass(frozen=True, kw_only=True)
 class RobustGait:
     """A gait that keeps its limits in a box of robots."""
@@ -189,20 +174,6 @@ class RobustGait:
     worst_W: float  #: in the worst corner: the minimised objective
     worst: Worst  #: its worst case over the corners
     random_worst: Worst  #: over random corners that are not in the scenario problem
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobotSimulation:
-    """One gait on one robot, open loop."""
-
-    gait: str  #: ``"nominal"`` or ``"robust"``
-    robot: str  #: its name, with its changes
-    fell_at_s: float | None  #: None if it stayed up
-    largest_tilt_deg: float  #: of the torso
-    #: mean lateral distance of the engine's centre of pressure, averaged over one period of the set-points, to the nearer edge of
-    #: the supporting soles
-    margin_m: float
-    predicted_margin_m: float  #: the same of the planned ZMP on this robot, over the same instants
 
 
 def make_boxes(problem: GaitProblem, mass: float, sole_m: float) -> dict[str, Box]:
@@ -228,15 +199,6 @@ def solve_robust(
 
     Starts and seed are those of the nominal problem; so many samples are random corners on which the optimum is evaluated.
     """
-    effort = {"starts": starts, "seed": seed, "samples": samples}
-    inputs = {**fingerprint(problem), "box": dict(box), "name": name, **effort}
-    function = partial(_solve_robust, problem, name, box, starts, seed, samples, work)
-    return work.compute(RobustGait, "box", inputs, function)
-
-
-def _solve_robust(
-    problem: GaitProblem, name: str, box: Box, starts: int, seed: int, samples: int, work: Work
-) -> RobustGait:
     robots, solver = RobotBox(problem, box), work.solver()
     work.progress(f"{name}: nominal optimum")
     nominal = _require(solve(problem, starts=starts, seed=seed, solver=solver), "the nominal problem")
@@ -260,7 +222,7 @@ def _solve_robust(
         name=name,
         box=dict(box),
         corners=tuple(robots.changes(corner) for corner in corners),
-        robots=tuple(robots.name_robot(corner) for corner in corners),
+        robots=tuple(str(robots.problem(corner).options["robot"]) for corner in corners),
         rounds=rounds,
         settled=settled,
         status=robust.status,
@@ -279,36 +241,3 @@ def _require(solution: Solution, what: str) -> Solution:
     if not solution.converged:
         raise InputError(f"{what}: {solution.status}; a smaller uncertainty or more --starts may help")
     return solution
-
-
-def simulate_robots(problem: GaitProblem, gait: RobustGait, work: Work) -> Iterator[RobotSimulation]:
-    """Simulate the nominal and the robust gait on all robots of the scenario problem; raises MissingExtraError without MuJoCo."""
-    for robot in gait.robots:
-        for kind, x in (("nominal", gait.nominal_x), ("robust", gait.x)):
-            perturbed = rebuild(problem, robot=robot)
-            inputs = {**fingerprint(perturbed), "gait": kind, "x": dict(x)}
-            yield work.compute(RobotSimulation, "play", inputs, partial(_simulate, perturbed, robot, kind, x))
-            work.progress(f"{kind} gait on {robot[:40]}")
-
-
-def _simulate(problem: GaitProblem, robot: str, gait: str, x: Mapping[str, float]) -> RobotSimulation:
-    plan, drive = make_plan(Result(problem=problem, x=problem.check_x(x))), Drive()
-    trace = simulate_plan(plan, drive=drive)
-    during = trace.t <= plan.duration_s
-    return RobotSimulation(
-        gait=gait,
-        robot=robot,
-        fell_at_s=trace.fell_at_s,
-        largest_tilt_deg=math.degrees(float(trace.tilt.max())),
-        margin_m=compute_lateral_margin(plan, average_pressure(trace, drive.period_s)[during, 1]),
-        predicted_margin_m=compute_lateral_margin(plan, plan.at("zmp", trace.t[during])[:, 1]),
-    )
-
-
-def compute_lateral_margin(plan: Plan, y: Array) -> float:
-    """Return the mean distance of lateral positions (T,) [m] to the nearer side of the supporting soles [m]."""
-    feet = [
-        (plan.at(f"{side}_foot", np.zeros(1))[0, 1], plan.robot.feet[side]) for side in SIDES if side in plan.supports
-    ]
-    left, right = max(y + foot.left_m for y, foot in feet), min(y - foot.right_m for y, foot in feet)
-    return float(np.nanmean(np.minimum(left - y, y - right)))

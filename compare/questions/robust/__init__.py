@@ -1,1 +1,0 @@
-"""One gait for a family of robots and grounds."""
