@@ -1,9 +1,10 @@
 """What each limit costs the optimum, and which error of the robot data would change it most, verified by solving again."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
@@ -27,7 +28,6 @@ from nlp_gait.backends.optima.sensitivities import Sensitivities, differentiate_
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
-from nlp_gait.decoding import decode
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem
 from nlp_gait.formulation.solution import Outcome
@@ -42,6 +42,19 @@ CHECK_SHARE, LEAST_CHECK_SHARE = 1e-3, 1e-6
 AGREEMENT = 1e-4
 # Half-width of the central differences over rebuilt models: masses enter the objective almost linearly.
 MASS_DIFFERENCE, LENGTH_DIFFERENCE_M = 1e-3, 1e-4
+# A limit whose natural step changes the optimum by less than this share costs nothing.
+FREE = 1e-9
+SHOWN = 10  # bars of each kind
+LISTED = 12  # rows of the robot's table; the CSV file has all
+UP, DOWN = "#D55E00", "#0072B2"
+# Unit and scale in which most bars are small numbers.
+PREFIXED = {"W": ("mW", 1e3)}
+EXPLANATION = (
+    "The slope is the derivative of the optimum with respect to the quantity, from the multipliers; next to it are the changes "
+    "found by solving again one step lower and one step higher. The line is the straight line on which x* moves, in steps of "
+    "the quantity: beyond it, another kink or limit takes over. dbm is the dynamic balance margin, the distance of the "
+    "zero-moment point from the edge of the soles."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +76,12 @@ class Price:
     #: change of the objective by solving again a natural step lower and higher; None where that failed
     one_step: tuple[float | None, float | None] | None = None
 
+    def __post_init__(self) -> None:
+        """Restore infinite ends of the reach, which are stored as null."""
+        down, up = self.reach
+        reach = (-math.inf if math.isnan(down) else down, math.inf if math.isnan(up) else up)
+        object.__setattr__(self, "reach", reach)  # it is frozen
+
     @property
     def per_step(self) -> float:
         """Change of the objective over a natural step, by the slope."""
@@ -82,15 +101,6 @@ class Price:
         constant = not name or abs(moves[name] * self.step) < CONSTANT * ranges[name]
         return None if constant else (name, moves[name] * self.step)
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain data without loss: the reach as text, because JSON has no infinity."""
-        return {**asdict(self), "reach": [repr(end) for end in self.reach]}
-
-
-def parse_price(raw: Mapping[str, Any]) -> Price:
-    """Return the price of ``Price.to_json``."""
-    return decode(Price, {**raw, "reach": [float(end) for end in raw["reach"]]})
-
 
 def price_parameters(optimum: Optimum) -> list[Price]:
     """Return the prices of all parameters; both bounds of a fixed variable are one, under the variable's name."""
@@ -104,15 +114,12 @@ def price_parameters(optimum: Optimum) -> list[Price]:
             if (sides[problem.variable_index(stem)] > 0) != (end == "upper"):
                 continue
             name = stem
-        prices.append(
-            _make_price(
-                problem, derivatives, i, name, parameter.unit, value, choose_natural_step(parameter.unit, value)
-            )
-        )
+        step = choose_natural_step(parameter.unit, value)
+        prices.append(_make_price(problem, derivatives, i, name, parameter.unit, value, step))
     return prices
 
 
-def price_robot(optimum: Optimum, progress: Progress) -> list[Price]:
+def price_robot(optimum: Optimum, progress: Progress) -> tuple[Price, ...]:
     """Return the prices of the robot's masses, leg lengths and soles."""
     problem, robot = optimum.problem, optimum.problem.display.robot
     names = list_quantities(robot)  # type: ignore[arg-type]
@@ -126,10 +133,10 @@ def price_robot(optimum: Optimum, progress: Progress) -> list[Price]:
             yield high, low, 2 * half
 
     derivatives = differentiate_by_models(optimum, make_pairs())
-    return [
+    return tuple(
         _make_price(problem, derivatives, i, name, *(("1", value, MASS) if is_mass(name) else ("m", value, LENGTH)))
         for i, (name, value) in enumerate(zip(names, values, strict=True))
-    ]
+    )
 
 
 def _make_price(
@@ -154,6 +161,11 @@ def change_parameter(problem: GaitProblem, price: Price, change: float) -> GaitP
         return problem.with_values(**dict.fromkeys(ends, price.value + change))
     except InputError:
         return None
+
+
+def change_robot(problem: GaitProblem, price: Price, change: float) -> GaitProblem:
+    """Return the problem with another robot."""
+    return perturb_robot(problem, {price.name: price.value + change})
 
 
 def verify_price(optimum: Optimum, near: Outcome, price: Price, change: Callable[[float], GaitProblem | None]) -> Price:
@@ -190,15 +202,6 @@ def _solve_neighbour(near: Outcome, problem: GaitProblem | None) -> Outcome | No
     return end if end.converged else None
 
 
-# A limit whose natural step changes the optimum by less than this share costs nothing.
-FREE = 1e-9
-SHOWN = 10  # bars of each kind
-LISTED = 12  # rows of the robot's table; the CSV file has all
-UP, DOWN = "#D55E00", "#0072B2"
-# Scales at which most bars are small numbers.
-PREFIXED = {"W": ("mW", 1e3), "J": ("J", 1.0)}
-
-
 @dataclass(frozen=True, kw_only=True)
 class FoundPrices:
     """Prices at the optimum of a problem."""
@@ -226,15 +229,6 @@ class Prices(Question[FoundPrices]):
     checks: int = 3
     solver: Solver | None = None  #: one with multipliers; its optimum is refined by IPOPT
 
-    @property
-    def inputs(self) -> dict[str, Any]:
-        return {**self._solving, "checks": self.checks}
-
-    @property
-    def _solving(self) -> dict[str, Any]:
-        solver = self.solver or IpoptSettings()
-        return {"starts": self.starts, "seed": self.seed, "solver": solver.name, "settings": solver.to_dict()}
-
     def find(self, work: Work) -> Iterator[FoundPrices]:
         """Yield the prices; InputError if there is no optimum, the solver has no multipliers, or the problem is too large."""
         problem = self.problem
@@ -247,36 +241,29 @@ class Prices(Question[FoundPrices]):
                 f"{problem.name}: none of {self.starts} starts converged to a feasible point, so there is nothing to "
                 "differentiate; try more --starts, or relax the limits that `nlp-gait solve` names"
             )
-        optimum = find_optimum(problem, near)
-        inputs = {**fingerprint(problem), **self._solving}
+        optimum, solver = find_optimum(problem, near), self.solver or IpoptSettings()
+        effort = {"starts": self.starts, "seed": self.seed, "solver": solver.name, "settings": solver.to_dict()}
+        inputs = {**fingerprint(problem), **effort}
         parameters: list[Price] = []
         robot: list[Price] = []
 
-        def verify(price: Price, change: Callable[[Price, float], GaitProblem | None]) -> Price:
-            def compute() -> dict[str, Any]:
-                work.progress(f"solving again with another {price.name}")
-                return verify_price(optimum, near, price, partial(change, price)).to_json()
-
-            return parse_price(work.store.compute("check", {**inputs, "quantity": price.name}, compute))
-
-        def compute_robot() -> list[dict[str, Any]]:
-            return [price.to_json() for price in price_robot(optimum, work.progress)]
+        def verify(price: Price, change: Callable[[GaitProblem, Price, float], GaitProblem | None]) -> Price:
+            work.progress(f"solving again with another {price.name}")
+            function = partial(verify_price, optimum, near, price, partial(change, problem, price))
+            return work.compute(Price, "check", {**inputs, "quantity": price.name}, function)
 
         if optimum.reason is None:
             parameters = _rank(price_parameters(optimum))
             if problem.display.robot is not None:
-                robot = _rank([parse_price(raw) for raw in work.store.compute("robot", inputs, compute_robot)])
+                function = partial(price_robot, optimum, work.progress)
+                robot = _rank(work.compute(tuple[Price, ...], "robot", inputs, function))
         limits = [price for price in parameters if abs(price.per_step) > FREE * max(abs(optimum.objective), FREE)]
-
-        def perturb(price: Price, change: float) -> GaitProblem:
-            return perturb_robot(problem, {price.name: price.value + change})
-
         yield FoundPrices(
             objective=optimum.objective,
             x=problem.by_name(optimum.x),
-            limits=tuple(verify(price, partial(change_parameter, problem)) for price in limits),
+            limits=tuple(verify(price, change_parameter) for price in limits),
             free=len(parameters) - len(limits),
-            robot=(*(verify(price, perturb) for price in robot[: self.checks]), *robot[self.checks :]),
+            robot=(*(verify(price, change_robot) for price in robot[: self.checks]), *robot[self.checks :]),
             weak=optimum.weak,
             dependent=optimum.dependent,
             residual=optimum.residual,
@@ -295,24 +282,15 @@ class Prices(Question[FoundPrices]):
         def make_table(prices: Sequence[Price], title: str) -> list[Part]:
             return [make_text_table(header, [_make_row(price, ranges) for price in prices], title)] if prices else []
 
+        cost = "What holds it back: change of the optimum for one step upwards of a limit or coefficient"
+        data = f"Which error of the robot would change it most, with unchanged limits (first {LISTED} of {len(findings.robot)})"
         parts: list[Part] = [
-            *make_table(
-                findings.limits,
-                "What holds it back: change of the optimum for one step upwards of a limit or coefficient",
-            ),
+            *make_table(findings.limits, cost),
             f"{findings.free} other parameters cost nothing here",
-            *make_table(
-                findings.robot[:LISTED],
-                "Which error of the robot would change it most, with unchanged limits "
-                f"(first {LISTED} of {len(findings.robot)})",
-            ),
+            *make_table(findings.robot[:LISTED], data),
             f"The first-order conditions are satisfied to {findings.residual:.1e}; {findings.dependent} of the active "
-            "constraints follow from others. x* moves along a line only within the range of the last column: beyond it, "
-            "another kink or limit takes over.",
-            "The slope is the derivative of the optimum with respect to the quantity, from the multipliers; next to it are the "
-            "changes found by solving again one step lower and one step higher. The line is the straight line on which x* "
-            "moves, in steps of the quantity; dbm is the dynamic balance margin, the distance of the zero-moment point from "
-            "the edge of the soles.",
+            "constraints follow from others.",
+            EXPLANATION,
         ]
         if findings.weak:
             parts.append(f"Active without a price, so that derivatives are one-sided: {', '.join(findings.weak)}")

@@ -43,7 +43,7 @@ class Robust(Question[tuple[RobustGait, ...]]):
         for name, box in self._make_boxes().items():
             inputs = {**fingerprint(self.problem), "box": dict(box), "name": name, **effort}
             solve = partial(solve_robust, self.problem, name, box, **effort, work=work)
-            gaits = (*gaits, work.compute(RobustGait, "box-{key}", inputs, solve))
+            gaits = (*gaits, work.compute(RobustGait, "box", inputs, solve))
             yield gaits
 
     def get_optimum(self, findings: tuple[RobustGait, ...]) -> float:
