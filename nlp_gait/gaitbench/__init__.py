@@ -8,14 +8,13 @@ problem.best_known, problem.best_x, str(problem.evidence)
 problem = gaitbench.generate("ssp", seed=3)  # the same as load("gb2:ssp:3"); gaitbench.list_families() has the others
 """
 
-from nlp_gait.gaitbench.facts import Definition, Evidence, Features, list_instances
+from nlp_gait.gaitbench.facts import Definition, Evidence, list_instances
 from nlp_gait.gaitbench.generated import list_families, list_test_seeds
 from nlp_gait.gaitbench.instance import Instance, generate, load
 
 __all__ = [
     "Definition",
     "Evidence",
-    "Features",
     "Instance",
     "generate",
     "list_families",

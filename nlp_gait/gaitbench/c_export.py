@@ -9,7 +9,7 @@ from nlp_gait.backends.kernel.compiler import BASE_FLAGS, read_native_source
 from nlp_gait.backends.kernel.kernel_source import build_kernel, write_rows_source
 from nlp_gait.export.c_files import format_comment, write_c_files
 from nlp_gait.formulation import Array
-from nlp_gait.gaitbench.instance import Instance, OneSidedRows
+from nlp_gait.gaitbench.instance import Instance
 
 # Name of each file by its template; the C++ file is put together from the kernel.
 TEMPLATES = {
@@ -25,10 +25,7 @@ TEMPLATES = {
 def export_objective(instance: Instance, folder: Path) -> list[Path]:
     """Write source, header, example, callers and build line of an instance in physical units; raises OutputError."""
     instance = Instance(instance.id)
-    sides = OneSidedRows(build_kernel(instance.gait_problem), instance.gait_problem)
-    prefix = make_prefix(instance.id)
-    words = _make_words(instance, sides, prefix)
-    return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, words, make_cpp_source(instance, sides))
+    return write_c_files(folder, "nlp_gait.gaitbench", TEMPLATES, _make_words(instance), make_cpp_source(instance))
 
 
 def make_prefix(id: str) -> str:
@@ -36,9 +33,9 @@ def make_prefix(id: str) -> str:
     return f"gaitbench_{re.sub('[^a-z0-9]', '_', id)}"
 
 
-def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
+def make_cpp_source(instance: Instance) -> str:
     """Return the C++ file: the kernel over lanes, the instance's constants, the functions of the header."""
-    problem = instance.gait_problem
+    problem, sides = instance.gait_problem, instance.sides
     kernel = build_kernel(problem)
     lower, upper = kernel.row_bounds(problem)
     prefix = make_prefix(instance.id)
@@ -68,15 +65,15 @@ def make_cpp_source(instance: Instance, sides: OneSidedRows) -> str:
                 for name, values in known.items()
             ),
             *(f'extern "C" const char* const {prefix}_{name}[] = {values};' for name, values in names.items()),
-            f"#define VARIABLES {len(instance.names)}\n#define ROWS {len(lower)}\n#define SIDES {len(sides.names)}",
+            f"#define VARIABLES {len(instance.names)}\n#define ROWS {len(lower)}\n#define SIDES {len(instance.row_names)}",
             f"#define FUNCTION {prefix}_evaluate",
             read_native_source("nlp_gait.gaitbench", "objective.hpp"),
         ]
     )
 
 
-def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping[str, str]:
-    problem, definition = instance.gait_problem, instance.definition
+def _make_words(instance: Instance) -> Mapping[str, str]:
+    problem, definition, prefix = instance.gait_problem, instance.definition, make_prefix(instance.id)
     unit = problem.objective.unit
     return {
         "ID": instance.id,
@@ -85,8 +82,8 @@ def _make_words(instance: Instance, sides: OneSidedRows, prefix: str) -> Mapping
         "BEST": repr(instance.best_known),
         "EVIDENCE": str(instance.evidence),
         "N": str(len(instance.names)),
-        "M": str(len(sides.names)),
-        "MEMORY": "100 kB" if len(sides.names) < 1000 else "1 MB",
+        "M": str(len(instance.row_names)),
+        "MEMORY": "100 kB" if len(instance.row_names) < 1000 else "1 MB",
         "UNIT": "" if unit == "1" else f" [{unit}]",
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",

@@ -109,22 +109,10 @@ class Facts:
     best_x: tuple[float, ...]  # (n,) its point; its violation is exactly zero
     evidence: Evidence
     probes: tuple[Probe, ...]
-    feasible_share: float = math.nan  # of 100 000 uniform random points; NaN for generated instances, see ``Features``
+    feasible_share: float = math.nan  # of 100 000 uniform random points; NaN for generated instances
     # processor time of one evaluation in a batch of many, on one core of the machine that made the suite [us]; likewise
     evaluation_us: float = math.nan
     local_optima: int = 1  # different objectives at which starts of IPOPT ended; 1 where they were not counted
-
-
-@dataclass(frozen=True, kw_only=True)
-class Features:
-    """What makes an instance easy or hard."""
-
-    dimension: int
-    constraints: int  #: one-sided rows
-    feasible_share: float  #: of 20 000 uniform points
-    #: of the directions of the objective's gradients at 4 n uniform points: greatest by least singular value
-    conditioning: float
-    local_optima: int  #: different objectives at which starts of IPOPT ended
 
 
 @cache

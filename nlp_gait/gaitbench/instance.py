@@ -14,11 +14,10 @@ from nlp_gait.errors import InputError, check_name
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.adapters import find_adapter
 from nlp_gait.gaitbench.best_known import check_shipped_facts, find_facts
-from nlp_gait.gaitbench.facts import Evidence, Facts, Features
+from nlp_gait.gaitbench.facts import Evidence, Facts
 from nlp_gait.gaitbench.generated import define, is_generated, make_id
 from nlp_gait.gaitbench.suite_problem import gaitbench
 
-FEATURE_POINTS = 20_000
 _BUILDING = threading.RLock()  # compiled functions are shared by all threads, and built by one of them
 
 
@@ -94,7 +93,7 @@ class Instance:
 
     def rows(self, X: Array) -> Array:
         """Return the rows G(X) (P, m), satisfied where <= 0, in units of each row's scale; ``row_names`` has their names."""
-        return self._sides(self._objective.constraints(self._physical(X)))
+        return self.sides(self._objective.constraints(self._physical(X)))
 
     def gradient(self, x: Array) -> Array:
         """Return the gradient (n,) of the objective at x (n,); at a kink, a one-sided one."""
@@ -104,49 +103,18 @@ class Instance:
     def jacobian(self, x: Array) -> Array:
         """Return the derivatives (m, n) of the rows at x (n,); at a kink, one-sided ones."""
         _, jacobian = self._derivatives(self._point(x), self.gait_problem.p)
-        sides = self._sides
+        sides = self.sides
         return np.array(jacobian)[sides.row] * (sides.sign * sides.weight)[:, None] * self._slope
 
     @property
     def row_names(self) -> tuple[str, ...]:
         """(m,) names of the rows."""
-        return self._sides.names
-
-    def make_one_sided(self, g: Array) -> Array:
-        """Return the rows G (P, m) of the values (P, ...) of the kernel's rows."""
-        return self._sides(g)
+        return self.sides.names
 
     @cached_property
     def facts(self) -> Facts:
         """Best known point, its evidence, and what was measured; of a generated instance computed on first use, and stored."""
         return find_facts(load(self.id))
-
-    @cached_property
-    def features(self) -> Features:
-        """What makes the instance easy or hard, from a few ten thousand evaluations."""
-        rng, n, width = np.random.default_rng(0), len(self.names), self.upper - self.lower
-        X = rng.uniform(self.lower, self.upper, (FEATURE_POINTS, n))
-        slopes = np.array([self.gradient(x) * width for x in X[: 4 * n]])
-        length = np.linalg.norm(slopes, axis=1, keepdims=True)
-        values = np.linalg.svd((slopes / length)[np.isfinite(length[:, 0]) & (length[:, 0] > 0.0)], compute_uv=False)
-        return Features(
-            dimension=n,
-            constraints=len(self.row_names),
-            feasible_share=float(np.mean(self(X)[1] == 0.0)),
-            conditioning=float(values[0] / values[-1]) if len(values) == n and values[-1] else np.inf,
-            local_optima=self.facts.local_optima,
-        )
-
-    @property
-    def description(self) -> str:
-        """What it is, in words."""
-        made = self.definition
-        drawn = {**made.options, **made.values, **made.held}
-        details = ", ".join(f"{name} {value}" for name, value in drawn.items())
-        return (
-            f"{made.what}: {len(self.names)} variables, {len(self.row_names)} inequalities; problem {made.problem}"
-            f"{' with ' * bool(details)}{details}. Source: {made.source}."
-        )
 
     @property
     def best_known(self) -> float:
@@ -185,7 +153,8 @@ class Instance:
             return objective
 
     @cached_property
-    def _sides(self) -> OneSidedRows:
+    def sides(self) -> OneSidedRows:
+        """Which one-sided rows the kernel's rows make."""
         with _BUILDING:
             return OneSidedRows(build_kernel(self.gait_problem), self.gait_problem)
 

@@ -122,14 +122,6 @@ def test_a_generated_instance_is_an_instance(walk: gaitbench.Instance) -> None:
     assert gaitbench.load(ID, unit_cube=True).best_known == walk.best_known
 
 
-def test_features_and_description_say_what_it_is(walk: gaitbench.Instance) -> None:
-    features = walk.features
-    assert (features.dimension, features.constraints) == (4, len(walk.row_names))
-    assert 0.0 < features.feasible_share < 1.0 and features.conditioning > 1.0 and features.local_optima >= 1
-    for part in ("12-joint walk", "4 variables", "lambda 0.", "Goswami"):
-        assert part in walk.description
-
-
 @pytest.mark.slow
 def test_best_points_are_neither_at_the_bounds_nor_in_the_middle() -> None:
     """27 % of GaitBench 1's variables are at a bound, and up to 43 % in the middle."""
