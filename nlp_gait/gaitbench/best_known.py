@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,12 +13,9 @@ from nlp_gait.backends.solve import solve
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
 from nlp_gait.files import make_folder, replace_nan, write_json
-from nlp_gait.formulation import Array
+from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.gaitbench.facts import Evidence, Facts, Probe, find_shipped_facts
 from nlp_gait.gaitbench.generated import STARTS, is_generated, parse_id
-
-if TYPE_CHECKING:
-    from nlp_gait.gaitbench.instance import Instance
 
 SAME = 1e-6  # relative difference of two results of IPOPT that count as equal
 # Slack of the best known point in every row, in units of its scale: no machine's rounding makes it infeasible.
@@ -28,7 +25,18 @@ AMPLIFIED, AMPLIFIED_AGREEMENT = 1e15, 1e-7
 MOST_ROUNDS = 4  # of the starts, until one of them converges
 
 
-def find_facts(instance: "Instance") -> Facts:
+class Judged(Protocol):
+    """What is needed of an ``Instance`` here."""
+
+    id: str
+    gait_problem: GaitProblem
+    lower: Array
+    upper: Array
+    sides: Any
+    jacobian: Any
+
+
+def find_facts(instance: Judged) -> Facts:
     """Return the facts about an instance: shipped ones, or those of this call or of an earlier one on this machine.
 
     Raises InputError if no start of IPOPT converged, so that the instance has no best known point.
@@ -46,7 +54,7 @@ def find_facts(instance: "Instance") -> Facts:
     return facts
 
 
-def compute_facts(instance: "Instance", starts: int) -> Facts:
+def compute_facts(instance: Judged, starts: int) -> Facts:
     """Return the best point of IPOPT from random starts and its evidence; raises InputError if no start converges."""
     problem = instance.gait_problem
     for seed in range(MOST_ROUNDS):
@@ -73,14 +81,15 @@ def compute_facts(instance: "Instance", starts: int) -> Facts:
     )
 
 
-def evaluate_interpreted(instance: "Instance", x: Array) -> tuple[float, Array]:
+def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     kernel = build_kernel(instance.gait_problem)
     cost, g = kernel.function(x, instance.gait_problem.p)
-    return float(cost), instance.sides(np.array(g).reshape(1, -1))[0]
+    rows: Array = instance.sides(np.array(g).reshape(1, -1))[0]
+    return float(cost), rows
 
 
-def make_strictly_feasible(instance: "Instance", x: Array) -> Array | None:
+def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
     """Return the nearest point with a slack in every row, by linear programs with the smallest possible step, or None.
 
     IPOPT may leave a row violated by about 1e-8; the best known point has a violation of exactly zero. The programs ignore the
@@ -115,7 +124,7 @@ def make_strictly_feasible(instance: "Instance", x: Array) -> Array | None:
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def check_shipped_facts(instance: "Instance") -> None:
+def check_shipped_facts(instance: Judged) -> None:
     """Compare the values of an instance with those in its shipped facts, if it has any; raises InputError."""
     facts = find_shipped_facts(instance.id)
     for number, probe in enumerate(() if facts is None else facts.probes, 1):
@@ -129,7 +138,7 @@ def check_shipped_facts(instance: "Instance") -> None:
                 )
 
 
-def make_probes(instance: "Instance", best: Array) -> tuple[Probe, ...]:
+def make_probes(instance: Judged, best: Array) -> tuple[Probe, ...]:
     """Return values at random points, between them and the best one, and at the best one."""
     rng = np.random.default_rng(20260101)
     draws = rng.uniform(instance.lower, instance.upper, (4, len(best)))
@@ -137,7 +146,7 @@ def make_probes(instance: "Instance", best: Array) -> tuple[Probe, ...]:
     return tuple(_make_probe(instance, x) for x in X)
 
 
-def _make_probe(instance: "Instance", x: Array) -> Probe:
+def _make_probe(instance: Judged, x: Array) -> Probe:
     f, G = evaluate_interpreted(instance, x)
     rows = float(G @ (1.0 + np.arange(len(G)) % 7))
     return Probe(x=tuple(x.tolist()), objective=f, violation=float(np.maximum(G, 0.0).sum()), rows=rows)
