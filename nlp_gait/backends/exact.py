@@ -44,8 +44,8 @@ class ExactModel:
     @lock_casadi
     def at(self, x: Sequence[float] | Array, p: Array) -> ExactValues:
         """Return the values at x (n,) and parameter values p (k,)."""
-        found = (np.array(value).ravel() for value in self.function(np.asarray(x), p))
-        cost, violation, g, lower, upper, indexes = found
+        outputs = (np.array(value).ravel() for value in self.function(np.asarray(x), p))
+        cost, violation, g, lower, upper, indexes = outputs
         if np.isnan(lower).any() or np.isnan(upper).any():  # CasADi's fmax ignores it
             violation = np.full(1, math.nan)
         named = dict(zip(self.index_names, indexes.tolist(), strict=True))
@@ -58,10 +58,10 @@ class ExactModel:
 
     def rows(self, values: ExactValues, chosen: Iterable[int] | None = None) -> tuple[ConstraintValue, ...]:
         """Return all rows, or chosen ones, with their names and units."""
-        violations, found = _compute_violations(values), []
+        violations, rows = _compute_violations(values), []
         for k in range(len(self.row_names)) if chosen is None else chosen:
             low, high = (float(end[k]) if math.isfinite(end[k]) else None for end in (values.lower, values.upper))
-            found.append(
+            rows.append(
                 ConstraintValue(
                     name=self.row_names[k],
                     value=float(values.g[k]),
@@ -71,7 +71,7 @@ class ExactModel:
                     unit=self.row_units[k],
                 )
             )
-        return tuple(found)
+        return tuple(rows)
 
 
 def build_exact_model(problem: GaitProblem) -> ExactModel:
@@ -97,7 +97,7 @@ def _build(problem: GaitProblem) -> ExactModel:
     # The bounds of x are rows, too: a candidate outside them is infeasible.
     n, k = len(problem.variables), len(problem.parameters)
     rows.append((point.x, point.p[k - 2 * n : k - n], point.p[k - n :], MX(ca.DM(problem.scale))))
-    g, lower, upper, scale = (ca.vertcat(*parts) for parts in zip(*rows, strict=True))
+    g, lower, upper, scale = (ca.vertcat(*columns) for columns in zip(*rows, strict=True))
     # fmax returns the other argument for NaN, which must not pass for feasible: it is neither above nor below a bound.
     comparable = (g <= upper) + (g > upper)
     violations = ca.fmax(ca.fmax(lower - g, g - upper), 0) / comparable

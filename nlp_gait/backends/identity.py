@@ -35,24 +35,24 @@ def hash_json(data: Any, code: str = "") -> str:
 
 def identify_problem(problem: GaitProblem) -> dict[str, Any]:
     """Return how to load a problem, and its probes: objective, violation and rows in units of their scales."""
-    part: dict[str, Any] = {"name": problem.address, "options": dict(problem.options)}
+    identity: dict[str, Any] = {"name": problem.address, "options": dict(problem.options)}
     changed = {
         q.name: value for q, value in zip(problem.parameters, problem.p.tolist(), strict=True) if value != q.default
     }
-    part |= {"parameters": changed, "mathematics": problem.mathematics}
+    identity |= {"parameters": changed, "mathematics": problem.mathematics}
     if files := problem.build_once(_hash_files):
-        part[FILES] = files
-    known = problem.build_once(_make_memory)
+        identity[FILES] = files
+    memory = problem.build_once(_make_memory)
     key = problem.p.tobytes()
-    if key not in known:
-        known[key] = _evaluate_probes(problem)
-    return {**part, PROBES: known[key]}
+    if key not in memory:
+        memory[key] = _evaluate_probes(problem)
+    return {**identity, PROBES: memory[key]}
 
 
 def fingerprint(problem: GaitProblem) -> dict[str, Any]:
     """Return a problem's identity as inputs of a stored result."""
-    part = identify_problem(problem)
-    return {**make_key(part), PROBES: part[PROBES]}
+    identity = identify_problem(problem)
+    return {**make_key(identity), PROBES: identity[PROBES]}
 
 
 def make_key(problem: Mapping[str, Any]) -> dict[str, Any]:
@@ -60,31 +60,31 @@ def make_key(problem: Mapping[str, Any]) -> dict[str, Any]:
 
     The digits give derived problems of one name, and user code before and after a change, files of their own.
     """
-    part = {key: value for key, value in problem.items() if key not in (PROBES, FILES)}
+    identity = {key: value for key, value in problem.items() if key not in (PROBES, FILES)}
     numbers = (probe[key] for probe in problem.get(PROBES, ()) for key in ("objective", "violation"))
     digits = " ".join("nan" if number is None else f"{number:.6g}" for number in numbers)
     options = {**_drop_defaults(problem["name"], problem["options"]), **problem.get(FILES, {})}
-    return {**part, "name": shorten_name(problem["name"]), "options": options, VALUES: digits}
+    return {**identity, "name": shorten_name(problem["name"]), "options": options, VALUES: digits}
 
 
 def _drop_defaults(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of a problem of this package that differ from its defaults: a new option changes no key."""
-    known = inspect.signature(find_maker(name)).parameters if name in PROBLEMS else {}
-    return {key: value for key, value in options.items() if key not in known or known[key].default != value}
+    parameters = inspect.signature(find_maker(name)).parameters if name in PROBLEMS else {}
+    return {key: value for key, value in options.items() if key not in parameters or parameters[key].default != value}
 
 
 def split_probes(data: Any) -> tuple[Any, list[Any]]:
     """Return plain data without the probes in it, and these in order."""
     if not isinstance(data, Mapping):
         return data, []
-    rest, probes = dict[str, Any](), list[Any]()
+    plain, probes = dict[str, Any](), list[Any]()
     for key, value in data.items():
         if key == PROBES:
             probes.append(value)
             continue
-        rest[key], found = split_probes(value)
-        probes += found
-    return rest, probes
+        plain[key], inner = split_probes(value)
+        probes += inner
+    return plain, probes
 
 
 def describe_difference(stored: Mapping[str, Any], problem: Mapping[str, Any]) -> str:
@@ -92,17 +92,21 @@ def describe_difference(stored: Mapping[str, Any], problem: Mapping[str, Any]) -
     if (before := stored.get("mathematics")) != (after := problem.get("mathematics")):
         return f"its formulas are of version {after}, not {before}"
     if stored.get("name") == problem.get("name"):
-        values, others = stored.get("parameters", {}), problem.get("parameters", {})
-        for name in {**values, **others}:
-            if values.get(name) != others.get(name):
-                return f"parameter {name} is {others.get(name, 'its default')}, not {values.get(name, 'its default')}"
+        values, new_values = stored.get("parameters", {}), problem.get("parameters", {})
+        for name in {**values, **new_values}:
+            if values.get(name) != new_values.get(name):
+                return (
+                    f"parameter {name} is {new_values.get(name, 'its default')}, not {values.get(name, 'its default')}"
+                )
     return _compare_probes(stored.get(PROBES, ()), problem.get(PROBES, ()))
 
 
 def _compare_probes(before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]]) -> str:
     if not before or len(before) != len(after):
         return "it was stored without probes, so it cannot be compared" if not before else "its probes are incomplete"
-    differences = [found for k, pair in enumerate(zip(before, after, strict=True), 1) for found in _compare(k, *pair)]
+    differences = [
+        difference for k, pair in enumerate(zip(before, after, strict=True), 1) for difference in _compare(k, *pair)
+    ]
     return max(differences)[1] if differences else ""
 
 

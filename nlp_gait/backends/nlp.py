@@ -97,7 +97,7 @@ def _build(problem: GaitProblem) -> NlpModel:
     ties = ca.vertcat(*(lift.rows for lift in ops.lifts))
     exact: list[MX] = []
     for i, lift in enumerate(ops.lifts):
-        earlier = [other.variable for other in ops.lifts[:i]]  # which a lift may contain
+        earlier = [previous.variable for previous in ops.lifts[:i]]  # which a lift may contain
         exact += ca.graph_substitute([lift.value], earlier, exact) if earlier else [lift.value]
     model = NlpModel(
         nlp={"x": ca.vertcat(z, lifted), "p": ca.vertcat(p, width), "f": cost, "g": ca.vertcat(values, ties)},
@@ -141,11 +141,11 @@ def _check_sense(problem: GaitProblem, model: NlpModel, lifts: list[Lift]) -> No
     two_sided = np.concatenate([[False], np.isfinite(lower) & np.isfinite(upper), tight])
     # The rows that define a lifted variable let it move: they do not count.
     row_owner = np.repeat(np.arange(-1, len(lifts)), [1 + len(lower), *(lift.rows.shape[0] for lift in lifts)])
-    row, column = (np.array(part) for part in slopes.sparsity_out(0).get_triplet())
+    row, column = (np.array(indices) for indices in slopes.sparsity_out(0).get_triplet())
     foreign = row_owner[row] != column_owner[column]
     for share in SENSE_POINTS:
-        at = np.concatenate([np.full(model.variables, share), np.zeros(model.lifted)])
-        slope = foreign * np.array(slopes(at, np.append(problem.p, 1e-3)).nonzeros())
+        w = np.concatenate([np.full(model.variables, share), np.zeros(model.lifted)])
+        slope = foreign * np.array(slopes(w, np.append(problem.p, 1e-3)).nonzeros())
         helps = slope * away[column] * hurts[row] < -SENSE_TOLERANCE
         helps |= two_sided[row] & (np.abs(slope) > SENSE_TOLERANCE)
         if helps.any():

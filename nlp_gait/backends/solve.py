@@ -170,7 +170,7 @@ def make_solution(problem: GaitProblem, outcomes: Sequence[Outcome], seed: int =
     )
 
 
-def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> Iterator[ActiveConstraint]:
+def _find_active(problem: GaitProblem, values: ExactValues, guess: Guess) -> Iterator[ActiveConstraint]:
     """Yield the bounds with a price: minus the multiplier is the change of the cost per unit of the bound.
 
     Equations of the problem are left out; a fixed variable has a price.
@@ -178,7 +178,7 @@ def _find_active(problem: GaitProblem, values: ExactValues, at: Guess) -> Iterat
     exact, unit = build_exact_model(problem), problem.objective.unit
     per = "" if unit == "1" else f"{unit} "
     rows = len(exact.row_names) - len(problem.names)  # the variables' bounds come last
-    slopes = -np.concatenate([at.rows[:rows], at.bounds[: len(problem.names)] / problem.scale])
+    slopes = -np.concatenate([guess.rows[:rows], guess.bounds[: len(problem.names)] / problem.scale])
     weights = np.abs(slopes) * np.concatenate([np.ones(rows), problem.scale])
     for i in np.argsort(-weights, kind="stable"):
         if weights[i] < PRICE_TOLERANCE:
@@ -241,7 +241,7 @@ class Continuation:
 
 def find_cheapest_feasible(outcomes: Sequence[Outcome]) -> Outcome | None:
     """Cheapest outcome that succeeded, if there is one."""
-    return min((outcome for outcome in outcomes if outcome.converged), key=lambda found: found.cost, default=None)
+    return min((outcome for outcome in outcomes if outcome.converged), key=lambda outcome: outcome.cost, default=None)
 
 
 def solve_both_ways(
@@ -269,7 +269,7 @@ def solve_both_ways(
                 outcomes[k] += path.run(problems[k], outcomes[k], interrupted)
                 if progress is not None:
                     progress()
-    tried = [make_solution(p, found, seed + 1) if found else None for p, found in zip(problems, outcomes, strict=True)]
+    tried = [make_solution(p, runs, seed + 1) if runs else None for p, runs in zip(problems, outcomes, strict=True)]
     solutions = [solution for solution in tried if solution is not None]
     if interrupted():
         raise Interrupted(f"interrupted after {len(solutions)} of {len(problems)} points", tried)

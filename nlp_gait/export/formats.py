@@ -75,7 +75,7 @@ def write_keyframes(result: Result, period_ms: int) -> str:
     times = sample_at_period(result, period_ms).arrays["t"]
     # The engine's coordinates are in the order of the joints in the model, its controls in that of the actuators.
     joints, driven = (
-        [plan.joints.index(part.attrib["name"]) for part in root.iter(tag)] for tag in ("joint", "position")
+        [plan.joints.index(element.attrib["name"]) for element in root.iter(tag)] for tag in ("joint", "position")
     )
     q = plan.at("q", times)
     poses = np.hstack([plan.at("hip", times), plan.attitude(times), q[:, joints]])

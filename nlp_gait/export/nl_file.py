@@ -26,12 +26,12 @@ ATAN:o49 {0}|ASINH:o50 {0}|ASIN:o51 {0}|ACOSH:o52 {0}|ACOS:o53 {0}|SQ:o5 {0} n2|
 ASSIGN:{0}"""
 OPERATIONS = {
     getattr(ca, f"OP_{name}"): text.replace(" ", "\n")
-    for name, _, text in (each.partition(":") for each in _OPERATIONS.replace("\n", "|").split("|"))
+    for name, _, text in (line.partition(":") for line in _OPERATIONS.replace("\n", "|").split("|"))
 }
 
 
 @lock_casadi
-def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> list[Path]:
+def export_nl(problem: GaitProblem, folder: Path, best_known: Mapping[str, Any]) -> list[Path]:
     """Write the ``.nl`` file of a problem's NLP, names of its columns and rows, and a JSON file; return their paths.
 
     The NLP is that of the solvers: scaled variables, then those of lifted operations. The JSON file has offset and scale of the
@@ -58,7 +58,7 @@ def export_nl(problem: GaitProblem, folder: Path, known: Mapping[str, Any]) -> l
         write_text(paths[ending], text)
     facts = {"problem": problem.address, "options": dict(problem.options), "parameters": dict(problem.values)}
     scales = {"offset": model.offset.tolist(), "scale": model.scale.tolist()}
-    write_json(paths["facts.json"], {**facts, "objective": asdict(problem.objective), **known, **scales})
+    write_json(paths["facts.json"], {**facts, "objective": asdict(problem.objective), **best_known, **scales})
     return list(paths.values())
 
 
@@ -91,29 +91,31 @@ def write_nl(nlp: ca.Function, bounds: Mapping[str, Array], start: Array, title:
     transposed = pattern.T
     starts, columns = transposed.colind(), transposed.row()
     for i in range(m):
-        own = columns[starts[i] : starts[i + 1]]
-        lines += [f"J{i} {len(own)}", *(f"{column} 0" for column in own)] if own else []
+        entries = columns[starts[i] : starts[i + 1]]
+        lines += [f"J{i} {len(entries)}", *(f"{column} 0" for column in entries)] if entries else []
     return "\n".join([*lines, f"G0 {n}", *(f"{i} 0" for i in range(n)), ""])
 
 
 def _write_expressions(tape: list[Instruction], n: int) -> tuple[list[str], dict[int, str]]:
     """Return the definitions of values used more than once, and the expression of each output by its place."""
     twice = (ca.OP_FMIN, ca.OP_FMAX)  # use their arguments twice
-    uses = Counter(place for each in tape for place in each.arguments * (1 + (each.operation in twice)))
+    uses = Counter(
+        place for instruction in tape for place in instruction.arguments * (1 + (instruction.operation in twice))
+    )
     texts: dict[int, str] = {}
     defined, outputs = list[str](), dict[int, str]()
-    for k, each in enumerate(tape):
-        arguments = [texts[argument] for argument in each.arguments]
-        if each.operation == ca.OP_OUTPUT:
-            outputs[each.place] = arguments[0]
-        elif each.operation == ca.OP_INPUT:
-            texts[k] = f"v{each.place}"
-        elif each.operation == ca.OP_CONST:
-            texts[k] = f"n{each.constant!r}"
-        elif each.operation not in OPERATIONS:
-            raise InputError(f"an .nl file cannot express operation {each.operation} of CasADi")
+    for k, instruction in enumerate(tape):
+        arguments = [texts[argument] for argument in instruction.arguments]
+        if instruction.operation == ca.OP_OUTPUT:
+            outputs[instruction.place] = arguments[0]
+        elif instruction.operation == ca.OP_INPUT:
+            texts[k] = f"v{instruction.place}"
+        elif instruction.operation == ca.OP_CONST:
+            texts[k] = f"n{instruction.constant!r}"
+        elif instruction.operation not in OPERATIONS:
+            raise InputError(f"an .nl file cannot express operation {instruction.operation} of CasADi")
         else:
-            texts[k] = OPERATIONS[each.operation].format(*arguments)
+            texts[k] = OPERATIONS[instruction.operation].format(*arguments)
             if uses[k] > 1:
                 defined.append(f"V{n + len(defined)} 0 0\n{texts[k]}")
                 texts[k] = f"v{n + len(defined) - 1}"

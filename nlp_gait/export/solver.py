@@ -27,14 +27,14 @@ def export_solver(problem: GaitProblem, folder: Path) -> list[Path]:
     Raises CompilerError for an operation without C++ code, or OutputError.
     """
     model = build_nlp(problem)
-    found = make_nlp_plan(split_nlp(model.nlp))
+    nlp_plan = make_nlp_plan(split_nlp(model.nlp))
     prefix = f"{problem.name.replace('-', '_')}_nlp"
-    words = _format_words(problem, model, found, prefix)
-    source = _read_source(problem, model, found, prefix)
+    words = _format_words(problem, model, nlp_plan, prefix)
+    source = _read_source(problem, model, nlp_plan, prefix)
     return write_c_files(folder, "nlp_gait.export", TEMPLATES, words, source)
 
 
-def _read_source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> str:
+def _read_source(problem: GaitProblem, model: NlpModel, nlp_plan: NlpPlan, prefix: str) -> str:
     """Return the C++ file: the plan and its interpreter, constants, the functions of the header."""
     width = model.widths[-1]
     bounds = model.bounds(problem)
@@ -46,7 +46,7 @@ def _read_source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: 
         "scale": model.scale,
     }
     public = 'extern "C" '
-    sparsities = {"jacobian": found.jacobian, "hessian": found.hessian}
+    sparsities = {"jacobian": nlp_plan.jacobian, "hessian": nlp_plan.hessian}
     starts = {f"{name}_starts": sparsity.colind() for name, sparsity in sparsities.items()}
     rows = {f"{name}_rows": [*sparsity.row(), 0] for name, sparsity in sparsities.items()}
     return "\n".join(
@@ -56,7 +56,7 @@ def _read_source(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: 
             "#ifndef LANES\n#define LANES 1  // pairs of a sample and a direction at a time: 1, 2, 4 or 8; see build.sh\n#endif",
             "#include <math.h>\n#include <stdlib.h>\n#include <string.h>",
             "namespace {  // so that a program can have several problems",
-            write_nlp_source(found).replace('extern "C" EXPORT', "static"),
+            write_nlp_source(nlp_plan).replace('extern "C" EXPORT', "static"),
             "}  // namespace",
             "#if !defined VARIANT || defined DISPATCH",
             *(_write_numbers(public, f"{prefix}_{name}", values) for name, values in constants.items()),
@@ -74,17 +74,17 @@ def _write_numbers(linkage: str, name: str, values: Array) -> str:
     return write_array("double", name, map(format_number, values.tolist())).replace("static ", linkage, 1)
 
 
-def _format_words(problem: GaitProblem, model: NlpModel, found: NlpPlan, prefix: str) -> Mapping[str, str]:
-    m, n = found.jacobian.shape
+def _format_words(problem: GaitProblem, model: NlpModel, nlp_plan: NlpPlan, prefix: str) -> Mapping[str, str]:
+    m, n = nlp_plan.jacobian.shape
     return {
         "WHAT": f"{problem.address}: {problem.title}",
         "N": str(n),
         "M": str(m),
-        "K": str(found.parameters),
+        "K": str(nlp_plan.parameters),
         "VARIABLES_COUNT": str(model.variables),
         "WIDTH": repr(WIDTHS[-1]),
-        "JACOBIAN": str(found.jacobian.nnz()),
-        "HESSIAN": str(found.hessian.nnz()),
+        "JACOBIAN": str(nlp_plan.jacobian.nnz()),
+        "HESSIAN": str(nlp_plan.hessian.nnz()),
         "PREFIX": prefix,
         "GUARD": f"{prefix.upper()}_H",
         "FLAGS": " ".join(FLAGS),

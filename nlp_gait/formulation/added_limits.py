@@ -26,12 +26,12 @@ class AddedLimits:
         """Return the limits of a phase from the sides of the feet that stand."""
         return self.single_support if len(tuple(standing)) == 1 else self.double_support
 
-    def extend(self, more: "AddedLimits") -> "AddedLimits":
+    def extend(self, added: "AddedLimits") -> "AddedLimits":
         """Return these limits and more."""
         return AddedLimits(
-            single_support=self.single_support + more.single_support,
-            double_support=self.double_support + more.double_support,
-            names=self.names + more.names,
+            single_support=self.single_support + added.single_support,
+            double_support=self.double_support + added.double_support,
+            names=self.names + added.names,
         )
 
 
@@ -56,12 +56,12 @@ def parse_limits(value: str | AddedLimits) -> AddedLimits:
     """
     if isinstance(value, AddedLimits):
         return value
-    parts = _split_names(value)
-    limits = [(phase, _load_limit(name)) for phase, name in parts]
+    names = _split_names(value)
+    limits = [(phase, _load_limit(name)) for phase, name in names]
     return AddedLimits(
         single_support=tuple(limit for phase, limit in limits if phase != DOUBLE),
         double_support=tuple(limit for phase, limit in limits if phase != SINGLE),
-        names=tuple(phase + name for phase, name in parts),
+        names=tuple(phase + name for phase, name in names),
     )
 
 
@@ -78,11 +78,11 @@ def hash_limits(text: str) -> str:
 
 def _split_names(text: str) -> list[tuple[str, str]]:
     """Return the prefix that restricts a limit to some phases, or an empty text, and its name."""
-    parts = []
+    names = []
     for name in filter(None, map(str.strip, text.split(","))):
         phase = next((prefix for prefix in (SINGLE, DOUBLE) if name.startswith(prefix)), "")
-        parts.append((phase, name.removeprefix(phase)))
-    return parts
+        names.append((phase, name.removeprefix(phase)))
+    return names
 
 
 def _load_limit(name: str) -> Any:
@@ -91,9 +91,9 @@ def _load_limit(name: str) -> Any:
     if not user_code.is_user_code(name, "limit"):
         raise unknown("limit", name, [*LIMITS, *user_code.find_entry_points("limit")])
     user_code.allow_code(name, "limit")
-    found: Any = user_code.load_object(name, "limit")
+    loaded: Any = user_code.load_object(name, "limit")
     path = user_code.parse_reference(name, "limit").home
-    limit = user_code.call_user_code(name, path, found) if isinstance(found, type) else found
+    limit = user_code.call_user_code(name, path, loaded) if isinstance(loaded, type) else loaded
     if not callable(getattr(limit, "add", None)):
-        raise InputError(f"{name!r} must be a class of limits with a method add, got {found!r}")
+        raise InputError(f"{name!r} must be a class of limits with a method add, got {loaded!r}")
     return limit

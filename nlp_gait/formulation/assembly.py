@@ -250,8 +250,8 @@ class PointOf(Generic[Expression]):
 
     def select(self, variables: Sequence[str]) -> "PointOf[Expression]":
         """Return the point with only these variables in x, in this order; parameters may become variables."""
-        own = tuple(name for name, (kind, _) in self.positions.items() if kind == "x")
-        if tuple(variables) == own:
+        present = tuple(name for name, (kind, _) in self.positions.items() if kind == "x")
+        if tuple(variables) == present:
             return self
         parameters = {name: place for name, place in self.positions.items() if place[0] == "p"}
         taken: dict[str, tuple[Literal["x", "p"], int]] = {name: ("x", i) for i, name in enumerate(variables)}

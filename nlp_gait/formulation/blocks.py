@@ -54,18 +54,18 @@ class Layout:
     def split(self, point: Point) -> dict[str, MX]:
         """Return the symbols of each block by quantity, (rows, columns)."""
         ends = np.cumsum([0, *(block.size for block in self.blocks)])
-        parts = ca.vertsplit(point.x, [int(end) for end in ends])
+        columns = ca.vertsplit(point.x, [int(end) for end in ends])
         return {
-            block.quantity: ca.reshape(part, len(block.rows), block.columns)
-            for block, part in zip(self.blocks, parts, strict=True)
+            block.quantity: ca.reshape(column, len(block.rows), block.columns)
+            for block, column in zip(self.blocks, columns, strict=True)
         }
 
     def values(self, x: Array) -> dict[str, Array]:
         """Return the values of each block by quantity, (rows, columns), from x (n,)."""
         ends = np.cumsum([block.size for block in self.blocks])[:-1]
         return {
-            block.quantity: part.reshape(block.columns, len(block.rows)).T
-            for block, part in zip(self.blocks, np.split(x, ends), strict=True)
+            block.quantity: values.reshape(block.columns, len(block.rows)).T
+            for block, values in zip(self.blocks, np.split(x, ends), strict=True)
         }
 
     def join(self, values: Mapping[str, Array]) -> Array:

@@ -118,8 +118,8 @@ class Skeleton:
 
     def box(self) -> tuple[Array, Array]:
         """Return the smallest and largest coordinates of everything that moves, (3,) each [m]."""
-        parts = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
-        everything = np.concatenate([part.reshape(-1, 3) for part in parts])
+        moving = [limb.points for limb in self.limbs] + [sole.corners for sole in self.soles]
+        everything = np.concatenate([points.reshape(-1, 3) for points in moving])
         return everything.min(axis=0), everything.max(axis=0)
 
 

@@ -178,8 +178,8 @@ class GaitProblem:
         make, options = self._origin or (None, {})
         if make is None or LIMITS_OPTION not in options:
             raise InputError(f"problem {self.name!r} takes no limits; those of NAO and of humanoids do")
-        more = make_added_limits(single_support, double_support)
-        limits = parse_limits(options[LIMITS_OPTION]).extend(more)
+        added = make_added_limits(single_support, double_support)
+        limits = parse_limits(options[LIMITS_OPTION]).extend(added)
         return make(**{**options, LIMITS_OPTION: limits}).with_values(**self.values)
 
     def fix(self, /, **values: float) -> GaitProblem:
@@ -196,13 +196,13 @@ class GaitProblem:
             bounds |= {f"{name}.lower": value, f"{name}.upper": value}
         return self.with_values(**bounds)
 
-    def place(self, at: Mapping[str, float]) -> GaitProblem:
+    def place(self, coordinates: Mapping[str, float]) -> GaitProblem:
         """Return the same problem at a point of a grid: parameters, variables and other bounded quantities have a value."""
-        fixed = {name: value for name, value in at.items() if name in self.names}
+        fixed = {name: value for name, value in coordinates.items() if name in self.names}
         values: dict[str, float] = {}
-        for name in at.keys() - fixed:
+        for name in coordinates.keys() - fixed:
             bounds = {f"{name}.lower", f"{name}.upper"}  # of a quantity that follows from the variables
-            values |= dict.fromkeys(bounds if bounds <= self.parameter_values.keys() else {name}, at[name])
+            values |= dict.fromkeys(bounds if bounds <= self.parameter_values.keys() else {name}, coordinates[name])
         return self.with_values(**values).fix(**fixed)
 
     def dense(self, factor: int) -> GaitProblem | None:
@@ -234,8 +234,8 @@ class GaitProblem:
 
         def start(parameters: Mapping[str, float], rng: np.random.Generator) -> Array:
             draw = self.hints.start or partial(draw_uniform, self.names)
-            own = draw(parameters, rng)
-            return np.concatenate([own, draw_uniform([variable.name for variable in variables], parameters, rng)])
+            values = draw(parameters, rng)
+            return np.concatenate([values, draw_uniform([variable.name for variable in variables], parameters, rng)])
 
         def refine(factor: int) -> GaitProblem:
             finer = self.dense(factor)
@@ -256,7 +256,9 @@ class GaitProblem:
             refine=None if self.refine is None else refine,
             rows_over_time=self.rows_over_time if change is None and not variables else (),
             power_form=self.power_form if change is None and not variables else None,
-            display=replace(self.display, motion=None if motion is None else lambda at: motion(at.select(self.names))),
+            display=replace(
+                self.display, motion=None if motion is None else lambda point: motion(point.select(self.names))
+            ),
             hints=replace(self.hints, start=start if self.hints.start is not None or variables else None),
             loaded_as="" if name else self.loaded_as,
         )
@@ -340,10 +342,10 @@ class GaitProblem:
 
     def _copy(self, origin: Origin | None, **changes: Any) -> GaitProblem:
         """Return a copy with the same mathematics, so that it shares what is built from it."""
-        made = replace(self, **changes)
-        object.__setattr__(made, "_cache", self._cache)
-        object.__setattr__(made, "_origin", origin)
-        return made
+        copy = replace(self, **changes)
+        object.__setattr__(copy, "_cache", self._cache)
+        object.__setattr__(copy, "_origin", origin)
+        return copy
 
     def __copy__(self) -> GaitProblem:  # it cannot be changed
         return self
@@ -379,8 +381,10 @@ class GaitProblem:
                     f"load it with --set {name}=VALUE, or load({self.name!r}, {name}=VALUE)"
                 )
             if name in self.with_other_options:
-                other = self.with_other_options[name]
-                raise UnknownNameError(f"{name!r} is no parameter of {self.name} with these options; add --set {other}")
+                option = self.with_other_options[name]
+                raise UnknownNameError(
+                    f"{name!r} is no parameter of {self.name} with these options; add --set {option}"
+                )
         raise unknown(f"parameter of {self.name}", name, [q.name for q in self.parameters])
 
 

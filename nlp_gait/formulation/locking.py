@@ -39,8 +39,8 @@ class Cache:
             with CASADI_LOCK:
                 if key not in self._values:  # another thread may have built it meanwhile
                     self._values[key] = build()
-        found: T = self._values[key]
-        return found
+        value: T = self._values[key]
+        return value
 
 
 if hasattr(os, "register_at_fork"):

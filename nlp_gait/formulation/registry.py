@@ -82,21 +82,21 @@ def find_maker(name: str) -> Maker:
 
 def _load_user_maker(name: str) -> Maker:
     user_code.allow_code(name, "problem")
-    found: Any = user_code.load_object(name, "problem")
+    loaded: Any = user_code.load_object(name, "problem")
     path = user_code.parse_reference(name, "problem").home
     make: Maker
-    if isinstance(found, GaitProblem):
+    if isinstance(loaded, GaitProblem):
 
         def make() -> GaitProblem:
-            return found
+            return loaded
 
-    elif callable(found):
-        make = found if hasattr(found, "checks_options") else maker(found)
+    elif callable(loaded):
+        make = loaded if hasattr(loaded, "checks_options") else maker(loaded)
         for option, parameter in inspect.signature(make).parameters.items():
             if type(parameter.default) not in (str, int, float, bool) or parameter.kind is parameter.POSITIONAL_ONLY:
                 raise InputError(f"{name!r}: option {option} needs a default: a text, a number, true or false")
     else:
-        raise InputError(f"{name!r} must be a GaitProblem or a function that makes one, got {type(found).__name__}")
+        raise InputError(f"{name!r} must be a GaitProblem or a function that makes one, got {type(loaded).__name__}")
 
     origin = UserMaker(name, user_code.hash_source(name, "problem"))
 
@@ -127,12 +127,12 @@ class UserMaker:
 
 def check_options(make: Maker, options: Mapping[str, Any]) -> None:
     """Check that a maker has these options, and allows their values; raises UnknownNameError or InputError."""
-    known, allowed = inspect.signature(make).parameters, _list_choices(make)
+    parameters, allowed = inspect.signature(make).parameters, _list_choices(make)
     for option, given in options.items():
         value = _to_python(str(given) if isinstance(given, AddedLimits) else given)
-        if option not in known:
-            raise unknown(f"option of {make.__name__.replace('_', '-')}", option, known)
-        expected = type(known[option].default)
+        if option not in parameters:
+            raise unknown(f"option of {make.__name__.replace('_', '-')}", option, parameters)
+        expected = type(parameters[option].default)
         right = type(value) is expected or (expected is float and type(value) is int)
         if not right or (expected is float and not is_number(value)):
             raise InputError(f"option {option} must be {describe_type(expected)}, got {format_value(value)}")
@@ -140,8 +140,8 @@ def check_options(make: Maker, options: Mapping[str, Any]) -> None:
             raise InputError(f"option {option} must be at most {LARGEST_COUNT}, got {value}")
         if option in allowed and value not in allowed[option]:
             raise InputError(f"{option} must be one of {', '.join(allowed[option])}, got {format_value(value)}")
-    whole = [name for name, option in known.items() if type(option.default) is int]
-    counts = {name: _to_python(options.get(name, known[name].default)) for name in GRID if name in whole}
+    whole = [name for name, option in parameters.items() if type(option.default) is int]
+    counts = {name: _to_python(options.get(name, parameters[name].default)) for name in GRID if name in whole}
     if math.prod(max(1, count) for count in counts.values()) > LARGEST_COUNT:
         product = " x ".join(f"{name} {count}" for name, count in counts.items())
         raise InputError(f"a grid takes at most {LARGEST_COUNT} intervals in all, got {product}")
@@ -204,26 +204,29 @@ def check_mathematics(problem: GaitProblem) -> None:
         raise InputError(f"{owner}: duplicated rows: {', '.join(duplicates[:5])}")
     inputs = [point.x, point.p]
     bounds: dict[str, MX] = {}
-    parts = {"objective": assembly.objective, **{f"index {name!r}": value for name, value in assembly.indexes.items()}}
+    expressions = {
+        "objective": assembly.objective,
+        **{f"index {name!r}": value for name, value in assembly.indexes.items()},
+    }
     for constraint in assembly.constraints:
         row = f"constraint {constraint.name!r}"
-        parts[row] = constraint.value
+        expressions[row] = constraint.value
         for end in ("lower", "upper"):
             bound = getattr(constraint, end)
             if bound is None:
                 continue
-            bounds[f"{row}: {end}"] = parts[f"{row}, {end}"] = bound
+            bounds[f"{row}: {end}"] = expressions[f"{row}, {end}"] = bound
             if Function("bound", inputs, [bound], {"allow_free": True}).sparsity_jac(0, 0).nnz():
                 remedy = "move terms with variables into value"
                 raise InputError(f"{owner}: {row}: {end} must depend on parameters only; {remedy}")
-    for part, value in parts.items():
+    for what, value in expressions.items():
         free = Function("part", inputs, [vertcat(value)], {"allow_free": True}).free_mx()
         if free:
             symbol = free[0].name()
-            raise InputError(f"{owner}: {part} contains {symbol!r}, which is neither a variable nor a parameter")
-    for part, bound in bounds.items():
+            raise InputError(f"{owner}: {what} contains {symbol!r}, which is neither a variable nor a parameter")
+    for what, bound in bounds.items():
         if np.isnan(np.array(Function("bound", inputs, [vertcat(bound)])(problem.lower, problem.p))).any():
-            raise InputError(f"{owner}: {part} is NaN; give a number, or leave it out for no bound")
+            raise InputError(f"{owner}: {what} is NaN; give a number, or leave it out for no bound")
     _check_texts(owner, problem, assembly)
     if problem.hints.start is not None:
         start = np.asarray(problem.hints.start(problem.parameter_values, np.random.default_rng(0)))

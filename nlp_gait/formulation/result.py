@@ -162,6 +162,6 @@ def sample_at_period(result: Result, period_ms: int) -> Signals:
     for name, values in fine.arrays.items():
         if name != "t":
             columns = values.reshape(len(values), -1).T
-            found = np.stack([np.interp(t, fine.arrays["t"], column) for column in columns], axis=1)
-            arrays[name] = np.round(found) if np.isin(values, (0.0, 1.0)).all() else found
+            interpolated = np.stack([np.interp(t, fine.arrays["t"], column) for column in columns], axis=1)
+            arrays[name] = np.round(interpolated) if np.isin(values, (0.0, 1.0)).all() else interpolated
     return replace(fine, arrays=arrays)

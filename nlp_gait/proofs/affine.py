@@ -120,20 +120,24 @@ def _encode(function: ca.Function, half_open: Collection[int]) -> tuple[Any, Arr
     """Return the instructions (count, 4), as operation, result and arguments, and the constants (count,)."""
     tape = list(read_tape(function))
     code = np.full((len(tape), 4), -1, dtype=np.int32)
-    inputs_below = {k for k, each in enumerate(tape) if each.operation == ca.OP_INPUT and each.place in half_open}
-    for k, each in enumerate(tape):
-        operation, places = each.operation, [tape[j].register for j in each.arguments]
+    inputs_below = {
+        k
+        for k, instruction in enumerate(tape)
+        if instruction.operation == ca.OP_INPUT and instruction.place in half_open
+    }
+    for k, instruction in enumerate(tape):
+        operation, places = instruction.operation, [tape[j].register for j in instruction.arguments]
         if operation == ca.OP_OUTPUT:
-            code[k, :3] = operation, each.place, places[0]
+            code[k, :3] = operation, instruction.place, places[0]
             continue
         if operation == ca.OP_INPUT:
-            places = [each.place]
+            places = [instruction.place]
         elif operation in BINARY:
-            if operation == ca.OP_LE and each.arguments[1] in inputs_below:
+            if operation == ca.OP_LE and instruction.arguments[1] in inputs_below:
                 operation = HALF_OPEN_LE
-            elif operation == ca.OP_LT and each.arguments[0] in inputs_below:
+            elif operation == ca.OP_LT and instruction.arguments[0] in inputs_below:
                 operation = HALF_OPEN_LT
         elif operation not in (*UNARY, ca.OP_CONST):
             raise InputError(f"function {function.name()!r}: CasADi's operation number {operation} cannot be enclosed")
-        code[k, : 2 + len(places)] = operation, each.register, *places
-    return code, np.array([each.constant for each in tape])
+        code[k, : 2 + len(places)] = operation, instruction.register, *places
+    return code, np.array([instruction.constant for instruction in tape])

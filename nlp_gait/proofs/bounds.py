@@ -45,13 +45,15 @@ class Bounds(ABC):
 
     def prune(self, boxes: Array, target: float) -> Remaining:
         """Remove from boxes (P, n, 2), each independently of the others, all that has no feasible point below the target."""
-        parts = np.array_split(np.arange(len(boxes)), max(1, min(available_cores(), len(boxes) // 64)))
-        if len(parts) == 1:
+        groups = np.array_split(np.arange(len(boxes)), max(1, min(available_cores(), len(boxes) // 64)))
+        if len(groups) == 1:
             return self._prune(boxes, target)
-        with ThreadPoolExecutor(len(parts)) as threads:
-            found = list(threads.map(lambda part: self._prune(boxes[part], target), parts))
-        whole = Remaining(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
-        return whole._replace(origin=np.concatenate([part[f.origin] for part, f in zip(parts, found, strict=True)]))
+        with ThreadPoolExecutor(len(groups)) as threads:
+            results = list(threads.map(lambda group: self._prune(boxes[group], target), groups))
+        whole = Remaining(*(np.concatenate(columns) for columns in zip(*results, strict=True)))
+        return whole._replace(
+            origin=np.concatenate([group[f.origin] for group, f in zip(groups, results, strict=True)])
+        )
 
     @abstractmethod
     def _prune(self, boxes: Array, target: float) -> Remaining: ...
@@ -101,7 +103,7 @@ class AffineBounds(Bounds):
             rows = slice(1, 1 + self._rows)
             possible = (forms.lower[:, rows] <= self._upper) & (forms.upper[:, rows] >= self._lower)
             left: Flags = (lowest < target) & possible.all(axis=1)
-            boxes, origin, forms = boxes[left], origin[left], AffineForms(*(part[left] for part in forms))
+            boxes, origin, forms = boxes[left], origin[left], AffineForms(*(values[left] for values in forms))
             contracted, cut = self._contract(boxes, forms, target), self._choose_cut(boxes, forms)
             exists = np.asarray((contracted[..., 0] <= contracted[..., 1]).all(axis=-1))
             narrower = np.diff(contracted)[..., 0] < (1.0 - LEAST_SHRINKAGE) * np.diff(boxes)[..., 0]
@@ -124,15 +126,15 @@ class AffineBounds(Bounds):
         """
         used = slice(0, 1 + self._rows)
         slopes, middle, error = forms.slopes[:, used], forms.middle[:, used], forms.error[:, used]
-        known = np.isfinite(error)
-        error = np.where(known, error, 0.0)
+        bounded = np.isfinite(error)
+        error = np.where(bounded, error, 0.0)
         size = np.abs(slopes)
         total = size.sum(axis=-1, keepdims=True)
         upper = np.concatenate([[target], self._upper])
         lower = np.concatenate([[-np.inf], self._lower])
         low, high = np.full(boxes.shape[:2], -1.0), np.full(boxes.shape[:2], 1.0)
         for sign, room in ((1.0, upper - middle + error), (-1.0, middle - lower + error)):
-            open_ = known & np.isfinite(room)
+            open_ = bounded & np.isfinite(room)
             available = _up(np.where(open_, room, 0.0)[..., None] + total - size)
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 farthest = available / (sign * slopes)
@@ -176,9 +178,9 @@ class PowerBounds(Bounds):
     def _prune(self, boxes: Array, target: float) -> Remaining:
         rows, poses = self._form.rows, self._form.pose_rows
         contracted, left = self._poses.contract(boxes, rows.lower[poses], rows.upper[poses])
-        found = self._function.prune(contracted[left], target + WIDENING * abs(target), rows)
-        lowest = found.lowest - WIDENING * abs(target)  # of the judged problem
-        return found._replace(lowest=lowest, origin=np.flatnonzero(left)[found.origin])
+        remaining = self._function.prune(contracted[left], target + WIDENING * abs(target), rows)
+        lowest = remaining.lowest - WIDENING * abs(target)  # of the judged problem
+        return remaining._replace(lowest=lowest, origin=np.flatnonzero(left)[remaining.origin])
 
 
 def _compare(problem: GaitProblem, form: PowerForm) -> None:
@@ -189,7 +191,7 @@ def _compare(problem: GaitProblem, form: PowerForm) -> None:
     """
     model, rng = build_exact_model(problem), np.random.default_rng(SEED)
     domain = [k for k, name in enumerate(model.row_names) if name.startswith(form.domain)]
-    seen = 0
+    compared = 0
     for _ in range(TRIES):
         x = rng.uniform(problem.lower, problem.upper)
         expected = model.at(x, problem.p)
@@ -202,8 +204,8 @@ def _compare(problem: GaitProblem, form: PowerForm) -> None:
                     f"problem {problem.name!r}: {name} is {float(value)} in its least-power form and {exact} in the exact "
                     "functions; with these options there is no proof"
                 )
-        seen += 1
-        if seen == POINTS:
+        compared += 1
+        if compared == POINTS:
             return
     raise InputError(
         f"problem {problem.name!r}: none of {TRIES} random points satisfies the constraints {form.domain}...]"

@@ -12,8 +12,10 @@ Source:
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -81,38 +83,22 @@ def certify(
         CompilerError: there is no compiler, or it fails.
     """
     if not (0.0 < tolerance < 1.0 and time_limit_s > 0.0):
-        raise InputError(
-            f"the tolerance must be between 0 and 1, the time limit positive; got {tolerance}, {time_limit_s} s"
-        )
-    x = problem.check_x(incumbent)
-    at = build_exact_model(problem).at(x, problem.p)
-    if not at.violation <= FEASIBILITY_TOLERANCE:
-        raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {at.violation:.3g}")
+        got = f"{tolerance}, {time_limit_s} s"
+        raise InputError(f"the tolerance must be between 0 and 1, the time limit positive; got {got}")
+    x, sign = problem.check_x(incumbent), problem.objective.sign
+    cost = _evaluate_feasible(problem, x)
     started, used = time.perf_counter(), time.process_time()
-    bounds, target = make_bounds(problem), target_cost(at.cost, tolerance)
+    bounds, target = make_bounds(problem), target_cost(cost, tolerance)
     identity = identify_problem(problem)
     proof = hash_json({**make_key(identity), "x": x.tolist(), "tolerance": tolerance, "root": bounds.root.tolist()})
-    tree = None
-    if checkpoint is not None and checkpoint.exists():
-        tree = read_checkpoint(checkpoint, identity, proof, bounds.root)
-        if tree is None:
-            progress(
-                f"checkpoint {str(checkpoint)!r} was made by another version of the prover; the proof starts again"
-            )
-    if tree is None:
-        whole = bounds.prune(bounds.root, target)
-        tree = Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
+    stored = None if checkpoint is None else _read_stored(checkpoint, identity, proof, bounds.root, progress)
+    tree = stored or _plant_tree(bounds, target)
     saved, deadline = started, started + time_limit_s
     started, used = started - tree.time_s, used - tree.cpu_s  # of earlier runs
-
-    def compute_bound() -> float:
-        return problem.objective.sign * float(tree.lowest.min(initial=target))
-
     while len(tree.lowest) and time.perf_counter() < deadline:
         _halve_best(tree, bounds, target)
-        progress(
-            f"{tree.enclosed} boxes, bound {compute_bound():.6g}, {100 * tree.estimate_share_left():.2g} % of the tree left"
-        )
+        left = f"{100 * tree.estimate_share_left():.2g} % of the tree left"
+        progress(f"{tree.enclosed} boxes, bound {sign * tree.find_bound(target):.6g}, {left}")
         if checkpoint is not None and time.perf_counter() - saved > CHECKPOINT_S:
             saved = time.perf_counter()
             tree.time_s, tree.cpu_s = saved - started, time.process_time() - used
@@ -121,8 +107,8 @@ def certify(
     if checkpoint is not None:
         write_checkpoint(checkpoint, identity, proof, tree)
     return Certificate(
-        objective=problem.objective.sign * at.cost,
-        bound=compute_bound(),
+        objective=sign * cost,
+        bound=sign * tree.find_bound(target),
         tolerance=tolerance,
         closed=not len(tree.lowest),
         boxes=tree.enclosed,
@@ -138,16 +124,40 @@ def target_cost(cost: float, tolerance: float) -> float:
     return cost - tolerance * abs(cost)
 
 
+def _evaluate_feasible(problem: GaitProblem, x: Array) -> float:
+    exact = build_exact_model(problem).at(x, problem.p)
+    if not exact.violation <= FEASIBILITY_TOLERANCE:
+        raise InputError(f"the incumbent of {problem.name} is infeasible: total violation {exact.violation:.3g}")
+    return exact.cost
+
+
+def _read_stored(
+    checkpoint: Path, identity: Mapping[str, Any], proof: str, root: Array, progress: Progress
+) -> Tree | None:
+    if not checkpoint.exists():
+        return None
+    tree = read_checkpoint(checkpoint, identity, proof, root)
+    if tree is None:
+        name = f"checkpoint {str(checkpoint)!r}"
+        progress(f"{name} was made by another version of the prover; the proof starts again")
+    return tree
+
+
+def _plant_tree(bounds: Bounds, target: float) -> Tree:
+    whole = bounds.prune(bounds.root, target)
+    return Tree(boxes=whole.boxes, lowest=whole.lowest, cut=whole.cut, depth=np.zeros(len(whole.origin)))
+
+
 def _halve_best(tree: Tree, bounds: Bounds, target: float) -> None:
     order = np.argsort(tree.lowest, kind="stable")
     batch = max(BATCH, len(order) // SHARE)
-    chosen, rest = order[:batch], order[batch:]
+    chosen, kept = order[:batch], order[batch:]
     new = halve(tree.boxes[chosen], tree.cut[chosen])
     tree.enclosed += len(new)
-    found = bounds.prune(new, target)
-    depth = np.tile(tree.depth[chosen] + 1, 2)[found.origin]
-    inherited = np.tile(tree.lowest[chosen], 2)[found.origin]  # also a bound of each half
-    tree.boxes = np.concatenate([tree.boxes[rest], found.boxes])
-    tree.lowest = np.concatenate([tree.lowest[rest], np.maximum(found.lowest, inherited)])
-    tree.cut = np.concatenate([tree.cut[rest], found.cut])
-    tree.depth = np.concatenate([tree.depth[rest], depth])
+    remaining = bounds.prune(new, target)
+    depth = np.tile(tree.depth[chosen] + 1, 2)[remaining.origin]
+    inherited = np.tile(tree.lowest[chosen], 2)[remaining.origin]  # also a bound of each half
+    tree.boxes = np.concatenate([tree.boxes[kept], remaining.boxes])
+    tree.lowest = np.concatenate([tree.lowest[kept], np.maximum(remaining.lowest, inherited)])
+    tree.cut = np.concatenate([tree.cut[kept], remaining.cut])
+    tree.depth = np.concatenate([tree.depth[kept], depth])

@@ -69,8 +69,8 @@ def load_certificates() -> Mapping[str, CertificateFile]:
 
 def find_certificate(problem: Mapping[str, Any]) -> CertificateFile | None:
     """Return the shipped certificate with the smallest gap of an equal problem, which may have another name; None for none."""
-    found = [file for file in load_certificates().values() if not describe_difference(file.problem, problem)]
-    return min(found, key=lambda file: file.certificate.gap, default=None)
+    equal = [file for file in load_certificates().values() if not describe_difference(file.problem, problem)]
+    return min(equal, key=lambda file: file.certificate.gap, default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,14 +119,14 @@ def check_certificate(
     Raises InputError that says what is wrong with the certificate, which point is better, or that a path does not end.
     """
     problem, target = _check_numbers(file)
-    found = {"the incumbent": np.array(file.certificate.x), **_check_shipped(problem, file), **(points or {})}
+    candidates = {"the incumbent": np.array(file.certificate.x), **_check_shipped(problem, file), **(points or {})}
     if starts:
-        solution = solve(problem, starts=starts, seed=seed, x0=found["the incumbent"])
-        found["a start of IPOPT"] = problem.check_x(solution.x)
-    best, source = _find_best(problem, file.certificate, found)
+        solution = solve(problem, starts=starts, seed=seed, x0=candidates["the incumbent"])
+        candidates["a start of IPOPT"] = problem.check_x(solution.x)
+    best, source = _find_best(problem, file.certificate, candidates)
     bounds, rng = make_bounds(problem), np.random.default_rng(seed)
     reach = 10.0 ** rng.uniform(NEAREST, FARTHEST, (paths, 1)) * (problem.upper - problem.lower)
-    goals = found[source] + reach * rng.standard_normal((paths, len(problem.names)))
+    goals = candidates[source] + reach * rng.standard_normal((paths, len(problem.names)))
     goals = bounds.to_z(np.clip(goals, problem.lower, problem.upper))
     goals[: (paths + 1) // 2] = np.nan  # random paths
     open_, _, cut, origin = bounds.prune(np.repeat(bounds.root, paths, axis=0), target)
@@ -187,15 +187,15 @@ def _check_numbers(file: CertificateFile) -> tuple[GaitProblem, float]:
     x, sign = problem.check_x(np.array(proof.x)), problem.objective.sign
     if _is_outside(problem, x):
         raise InputError("the certificate's incumbent is outside the bounds of its variables")
-    at = build_exact_model(problem).at(x, problem.p)
-    objective = sign * at.cost
-    if not at.violation <= FEASIBILITY_TOLERANCE:
-        raise InputError(f"the certificate's incumbent is infeasible: total violation {at.violation:.3g}")
+    exact = build_exact_model(problem).at(x, problem.p)
+    objective = sign * exact.cost
+    if not exact.violation <= FEASIBILITY_TOLERANCE:
+        raise InputError(f"the certificate's incumbent is infeasible: total violation {exact.violation:.3g}")
     if not abs(objective - proof.objective) <= SAME_VALUE * abs(objective):
         raise InputError(f"the certificate's objective is {proof.objective}, but its incumbent has {objective}")
-    if sign * proof.bound > at.cost:
+    if sign * proof.bound > exact.cost:
         raise InputError(f"the certificate's bound {proof.bound} is contradicted by its own incumbent, {objective}")
-    target = target_cost(at.cost, proof.tolerance)
+    target = target_cost(exact.cost, proof.tolerance)
     if not abs(sign * proof.bound - target) <= SAME_VALUE * abs(target):
         raise InputError(
             f"the certificate's bound {proof.bound} does not follow from objective and tolerance, which give {sign * target}"
@@ -225,10 +225,10 @@ def _find_best(problem: GaitProblem, proof: Certificate, points: Mapping[str, Ar
     model, sign = build_exact_model(problem), problem.objective.sign
     costs = dict[str, float]()
     for source, x in points.items():
-        at = model.at(x, problem.p)
-        if at.violation <= FEASIBILITY_TOLERANCE and not _is_outside(problem, x):
-            costs[source] = at.cost
-    source = min(costs, key=lambda each: costs[each])
+        exact = model.at(x, problem.p)
+        if exact.violation <= FEASIBILITY_TOLERANCE and not _is_outside(problem, x):
+            costs[source] = exact.cost
+    source = min(costs, key=lambda name: costs[name])
     best = sign * costs[source]
     if costs[source] < sign * proof.bound:
         raise InputError(f"the certificate's bound {proof.bound} is wrong: {source} is feasible and has {best}")

@@ -43,6 +43,10 @@ class Tree:
     time_s: float = 0.0
     cpu_s: float = 0.0
 
+    def find_bound(self, target: float) -> float:
+        """Return the lower bound of the cost that is proven: that of the open boxes, at most the target."""
+        return float(self.lowest.min(initial=target))
+
     def estimate_share_left(self) -> float:
         """Return the open share of the tree, as if both halves of a box were equal work."""
         return float(np.exp2(-self.depth.astype(float)).sum())

@@ -53,8 +53,8 @@ class Guarantee:
         sampled = f"; checked on samples only: {', '.join(self.sampled)}" if self.sampled else ""
         if self.satisfied:
             return f"all limits are satisfied at all times{sampled}"
-        more = f"; {len(self.violations) - 1} more constraints" if len(self.violations) > 1 else ""
-        return f"{self.violations[0]}{more}{sampled}"
+        omitted = f"; {len(self.violations) - 1} more constraints" if len(self.violations) > 1 else ""
+        return f"{self.violations[0]}{omitted}{sampled}"
 
     @property
     def word(self) -> str:
@@ -79,7 +79,9 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
         for name, (low, high) in phase_means.items():
             before = means.get(name, (0.0, 0.0))
             means[name] = (before[0] + low, before[1] + high)
-    violations = tuple(sorted((v for found, _, _ in results for v in found), key=lambda v: v.from_s))
+    violations = tuple(
+        sorted((v for phase_violations, _, _ in results for v in phase_violations), key=lambda v: v.from_s)
+    )
     proven = any(v.least > FEASIBILITY_TOLERANCE for v in violations)
     satisfied = False if proven else None if violations else True
     sampled = tuple(dict.fromkeys(name for phase in phases for name in phase.sampled))
@@ -124,6 +126,6 @@ def _search_phase(
 
 
 def _violation(rows: TimeRows, k: int, piece: tuple[float, float], least: float, most: float) -> RowViolation:
-    known, (from_s, to_s) = most if np.isfinite(most) else None, piece
+    finite, (from_s, to_s) = most if np.isfinite(most) else None, piece
     row, unit = rows.names[k], rows.units[k]
-    return RowViolation(row=row, unit=unit, from_s=from_s, to_s=to_s, least=max(least, 0.0), most=known)
+    return RowViolation(row=row, unit=unit, from_s=from_s, to_s=to_s, least=max(least, 0.0), most=finite)

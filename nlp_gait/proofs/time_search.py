@@ -70,10 +70,10 @@ class TimeRows:
     """Enclosed functions of time of one kind: rows of every time, and other values whose time means are bounded."""
 
     def __init__(
-        self, plain: Sequence[tuple[Any, ...]], others: Sequence[tuple[Any, ...]], inputs: Sequence[MX], kinks: bool
+        self, plain: Sequence[tuple[Any, ...]], averaged: Sequence[tuple[Any, ...]], inputs: Sequence[MX], kinks: bool
     ) -> None:
         """Read the instructions of a function of (x, p, phase) or (x, p, phase, phase an interval later)."""
-        names, units, values, lower, upper = zip(*plain, *others, strict=True)
+        names, units, values, lower, upper = zip(*plain, *averaged, strict=True)
         self.names, self.units, self.plain = names, units, len(plain)  # no unit: an index, which has no bounds
         self._bounds = ca.Function("bounds", [inputs[1]], [ca.vertcat(*lower), ca.vertcat(*upper)])
         function = ca.Function("rows", list(inputs), [ca.vertcat(*values)])
@@ -100,11 +100,13 @@ class TimeRows:
         if group not in self._parts:
             rows, arguments = self.groups[group], self._function.sx_in()
             (values,) = self._function.call(arguments)
-            part = ca.Function("part", arguments, [values[rows.tolist()]])
-            share = part.n_instructions() / self._function.n_instructions()
+            function = ca.Function("part", arguments, [values[rows.tolist()]])
+            share = function.n_instructions() / self._function.n_instructions()
             self._parts[group] = EnclosedPart(self.whole, rows, 1.0)
             if share < 0.5:
-                self._parts[group] = EnclosedPart(AffineFunction(part, self._half_open), np.arange(len(rows)), share)
+                self._parts[group] = EnclosedPart(
+                    AffineFunction(function, self._half_open), np.arange(len(rows)), share
+                )
         return self._parts[group]
 
 
@@ -138,12 +140,12 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
     ]
     means_of = [name for name in source.means if name in still.indexes]
     indexes = [(name, "", still.indexes[name], MX(-np.inf), MX(np.inf)) for name in means_of]
-    others, kinks = [*means, *squares, *indexes], bool(source.kinks)
+    averaged, kinks = [*means, *squares, *indexes], bool(source.kinks)
     first = len(instants) + len(means)
     changes = [row for c in moved.constraints if c.name in wanted for row in _select_first_sample(c)]
     given = [point.x, point.p, now]
     numbers = frozenset(range(first, first + len(squares)))
-    at_once = TimeRows(instants, others, given, kinks) if instants or others else None
+    at_once = TimeRows(instants, averaged, given, kinks) if instants or averaged else None
     between = TimeRows(changes, [], [*given, later], kinks) if changes else None
     sampled = tuple(c.name for kind in (None, "samples") for c in by_kind[kind])
     return TimeFunctions(source=source, instants=at_once, squares=numbers, changes=between, sampled=sampled)
@@ -151,17 +153,17 @@ def make_time_functions(problem: GaitProblem, source: RowsOverTime) -> TimeFunct
 
 def _split(constraint: Constraint) -> list[tuple[Any, ...]]:
     columns = [ca.vertsplit(column) for column in constraint.columns]
-    return [(name, constraint.unit, *parts) for name, *parts in zip(constraint.row_names, *columns, strict=True)]
+    return [(name, constraint.unit, *row) for name, *row in zip(constraint.row_names, *columns, strict=True)]
 
 
 def _select_first_sample(constraint: Constraint) -> list[tuple[Any, ...]]:
     """Return the same for the first sample, named without its number."""
-    found: dict[str, tuple[Any, ...]] = {}
+    rows: dict[str, tuple[Any, ...]] = {}
     labels = constraint.labels or ("",)
-    for label, (_, *rest) in zip(labels, _split(constraint), strict=True):
+    for label, (_, *row) in zip(labels, _split(constraint), strict=True):
         stem = label.rpartition(",")[0]
-        found.setdefault(f"{constraint.name}[{stem}]" if stem else constraint.name, tuple(rest))
-    return [(name, *rest) for name, rest in found.items()]
+        rows.setdefault(f"{constraint.name}[{stem}]" if stem else constraint.name, tuple(row))
+    return [(name, *row) for name, row in rows.items()]
 
 
 class TimeSearch:
@@ -204,10 +206,10 @@ class TimeSearch:
                     self.first[row] = (a, b)
             if not again.any():
                 return
-            pieces, part = halve_pieces(pieces[again]), self._rows.part(number)
-            forms = self._enclose(part.function, pieces)
-            low, high = forms.lower[:, part.columns], forms.upper[:, part.columns]
-            work += part.work * len(pieces)
+            pieces, group = halve_pieces(pieces[again]), self._rows.part(number)
+            forms = self._enclose(group.function, pieces)
+            low, high = forms.lower[:, group.columns], forms.upper[:, group.columns]
+            work += group.work * len(pieces)
 
     def integrals(self) -> tuple[Array, Array]:
         """Return bounds (k,) and (k,) of the integrals over the phase of the values that follow the rows."""
@@ -219,21 +221,21 @@ class TimeSearch:
 
         They need not be narrow on both sides of the limits (k, 2) of the integrals.
         """
-        pieces, parts = self._settled
-        while parts.shape[1]:
-            spread = parts[..., 1] - parts[..., 0]  # infinite where there is no bound
-            low, high = parts.sum(axis=0).T
+        pieces, integrals = self._settled
+        while integrals.shape[1]:
+            spread = integrals[..., 1] - integrals[..., 0]  # infinite where there is no bound
+            low, high = integrals.sum(axis=0).T
             astride = ((low[:, None] < limits) & (limits < high[:, None])).any(axis=1)
-            known = np.isfinite(low) & np.isfinite(high) & ~astride
-            wanted = np.where(known, MEAN_SHARPNESS * np.maximum(np.abs(low), np.abs(high)), 0.0)
+            bounded = np.isfinite(low) & np.isfinite(high) & ~astride
+            wanted = np.where(bounded, MEAN_SHARPNESS * np.maximum(np.abs(low), np.abs(high)), 0.0)
             again: Flags = (spread > wanted / len(pieces)).any(axis=1) & (spread.sum(axis=0) > wanted).any()
             if not again.any() or len(pieces) + again.sum() > MOST_MEAN_PIECES:
                 break
             finer = halve_pieces(pieces[again])
             forms = self._enclose(self._rows.whole, finer)
             pieces = np.concatenate([pieces[~again], finer])
-            parts = np.concatenate([parts[~again], self._integrate(finer, forms)])
-        self._settled = pieces, parts
+            integrals = np.concatenate([integrals[~again], self._integrate(finer, forms)])
+        self._settled = pieces, integrals
 
     def _integrate(self, pieces: Array, forms: AffineForms) -> Array:
         """Return (P, k, 2) bounds of the integrals over pieces; the slope of a form has no effect."""

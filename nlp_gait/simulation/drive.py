@@ -64,14 +64,16 @@ class Drive:
         """Return the damping of a joint's drive [Nm s/rad]."""
         return self.stiffness(joint) * self.time_constant_s
 
-    def set_points(self, at: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
+    def set_points(self, sample: Callable[[str, Array], Array], times: Array, joints: Sequence[Joint]) -> Array:
         """Return the set-points at times (T,) [s] of joints, (T, J) [rad]: planned angles, shifted by the feed-forward.
 
         ``at`` returns planned ``q`` [rad], ``qd`` [rad/s] and ``tau`` [Nm] at any times (N,), each (N, J).
         """
         before, share = np.divmod(times / self.period_s + ROUNDING, 1.0)
         last = int(before[-1]) + 1
-        sent = self._shift(joints, *(at(name, self.period_s * np.arange(last + 1.0)) for name in ("q", "qd", "tau")))
+        sent = self._shift(
+            joints, *(sample(name, self.period_s * np.arange(last + 1.0)) for name in ("q", "qd", "tau"))
+        )
         k = before.astype(int)
         if self.interpolation == "held":
             return sent[k]

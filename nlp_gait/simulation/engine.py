@@ -48,9 +48,9 @@ class Addresses:
         self.soles = np.array([model.site(side).id for side in SIDES])
         self.foot_of_geometry = np.full(model.ngeom, -1)
         for i, side in enumerate(SIDES):
-            for part in (plan.robot.feet, plan.robot.toes):
-                if side in part:
-                    self.foot_of_geometry[model.geom_bodyid == model.body(part[side].link).id] = i
+            for contacts in (plan.robot.feet, plan.robot.toes):
+                if side in contacts:
+                    self.foot_of_geometry[model.geom_bodyid == model.body(contacts[side].link).id] = i
 
 
 # Between two commands of a controller: NAO's has cycles of 10 ms, the engine steps of 0.5 ms.

@@ -117,22 +117,24 @@ class BalanceController:
 
     def correct(self, command: Array, data: Any) -> Array:
         """Return the set-points (J,) [rad] instead of the planned ones; call it once in each step of the engine."""
-        seen = self._sensor.read(data)
-        if seen is not None:
-            self._shift = self._torques(seen) / self._stiffness
+        measured = self._sensor.read(data)
+        if measured is not None:
+            self._shift = self._torques(measured) / self._stiffness
         return command + self._shift
 
-    def _torques(self, seen: SensorValues) -> Array:
+    def _torques(self, measured: SensorValues) -> Array:
         """Return the joint torques (J,) of the springs' force and moment [Nm]."""
-        settings, plan, at = self._feedback, self._plan, np.array([seen.step * self._sensor.step_s])
-        share = compute_load_shares(plan, at)[0]
-        planned, soles = self._planned_posture(at, int(share[1] > share[0]))
-        feet = np.stack([plan.at(f"{side}_foot", at)[0] for side in SIDES])
-        place = plan.at("hip", at)[0] - share @ feet
-        force = settings.spring_N_per_m * (place - share @ seen.places)
-        force += settings.damper_Ns_per_m * (plan.rate("hip", at)[0] - seen.velocity)
-        moment = settings.tilt_spring_Nm_per_rad * (to_rotation_vector(planned @ seen.attitude.T) - seen.tilt_error)
-        moment -= settings.tilt_damper_Nms_per_rad * seen.rate
+        settings, plan, time = self._feedback, self._plan, np.array([measured.step * self._sensor.step_s])
+        share = compute_load_shares(plan, time)[0]
+        planned, soles = self._planned_posture(time, int(share[1] > share[0]))
+        feet = np.stack([plan.at(f"{side}_foot", time)[0] for side in SIDES])
+        place = plan.at("hip", time)[0] - share @ feet
+        force = settings.spring_N_per_m * (place - share @ measured.places)
+        force += settings.damper_Ns_per_m * (plan.rate("hip", time)[0] - measured.velocity)
+        moment = settings.tilt_spring_Nm_per_rad * (
+            to_rotation_vector(planned @ measured.attitude.T) - measured.tilt_error
+        )
+        moment -= settings.tilt_damper_Nms_per_rad * measured.rate
         wrench = np.concatenate([force, moment])
         integral = self._integral + settings.growth_per_s * settings.period_s * wrench
         self._integral = np.clip(integral, -self._most, self._most)
@@ -140,22 +142,22 @@ class BalanceController:
         force, moment = planned.T @ wrench[:3], planned.T @ wrench[3:]  # in the torso's planned axes
         torques = np.zeros(len(self._at.rates))
         moving, turning = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
-        for part, sole, foot in zip(share, self._at.soles, soles, strict=True):
-            if part > 0.0:  # with a fixed foot, the torso moves opposite to the foot under a fixed torso
+        for load_share, sole, foot in zip(share, self._at.soles, soles, strict=True):
+            if load_share > 0.0:  # with a fixed foot, the torso moves opposite to the foot under a fixed torso
                 self._engine.mj_jacSite(self._model, self._posture, moving, turning, sole)
                 at_foot = moment - np.cross(foot, force)
-                torques -= part * (moving[:, self._at.rates].T @ force + turning[:, self._at.rates].T @ at_foot)
+                torques -= load_share * (moving[:, self._at.rates].T @ force + turning[:, self._at.rates].T @ at_foot)
         return torques
 
-    def _planned_posture(self, at: Array, standing: int) -> tuple[Array, Array]:
+    def _planned_posture(self, time: Array, standing: int) -> tuple[Array, Array]:
         """Return the planned attitude (3, 3) of the torso, by the flat supporting sole, and the soles (2, 3) in its axes [m]."""
         posture = self._posture
         posture.qpos[:] = self._model.qpos0
-        posture.qpos[self._at.angles] = self._plan.at("q", at)[0]
+        posture.qpos[self._at.angles] = self._plan.at("q", time)[0]
         self._engine.mj_kinematics(self._model, posture)
         self._engine.mj_comPos(self._model, posture)
         attitude = posture.site_xmat[self._at.soles[standing]].reshape(3, 3).T
-        (x, y, z), (cos, sin) = attitude, self._plan.direction(standing, at)[0]
+        (x, y, z), (cos, sin) = attitude, self._plan.direction(standing, time)[0]
         attitude = np.stack([cos * x - sin * y, sin * x + cos * y, z])
         return attitude, posture.site_xpos[self._at.soles] - posture.xpos[self._at.torso]
 

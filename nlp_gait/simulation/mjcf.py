@@ -44,8 +44,8 @@ def make_plan_model(plan: Plan, drive: Drive, sole: str = "rectangle", friction:
         "gravity": _format_numbers(*tilt_gravity(plan.gravity, plan.slope_rad)),
     }
     default[0].set("friction", _format_numbers(friction, TURNING_FRICTION, ROLLING_FRICTION))
-    for link, parts in shapes.items():
-        for i, shape in enumerate(parts):
+    for link, link_shapes in shapes.items():
+        for i, shape in enumerate(link_shapes):
             if isinstance(shape, Prism):
                 levels = (shape.bottom, shape.bottom + shape.thickness)
                 corners = [value for z in levels for x, y in shape.outline for value in (x, y, z)]
@@ -154,7 +154,7 @@ def find_sides(robot: Robot) -> dict[str, str]:
     above = {link: {link, *(joint.child for joint in robot.path_to_root(link))} for link in robot.links}
     sides = {}
     for link in robot.links:
-        found = [side for side, foot in robot.feet.items() if link in above[foot.link] or foot.link in above[link]]
-        if len(found) == 1:
-            sides[link] = found[0]
+        matching = [side for side, foot in robot.feet.items() if link in above[foot.link] or foot.link in above[link]]
+        if len(matching) == 1:
+            sides[link] = matching[0]
     return sides

@@ -90,7 +90,7 @@ def make_skeleton(recording: Recording, sole: str, title: str) -> Skeleton:
             else:
                 soles.append(Sole(side=side, corners=points, supports=loaded[:, SIDES.index(side)]))
     pressure = _hold_last(average_pressure(recording.simulation, PRESSURE_WINDOW_S)[steps])
-    everything = np.concatenate([part.points for part in limbs], axis=1)[..., 0]
+    everything = np.concatenate([limb.points for limb in limbs], axis=1)[..., 0]
     return Skeleton(
         t=recording.simulation.t[steps],
         limbs=tuple(limbs),
@@ -105,11 +105,11 @@ def make_skeleton(recording: Recording, sole: str, title: str) -> Skeleton:
 
 def _hold_last(values: Array) -> Array:
     """Return rows where unknown ones (NaN, in flight) repeat the last known one, or the first."""
-    known = np.isfinite(values[:, 0])
-    if not known.any():
+    measured = np.isfinite(values[:, 0])
+    if not measured.any():
         return np.zeros_like(values)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), 0))
-    return np.where(known[last, None], values[last], values[np.argmax(known)])
+    last = np.maximum.accumulate(np.where(measured, np.arange(len(values)), 0))
+    return np.where(measured[last, None], values[last], values[np.argmax(measured)])
 
 
 def _outline_ground(treads: tuple[Tread, ...], first: float, last: float) -> Array:

@@ -70,7 +70,7 @@ class Conditions:
 
     def gravity(self, magnitude: float, planned_rad: float = 0.0) -> tuple[float, float, float]:
         """Return gravity in the axes of the sloping floor [m/s^2]; the planned slope rises forward."""
-        x, y = (math.tan(slope + more) for slope, more in zip(self.slope_rad, (planned_rad, 0.0), strict=True))
+        x, y = (math.tan(slope + planned) for slope, planned in zip(self.slope_rad, (planned_rad, 0.0), strict=True))
         scale = magnitude / math.sqrt(1.0 + x * x + y * y)
         return (-x * scale, -y * scale, -scale)
 
@@ -111,7 +111,7 @@ def simulate_plan(
     engine = load_mujoco()
     drive, conditions = drive or Drive(), conditions or Conditions()
     model, data = prepare(plan, conditions, drive, sole)
-    at = Addresses(model, plan)
+    addresses = Addresses(model, plan)
     steps = round((plan.duration_s + SETTLE_TIME) / TIME_STEP)
     times = np.linspace(0.0, steps * TIME_STEP, steps, endpoint=False)
     commands = drive.set_points(plan.at, times, [plan.robot.joint(name) for name in plan.joints])
@@ -125,17 +125,17 @@ def simulate_plan(
     for t, command, axis, least_height in zip(times.tolist(), commands, axes_planned, least_heights, strict=True):
         if balance is not None:
             command[:] = balance.correct(command, data)  # in place: the result contains these set-points
-        data.ctrl[at.actuators] = command
+        data.ctrl[addresses.actuators] = command
         if push is not None:
-            data.xfrc_applied[at.torso, :2] = push.force(t - pushed_s)
+            data.xfrc_applied[addresses.torso, :2] = push.force(t - pushed_s)
         if on_step is not None:
             on_step(model, data)
-        q, qd = data.qpos[at.angles], data.qvel[at.rates]
+        q, qd = data.qpos[addresses.angles], data.qvel[addresses.rates]
         engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
-        torso, axes = data.xpos[at.torso].copy(), data.xmat[at.torso]
+        torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
         upright, heading = float(axes[2::3] @ axis), math.atan2(axes[3], axes[0])
-        feet, torque = data.site_xpos[at.soles], data.actuator_force[at.actuators]
-        rows.append((q, qd, torque, torso, upright, heading, feet, *_measure_pressure(data, at)))
+        feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
+        rows.append((q, qd, torque, torso, upright, heading, feet, *_measure_pressure(data, addresses)))
         diverged = not np.isfinite(data.qvel).all()
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
@@ -158,7 +158,7 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     model.opt.gravity[:] = conditions.gravity(plan.gravity, plan.slope_rad)
     data = engine.MjData(model)
     engine.mj_setConst(model, data)
-    at, start = Addresses(model, plan), np.zeros(1)
+    addresses, start = Addresses(model, plan), np.zeros(1)
     data.qvel[:] = 0.0
     # The root's coordinates are the engine's first.
     (x, y, z), (vx, vy, vz) = plan.at("hip", start)[0], plan.rate("hip", start)[0]
@@ -169,17 +169,17 @@ def prepare(plan: Plan, conditions: Conditions, drive: Drive, sole: str) -> tupl
     else:
         data.qpos[:3], data.qpos[3:7] = (x, y, z), attitude
         data.qvel[:3], data.qvel[3:6] = (vx, vy, vz), spin
-    data.qpos[at.angles], data.qvel[at.rates] = plan.at("q", start)[0], plan.rate("q", start)[0]
+    data.qpos[addresses.angles], data.qvel[addresses.rates] = plan.at("q", start)[0], plan.rate("q", start)[0]
     engine.mj_forward(model, data)
     return model, data
 
 
-def _measure_pressure(data: Any, at: Addresses) -> tuple[Array, Array]:
+def _measure_pressure(data: Any, addresses: Addresses) -> tuple[Array, Array]:
     """Return the normal forces on both feet (2,) [N] and the centre of pressure (2,) [m], from all contacts with the floor."""
     contact = data.contact
     active = contact.efc_address >= 0
     forces = data.efc_force[contact.efc_address[active]]  # the first row of an elliptic contact is along its normal
-    feet = at.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's geometries come first
+    feet = addresses.foot_of_geometry[contact.geom[active].max(axis=1)]  # the ground's geometries come first
     loads = np.array([forces[feet == i].sum() for i in range(len(SIDES))])
     total = forces.sum()
     centre = forces @ contact.pos[active, :2] / total if total > LEAST_LOAD else np.full(2, np.nan)
@@ -219,13 +219,13 @@ def measure_robustness(plan: Plan, drive: Drive | None = None) -> Robustness:
         return Conditions(slope_rad=(math.radians(x), math.radians(y)))
 
     def find_largest(make: Callable[[float, float], Conditions], step: float, most: float) -> dict[str, float]:
-        found = {}
+        largest = {}
         for direction, (x, y) in DIRECTIONS.items():
             steps = 1
             while steps * step <= most and survives(make(x * steps * step, y * steps * step)):
                 steps += 1
-            found[direction] = round((steps - 1) * step, 9)
-        return found
+            largest[direction] = round((steps - 1) * step, 9)
+        return largest
 
     return Robustness(
         undisturbed=survives(Conditions()),

@@ -92,14 +92,13 @@ def newton_euler(
     shares, pushes = shares or {}, pushes or {}
     rotations = [relative_rotation(body, q) for body in tree]
     moved: list[tuple[SX, SX, SX, SX]] = []  # spin, its rate, turning and acceleration of each body
-    # What the motion of each body needs, about its reference point, in its axes.
-    forces: list[SX] = []
-    moments: list[SX] = []
+    wrenches: list[Wrench] = []  # that the motion of each body needs, about its reference point, in its axes
     down = gravity if isinstance(gravity, tuple) else (0.0, 0.0, -gravity)
     for body, inertia, rotation in zip(tree, regroup_inertias(tree, shares), rotations, strict=True):
         spin, spin_rate = SX(3, 1), SX(3, 1)
         if body.joint is None:
-            acceleration = SX(DM([0.0 - part for part in down]))  # gravity as an upward acceleration of the ground
+            # gravity as an upward acceleration of the ground
+            acceleration = SX(DM([0.0 - component for component in down]))
         else:
             parent_spin, parent_spin_rate, parent_turning, parent_acceleration = moved[body.parent]
             acceleration = rotation.T @ (parent_acceleration + parent_turning @ DM(body.offset_m))
@@ -117,20 +116,26 @@ def newton_euler(
             force, moment = force * shares[body.link.name], moment * shares[body.link.name]
         if body.link.name in pushes:  # its joint does not transmit them
             force, moment = force - pushes[body.link.name].force, moment - pushes[body.link.name].moment
-        forces.append(force)
-        moments.append(moment)
+        wrenches.append(Wrench(force, moment))
+    return _pass_down(tree, rotations, wrenches, qdd), wrenches[0]
+
+
+def _pass_down(
+    tree: Sequence[TreeBody], rotations: Sequence[SX], wrenches: list[Wrench], qdd: Mapping[str, SX]
+) -> dict[str, SX]:
+    """Add the wrench of each body to that of its parent; return the torque of each joint."""
     torques: dict[str, SX] = {}
     for i in range(len(tree) - 1, 0, -1):
         body = tree[i]
         assert body.joint is not None  # only the first body has none; for the type checker
-        torques[body.joint.name] = body.direction * ca.dot(DM(body.joint.axis), moments[i])
+        torques[body.joint.name] = body.direction * ca.dot(DM(body.joint.axis), wrenches[i].moment)
         if body.armature_kgm2:
             torques[body.joint.name] += body.armature_kgm2 * qdd[body.joint.name]
-        force = rotations[i] @ forces[i]
-        moment = rotations[i] @ moments[i]
-        forces[body.parent] += force
-        moments[body.parent] += moment + ca.cross(SX(DM(body.offset_m)), force)
-    return torques, Wrench(forces[0], moments[0])
+        force, moment = (rotations[i] @ vector for vector in wrenches[i])
+        below = wrenches[body.parent]
+        lever = ca.cross(SX(DM(body.offset_m)), force)
+        wrenches[body.parent] = Wrench(below.force + force, below.moment + (moment + lever))
+    return torques
 
 
 def regroup_inertias(tree: Sequence[TreeBody], kept: Collection[str] = ()) -> list[Inertia]:

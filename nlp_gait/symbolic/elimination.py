@@ -34,8 +34,8 @@ class Factors:
         x = [SX(0)] * len(b)
         for k in reversed(range(len(self.order))):
             row, column = self.order[k]
-            known = sum((self.factors[row][later] * x[later] for _, later in self.order[k + 1 :]), SX(0))
-            x[column] = (b[row] - known) * self.inverses[k]
+            solved = sum((self.factors[row][later] * x[later] for _, later in self.order[k + 1 :]), SX(0))
+            x[column] = (b[row] - solved) * self.inverses[k]
         return ca.vertcat(*x)
 
 

@@ -64,7 +64,9 @@ def turn_torso(torso: TorsoMotion, yaw: Motion, foot_yaw: Motion) -> TorsoMotion
         rotation=turn @ torso.rotation,
         spin=spin + up * heading.velocity,
         spin_rate=rate + up * heading.acceleration + heading.velocity * ca.cross(up, spin),
-        place=map_motion(lambda at: axis_rotation(UP, -at[0]) @ at[1:], stack(foot_yaw, torso.place)),
+        place=map_motion(
+            lambda yaw_and_place: axis_rotation(UP, -yaw_and_place[0]) @ yaw_and_place[1:], stack(foot_yaw, torso.place)
+        ),
     )
 
 
@@ -186,17 +188,19 @@ def _knee_cosine(leg: Leg, distance_squared: SX) -> SX:
     return (distance_squared - float(u @ u + w @ w) - 2 * leg.knee_terms[0]) / (2 * leg.knee_gain)
 
 
-def _solve_ankle(fifth: Array, sixth: Array, m: SX, seen: SX, at_zero: Array) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
+def _solve_ankle(
+    fifth: Array, sixth: Array, m: SX, direction: SX, at_zero: Array
+) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
     """Solve Rot(fifth) Rot(sixth) seen = m for the rotations of the ankle: Paden's and Kahan's second subproblem."""
     c = float(fifth @ sixth)
     normal = np.cross(fifth, sixth)
     sine_squared = float(normal @ normal)
-    x, y = ca.dot(DM(fifth), m), ca.dot(DM(sixth), seen)
+    x, y = ca.dot(DM(fifth), m), ca.dot(DM(sixth), direction)
     alpha, beta = (x - c * y) / sine_squared, (y - c * x) / sine_squared
-    left = (ca.sumsqr(seen) - alpha**2 - beta**2 - 2 * c * alpha * beta) / sine_squared
+    left = (ca.sumsqr(direction) - alpha**2 - beta**2 - 2 * c * alpha * beta) / sine_squared
     sign = 1.0 if float(at_zero @ normal) >= 0 else -1.0
     between = alpha * DM(fifth) + beta * DM(sixth) + sign * ca.sqrt(ca.fmax(left, TINY)) * DM(normal)
-    return find_rotation(fifth, between, m), find_rotation(sixth, seen, between)
+    return find_rotation(fifth, between, m), find_rotation(sixth, direction, between)
 
 
 def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[SX, SX], tuple[SX, SX]]:
@@ -207,9 +211,9 @@ def _solve_hip(axes: Array, third: SX, first: SX) -> tuple[tuple[SX, SX], tuple[
     gain = float(np.hypot(along, across))
     # cos(q2 - delta) = kappa, with q2 = 0 on the same side of delta
     kappa = ca.fmax(-1, ca.fmin(1, (ca.dot(DM(a), third) - constant) / gain))
-    rest = -np.sign(across) * ca.sqrt(ca.fmax(1 - kappa**2, TINY))
+    sine = -np.sign(across) * ca.sqrt(ca.fmax(1 - kappa**2, TINY))
     cos_d, sin_d = along / gain, across / gain
-    two = cos_d * kappa - sin_d * rest, sin_d * kappa + cos_d * rest
+    two = cos_d * kappa - sin_d * sine, sin_d * kappa + cos_d * sine
     one = find_rotation(a, rotate_vector(SX(DM(b)), *two, SX(DM(c))), third)
     back = find_rotation(c, rotate_vector(SX(DM(b)), *invert_turn(two), SX(DM(a))), first)
     return one, two, invert_turn(back)
@@ -236,8 +240,8 @@ def _build_chain(leg: Leg, cosines: SX, sines: SX) -> _Chain:
 
 def _compute_misfit(leg: Leg, chain: _Chain, hip: SX, rotation: SX) -> SX:
     """Return (6,) the misfit of the hip centre in lengths of the leg, and of the torso's rotation as a vector [rad]."""
-    found = chain.rotations[0]
-    turn = sum((ca.cross(found[:, k], rotation[:, k]) for k in range(3)), SX(3, 1)) / 2
+    turned = chain.rotations[0]
+    turn = sum((ca.cross(turned[:, k], rotation[:, k]) for k in range(3)), SX(3, 1)) / 2
     return ca.vertcat((hip - chain.hip) / leg.length_m, turn)
 
 

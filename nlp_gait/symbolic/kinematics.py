@@ -78,7 +78,7 @@ def leg_angles(hip_to_ankle: Motion, thigh: float, tibia: float, margin: SX, ops
         Gupta, Pratihar, Deb (2023), eqs. (5)-(14) with the hip yaw-pitch angle at zero; the arcsine of eq. (9) replaced by the
         two-argument arctangent, rates by differentiating in closed form: (K.5) to (K.17) in docs/model.
     """
-    (x, y, z), (xd, yd, zd), (xdd, ydd, zdd) = (ca.vertsplit(part) for part in hip_to_ankle)
+    (x, y, z), (xd, yd, zd), (xdd, ydd, zdd) = (ca.vertsplit(vector) for vector in hip_to_ankle)
 
     # Roll: the leg's plane, from y and z. Length is that of the leg seen along the roll axis.
     length_squared = ca.fmax(y * y + z * z, LEAST_LEG_LENGTH**2)

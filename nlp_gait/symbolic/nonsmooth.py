@@ -147,16 +147,16 @@ class Lifted(Nonsmooth):
 
     def root(self, root: Root, inputs: SX) -> SX:
         """Return a symbol that a row must tie; or the result of Newton's method, to be differentiated."""
-        found = root.newton(inputs)
+        solution = root.newton(inputs)
         if not root.lift:
-            return found
-        unknowns = SX.sym(f"unknown_{len(self._open)}", found.shape[0])
-        self._open.append(OpenRoots(unknowns, root.residual(unknowns, inputs), found))
+            return solution
+        unknowns = SX.sym(f"unknown_{len(self._open)}", solution.shape[0])
+        self._open.append(OpenRoots(unknowns, root.residual(unknowns, inputs), solution))
         return unknowns
 
     def open_roots(self) -> OpenRoots | None:
-        found, self._open = self._open, []
-        return OpenRoots(*(ca.vertcat(*parts) for parts in zip(*found, strict=True))) if found else None
+        roots, self._open = self._open, []
+        return OpenRoots(*(ca.vertcat(*columns) for columns in zip(*roots, strict=True))) if roots else None
 
     def tie_roots(self, start: MX, residual: Callable[[MX], MX]) -> MX:
         columns = start.shape

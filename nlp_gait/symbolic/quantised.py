@@ -111,11 +111,11 @@ def solve_definite(A: SX, B: SX) -> SX:
     for k in range(n):
         for i in range(k + 1, n):
             rows[i] = rows[i] - rows[i][k] / rows[k][k] * rows[k]
-    found = [row[n:] for row in rows]
+    solution = [row[n:] for row in rows]
     for i in reversed(range(n)):
-        known = sum((rows[i][k] * found[k] for k in range(i + 1, n)), SX(1, B.shape[1]))
-        found[i] = (rows[i][n:] - known) / rows[i][i]
-    return ca.vertcat(*found)
+        solved = sum((rows[i][k] * solution[k] for k in range(i + 1, n)), SX(1, B.shape[1]))
+        solution[i] = (rows[i][n:] - solved) / rows[i][i]
+    return ca.vertcat(*solution)
 
 
 class Controller(NamedTuple):

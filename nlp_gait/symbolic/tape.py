@@ -67,20 +67,21 @@ def tabulate_last_input(function: ca.Function, values: DM) -> tuple[ca.Function,
     Returns:
         The function with a vector (k,) in place of its last input, and that vector's values (k, n).
     """
-    *others, last = function.sx_in()
+    *first_inputs, last = function.sx_in()
     with _without_simplification():
-        outputs = function.call([*others, last])
+        outputs = function.call([*first_inputs, last])
         remaining, symbols, extracted = ca.extract_parametric(outputs, last, {"extract_trivial": True})
     table = ca.Function("table", [last], [ca.vertcat(*extracted)]).map(values.shape[1])
     names = function.name_in(), function.name_out()
-    return ca.Function(function.name(), [*others, ca.vertcat(*symbols)], remaining, *names), table(values)
+    return ca.Function(function.name(), [*first_inputs, ca.vertcat(*symbols)], remaining, *names), table(values)
 
 
 class _Rewriter:
     def __init__(self, symbols: Sequence[SX], tape: Sequence[Instruction]) -> None:
         self._symbols = symbols
         self._tape = tape
-        self._divisions = Counter(each.arguments[1] for each in tape if each.operation == ca.OP_DIV)  # by each divisor
+        divisions = [instruction for instruction in tape if instruction.operation == ca.OP_DIV]
+        self._divisions = Counter(instruction.arguments[1] for instruction in divisions)  # by each divisor
         self._values: list[SX] = []
         self._reciprocals: dict[int, SX] = {}
 

@@ -102,8 +102,8 @@ def _differentiate(values: list[SX], knots: Array, degree: int, _: SX) -> list[S
     ]
 
 
-def _divide(part: SX, width: float) -> SX:
-    return part / float(width) if width > 0.0 else SX(0)  # 0 on a span without width
+def _divide(dividend: SX, width: float) -> SX:
+    return dividend / float(width) if width > 0.0 else SX(0)  # 0 on a span without width
 
 
 def cubic(start: SX, end: SX, start_velocity: SX, end_velocity: SX, duration: SX, phase: SX) -> Motion:
@@ -176,4 +176,4 @@ def resting_point(place: Sequence[float]) -> Motion:
 
 def stack(*motions: Motion) -> Motion:
     """Stack motions to one vector motion."""
-    return Motion(*(ca.vertcat(*parts) for parts in zip(*motions, strict=True)))
+    return Motion(*(ca.vertcat(*values) for values in zip(*motions, strict=True)))

@@ -68,42 +68,44 @@ class Hessian:
         assembler.evaluate(SECOND, values, places, (symbols, weights))
         for i, j, place in zip(first, second, places.tolist(), strict=True):
             rows = assembler.derivatives[i], assembler.derivatives[j]
-            for row, other in [rows] if i == j else [rows, rows[::-1]]:
-                _add_outer(row, other, place, contributions)
+            for row, second_row in [rows] if i == j else [rows, rows[::-1]]:
+                _add_outer(row, second_row, place, contributions)
 
     def _add_samples(self, samples: StagePlaces, bar: int, contributions: Products) -> None:
-        plan, found, count = self.plan, samples.derivatives, samples.count
+        plan, derivatives, count = self.plan, samples.derivatives, samples.count
         ma, nv = len(samples.active), len(samples.used)
-        number = plan.add_function(found.second)
+        number = plan.add_function(derivatives.second)
         weights = PlaceBlock(bar, nv, nv, 1, 0)
         gradient = plan.allocate(count * ma)
         write = PlaceBlock(gradient, ma, ma, 1, 0)
         pattern = np.zeros((ma, ma), bool)
-        pattern[tuple(found.hessian.get_triplet())] = True
-        if found.directional:
+        pattern[tuple(derivatives.hessian.get_triplet())] = True
+        if derivatives.directional:
             place = plan.allocate(count * ma * samples.width)
             change = PlaceBlock(place, ma * samples.width, ma, samples.width, 1)
             given = (samples.read, weights, samples.place_directions(plan))
             plan.add_call(SECOND, Call(number, count, samples.count_directions(), given, (write, change)))
         else:
-            upper = ca.triu(found.hessian)
+            upper = ca.triu(derivatives.hessian)
             place = plan.allocate(count * upper.nnz())
             change = PlaceBlock(place, upper.nnz(), upper.nnz(), 1, 0)
             plan.add_call(SECOND, Call(number, count, None, (samples.read, weights), (write, change)))
-            at = np.full((ma, ma), -1)
+            entry_of = np.full((ma, ma), -1)
             i, j = upper.get_triplet()
-            at[i, j] = at[j, i] = np.arange(upper.nnz())
+            entry_of[i, j] = entry_of[j, i] = np.arange(upper.nnz())
         for e in range(count):
             for a in range(ma):
                 row = samples.rows[e][a]
                 if samples.by_column:
-                    parts = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
-                    columns = unite(parts)
+                    changed = [samples.rows[e][b].columns for b in np.flatnonzero(pattern[a])]
+                    columns = unite(changed)
                     places = place + (e * ma + a) * samples.width + np.searchsorted(samples.columns[e], columns)
                     _add_outer(row, Row(columns, places), ONE, contributions)
                     continue
                 for b in np.flatnonzero(pattern[a]):
-                    factor = place + ((e * ma + a) * ma + b if found.directional else e * upper.nnz() + at[a, b])
+                    factor = place + (
+                        (e * ma + a) * ma + b if derivatives.directional else e * upper.nnz() + entry_of[a, b]
+                    )
                     _add_outer(row, samples.rows[e][b], int(factor), contributions)
         places = np.full(len(samples.glue.entries), -1)
         for a, i in enumerate(samples.active):
@@ -113,13 +115,13 @@ class Hessian:
         self._add_glue(glue, places[rows], contributions)
 
 
-def _add_outer(row: Row, other: Row, factor: int, contributions: Products) -> None:
+def _add_outer(row: Row, second_row: Row, factor: int, contributions: Products) -> None:
     """Add the products of each entry d of a row with the entries c <= d of another one, times a factor."""
     for column, place in zip(row.columns.tolist(), row.places.tolist(), strict=True):
-        end = int(np.searchsorted(other.columns, column, side="right"))
+        end = int(np.searchsorted(second_row.columns, column, side="right"))
         if end:
-            part = Row(other.columns[:end], other.places[:end])
-            contributions.append((np.full(end, column), part.columns, part, place, factor))
+            low = Row(second_row.columns[:end], second_row.places[:end])
+            contributions.append((np.full(end, column), low.columns, low, place, factor))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

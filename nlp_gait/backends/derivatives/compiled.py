@@ -27,26 +27,26 @@ UNARY = ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sin
 BINARY = ("pow", "fmod", "copysign", "fmin", "fmax", "atan2", "hypot")
 
 
-def write_nlp_source(found: NlpPlan) -> str:
+def write_nlp_source(nlp_plan: NlpPlan) -> str:
     """Return C++ of an NLP's functions (see ``native/nlp.hpp``); the lane count is the macro LANES."""
-    plan = found.plan
-    m, n = found.jacobian.shape
+    plan = nlp_plan.plan
+    m, n = nlp_plan.jacobian.shape
     phases = dict(zip(("value", "first", "second"), plan.steps, strict=True))
     sizes = {
         "VARIABLES": n,
-        "PARAMETERS": found.parameters,
+        "PARAMETERS": nlp_plan.parameters,
         "ROWS": m,
         "SIZE": plan.size,
         "MOST_IN": max((function.nnz_in() for function in plan.functions), default=1),
         "MOST_OUT": max((function.nnz_out() for function in plan.functions), default=1),
-        "W": found.w,
-        "P": found.p,
-        "VALUE": found.rows,
-        "WEIGHT": found.weights,
-        "GRADIENT": found.gradient,
-        "HESSIAN": found.hessian_place,
-        "HESSIAN_NONZEROS": found.hessian.nnz(),
-        "JACOBIAN_NONZEROS": found.jacobian.nnz(),
+        "W": nlp_plan.w,
+        "P": nlp_plan.p,
+        "VALUE": nlp_plan.rows,
+        "WEIGHT": nlp_plan.weights,
+        "GRADIENT": nlp_plan.gradient,
+        "HESSIAN": nlp_plan.hessian_place,
+        "HESSIAN_NONZEROS": nlp_plan.hessian.nnz(),
+        "JACOBIAN_NONZEROS": nlp_plan.jacobian.nnz(),
         "INITIALS": len(plan.initial),
         **{f"{phase.upper()}_STEPS": len(steps) for phase, steps in phases.items()},
     }
@@ -54,7 +54,7 @@ def write_nlp_source(found: NlpPlan) -> str:
         f"case {CODES[operation]}: r = {expression.format('a', 'b', f='s_')}; break;"
         for operation, expression in EXPRESSIONS.items()
     )
-    parts = [
+    sources = [
         "#include <stdlib.h>\n#include <string.h>",
         read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
         read_native_source("nlp_gait.backends.derivatives", "operations.hpp"),
@@ -64,18 +64,18 @@ def write_nlp_source(found: NlpPlan) -> str:
         *(write_function(f"function_{i}", function) for i, function in enumerate(plan.functions)),
         write_array("int", "initial_place", plan.initial),
         write_array("double", "initial_value", map(format_number, plan.initial.values())),
-        write_array("int", "jacobian_place", found.jacobian_places.tolist()),
-        write_array("long long int", "jacobian_sparsity", _compress(found.jacobian)),
-        write_array("long long int", "hessian_sparsity", _compress(found.hessian)),
+        write_array("int", "jacobian_place", nlp_plan.jacobian_places.tolist()),
+        write_array("long long int", "jacobian_sparsity", _compress(nlp_plan.jacobian)),
+        write_array("long long int", "hessian_sparsity", _compress(nlp_plan.hessian)),
         _write_rows("tape", 4, plan.tape),
         _write_rows("runs", 4, plan.runs),
         _write_rows("products", 5, plan.products),
         *(_write_rows(f"{phase}_steps", 3, steps) for phase, steps in phases.items()),
-        _write_calls(found),
+        _write_calls(nlp_plan),
         f"#define OPERATIONS {cases}",
         read_native_source("nlp_gait.backends.derivatives", "nlp.hpp"),
     ]
-    return "\n".join(parts)
+    return "\n".join(sources)
 
 
 def _write_rows(name: str, width: int, rows: Iterable[Sequence[int]]) -> str:
@@ -96,14 +96,14 @@ def _compress(sparsity: ca.Sparsity) -> Sequence[int]:
     return [*sparsity.shape, *sparsity.colind(), *sparsity.row()]
 
 
-def _write_calls(found: NlpPlan) -> str:
+def _write_calls(nlp_plan: NlpPlan) -> str:
     lines = [
         "struct Block { int base, sample, length, step, direction; };",
         "struct Call {\n  void (*function)(const Vector*, Vector*);\n  int count;\n  const int* directions;\n"
         "  const Block *inputs, *outputs, *end;\n};",
     ]
     rows = []
-    for i, call in enumerate(found.plan.calls):
+    for i, call in enumerate(nlp_plan.plan.calls):
         lines.append(
             write_array("Block", f"blocks_{i}", [_format_braces(block) for block in call.inputs + call.outputs])
         )
@@ -167,11 +167,11 @@ class CompiledNlp:
         agreeing = checked = 0
         for _ in range(MOST_POINTS):
             w, d, weights = rng.uniform(0.0, 1.0, n), rng.uniform(-1.0, 1.0, n), rng.uniform(-1.0, 1.0, m)
-            slope, other = (
+            slope, wider = (
                 (_join_numbers(machine(w + step * d, p)) - _join_numbers(machine(w - step * d, p))) / (2 * step)
                 for step in (STEP, OTHER_STEP)
             )
-            if not _agree(slope, other):
+            if not _agree(slope, wider):
                 continue
             (f, gradient), (g, J) = (self.functions[name](w, p) for name in ("nlp_grad_f", "nlp_jac_g"))
             pairs = [
@@ -200,17 +200,17 @@ def _hash_generator() -> str:
     digest = hashlib.sha256(files("nlp_gait.symbolic").joinpath("tape.py").read_bytes())
     backends = files("nlp_gait.backends")
     for folder in ("derivatives", "derivatives/native", "kernel/native"):
-        for file in sorted(backends.joinpath(folder).iterdir(), key=lambda each: each.name):
+        for file in sorted(backends.joinpath(folder).iterdir(), key=lambda file: file.name):
             if file.name.endswith((".py", ".hpp")):
                 digest.update(file.read_bytes())
     return digest.hexdigest()
 
 
-def _join_numbers(parts: Any) -> Array:
-    return np.concatenate([ca.DM(part).full().ravel() for part in parts])
+def _join_numbers(matrices: Any) -> Array:
+    return np.concatenate([ca.DM(matrix).full().ravel() for matrix in matrices])
 
 
-def _agree(expected: Array, found: Array) -> bool:
+def _agree(expected: Array, computed: Array) -> bool:
     """Return whether the numbers agree, relative to the largest one; NaN must agree, too."""
     scale = np.abs(expected[np.isfinite(expected)]).max(initial=1e-6)
-    return bool(np.allclose(found, expected, rtol=0.0, atol=CHECK_TOLERANCE * scale, equal_nan=True))
+    return bool(np.allclose(computed, expected, rtol=0.0, atol=CHECK_TOLERANCE * scale, equal_nan=True))

@@ -45,9 +45,9 @@ class Assembler:
         self.derivatives += [Row(np.zeros(0, int), np.zeros(0, int))] * (self.y.shape[0] - n)
         self.used = np.zeros(self.y.shape[0] + structure.p.shape[0], bool)  # whether glue reads each entry of y and p
         rows = ca.vertcat(*(stage.inputs for stage in structure.stages), structure.rows)
-        for each in read_tape(ca.Function("all", [self.y, structure.p], [rows])):
-            if each.operation == ca.OP_INPUT:
-                self.used[each.place] = True
+        for instruction in read_tape(ca.Function("all", [self.y, structure.p], [rows])):
+            if instruction.operation == ca.OP_INPUT:
+                self.used[instruction.place] = True
 
     def add_glue(self, rows: SX, places: Integers) -> Glue:
         """Add rows, evaluated to places, and their derivatives with respect to y."""
@@ -63,15 +63,15 @@ class Assembler:
             entries[i].append((j, factor))
         return Glue(rows, places, entries)
 
-    def evaluate(self, phase: int, outputs: SX, targets: Integers, *more: tuple[SX, Integers]) -> None:
+    def evaluate(self, phase: int, outputs: SX, targets: Integers, *symbols_and_places: tuple[SX, Integers]) -> None:
         """Add expressions of y, p and more symbols; constants go into the initial values."""
         listed = split_nonzeros(ca.densify(outputs))
-        varying = [k for k, each in enumerate(listed) if not each.is_constant()]
-        constants = {int(targets[k]): float(each) for k, each in enumerate(listed) if each.is_constant()}
+        varying = [k for k, value in enumerate(listed) if not value.is_constant()]
+        constants = {int(targets[k]): float(value) for k, value in enumerate(listed) if value.is_constant()}
         self.plan.initial.update(constants)
         p = self.structure.p
-        inputs = [self.y, p, *(symbols for symbols, _ in more)]
-        places = [self.value_places, self.p + np.arange(p.shape[0]), *(place for _, place in more)]
+        inputs = [self.y, p, *(symbols for symbols, _ in symbols_and_places)]
+        places = [self.value_places, self.p + np.arange(p.shape[0]), *(place for _, place in symbols_and_places)]
         expressions = ca.vertcat(SX(0, 1), *(listed[k] for k in varying))
         self.plan.add_expressions(phase, inputs, places, expressions, targets[varying])
 
@@ -80,9 +80,9 @@ class Assembler:
         return unite(self.derivatives[j].columns for j, _ in entries)
 
 
-def unite(parts: Iterable[Integers]) -> Integers:
+def unite(columns: Iterable[Integers]) -> Integers:
     """Return all numbers of some arrays, ascending."""
-    return np.unique(np.concatenate([np.zeros(0, int), *parts]))
+    return np.unique(np.concatenate([np.zeros(0, int), *columns]))
 
 
 class SampleDerivatives(NamedTuple):
@@ -139,8 +139,8 @@ class StagePlaces:
         self.active, self.used, self.m = active, used, m
         # Derivatives of active inputs, sample by sample.
         patterns = [[assembler.columns(self.glue.entries[e * m + i]) for i in active] for e in range(count)]
-        self.columns = [unite(each) for each in patterns]
-        most = max((len(each) for each in self.columns), default=0)
+        self.columns = [unite(columns) for columns in patterns]
+        most = max((len(columns) for columns in self.columns), default=0)
         self.derivatives = derive_sample(stage.function, active, used, most)
         self.by_column = self.derivatives.directional and most <= len(active)
         self.v = plan.allocate(count * len(used))
@@ -163,7 +163,7 @@ class StagePlaces:
     def count_directions(self) -> Integers:
         """Return the number of directions of each sample."""
         if self.by_column:
-            return np.array([len(each) for each in self.columns])
+            return np.array([len(columns) for columns in self.columns])
         return np.full(self.count, len(self.active))
 
     def place_directions(self, plan: DerivativePlan) -> PlaceBlock:
@@ -182,9 +182,9 @@ class StagePlaces:
         mark, begin = len(plan.steps[FIRST]), plan.size
         if self.by_column:
             self.d = plan.allocate(self.count * ma * self.width)
-        for e, each in enumerate(patterns):
+        for e, sample_patterns in enumerate(patterns):
             rows.append([])
-            for a, pattern in enumerate(each):
+            for a, pattern in enumerate(sample_patterns):
                 entries = self.glue.entries[e * self.m + self.active[a]]
                 if self.by_column:
                     places = self.d + (e * ma + a) * self.width + np.searchsorted(self.columns[e], pattern)
@@ -204,26 +204,26 @@ class StagePlaces:
 
     def _add_output_rows(self, assembler: Assembler) -> None:
         """Add the call of the first derivatives, and the derivatives of the outputs with respect to the variables."""
-        plan, found, count = assembler.plan, self.derivatives, self.count
+        plan, derivatives, count = assembler.plan, self.derivatives, self.count
         ma, nv = len(self.active), len(self.used)
-        number = plan.add_function(found.first)
-        if found.directional:
+        number = plan.add_function(derivatives.first)
+        if derivatives.directional:
             place = plan.allocate(count * nv * self.width)
             write = PlaceBlock(place, nv * self.width, nv, self.width, 1)
             inputs = (self.read, self.place_directions(plan))
             plan.add_call(FIRST, Call(number, count, self.count_directions(), inputs, (write,)))
         else:
-            nonzeros = found.jacobian.nnz()
+            nonzeros = derivatives.jacobian.nnz()
             place = plan.allocate(count * nonzeros)
             write = PlaceBlock(place, nonzeros, nonzeros, 1, 0)
             plan.add_call(FIRST, Call(number, count, None, (self.read,), (write,)))
-        at = np.full((nv, ma), -1)
-        output, source = found.jacobian.get_triplet()
-        at[output, source] = np.arange(len(output))
+        entry_of = np.full((nv, ma), -1)
+        output, source = derivatives.jacobian.get_triplet()
+        entry_of[output, source] = np.arange(len(output))
         mark, begin = len(plan.steps[FIRST]), plan.size
         for e in range(count):
             for o, name in enumerate(self.used):
-                read = np.flatnonzero(at[o] >= 0)
+                read = np.flatnonzero(entry_of[o] >= 0)
                 rows = [self.rows[e][a] for a in read]
                 columns = unite(row.columns for row in rows)
                 y = self.before + e * self.outputs + name
@@ -231,7 +231,9 @@ class StagePlaces:
                     base = place + (e * nv + o) * self.width
                     assembler.derivatives[y] = Row(columns, base + np.searchsorted(self.columns[e], columns))
                     continue
-                slopes = place + ((e * nv + o) * ma + read if found.directional else e * nonzeros + at[o, read])
+                slopes = place + (
+                    (e * nv + o) * ma + read if derivatives.directional else e * nonzeros + entry_of[o, read]
+                )
                 if all(len(row.places) == 1 and row.places[0] == ONE for row in rows) and len(columns) == len(rows):
                     order = np.argsort([row.columns[0] for row in rows])
                     assembler.derivatives[y] = Row(columns, slopes[order])

@@ -56,9 +56,11 @@ def write_function(name: str, function: ca.Function) -> str:
     """
     tape = list(read_operations(function))
     free = {
-        k: f"in[{each.place}]" if each.operation == ca.OP_INPUT else f"v_number({format_number(each.constant)})"
-        for k, each in enumerate(tape)
-        if each.operation in (ca.OP_INPUT, ca.OP_CONST)
+        k: f"in[{instruction.place}]"
+        if instruction.operation == ca.OP_INPUT
+        else f"v_number({format_number(instruction.constant)})"
+        for k, instruction in enumerate(tape)
+        if instruction.operation in (ca.OP_INPUT, ca.OP_CONST)
     }
     body = [k for k in range(len(tape)) if k not in free]
     piece = {k: i // PIECE for i, k in enumerate(body)}
@@ -74,19 +76,19 @@ def write_function(name: str, function: ca.Function) -> str:
             f"static NEVER_INLINE void {name}_{number}(const Vector* __restrict in, Vector* __restrict out, "
             "Vector* __restrict kept) {"
         )
-        known: set[int] = set()
+        declared: set[int] = set()
         for k in body[number * PIECE : (number + 1) * PIECE]:
-            each = tape[k]
-            for value in each.arguments:
-                if value not in known:
-                    known.add(value)
+            instruction = tape[k]
+            for value in instruction.arguments:
+                if value not in declared:
+                    declared.add(value)
                     lines.append(f"const Vector t{value} = {free.get(value) or f'kept[{kept[value]}]'};")
-            names = [f"t{value}" for value in each.arguments]
-            if each.operation == ca.OP_OUTPUT:
-                lines.append(f"out[{each.place}] = {names[0]};")
+            names = [f"t{value}" for value in instruction.arguments]
+            if instruction.operation == ca.OP_OUTPUT:
+                lines.append(f"out[{instruction.place}] = {names[0]};")
                 continue
-            known.add(k)
-            lines.append(f"const Vector t{k} = {EXPRESSIONS[each.operation].format(*names, f='v_')};")
+            declared.add(k)
+            lines.append(f"const Vector t{k} = {EXPRESSIONS[instruction.operation].format(*names, f='v_')};")
             if k in kept:
                 lines.append(f"kept[{kept[k]}] = t{k};")
         lines.append("}")
@@ -193,22 +195,25 @@ class DerivativePlan:
         function = ca.Function("glue", list(inputs), [ca.cse(outputs)])
         source = np.concatenate(places) if places else np.zeros(0, int)
         begin = len(self.tape)
-        at: list[int] = []
+        value_places: list[int] = []
         registers: dict[int, int] = {}
-        for each in read_operations(function):
-            arguments = [at[k] for k in each.arguments]
-            if each.operation == ca.OP_INPUT:
-                at.append(int(source[each.place]))
+        for instruction in read_operations(function):
+            arguments = [value_places[k] for k in instruction.arguments]
+            if instruction.operation == ca.OP_INPUT:
+                value_places.append(int(source[instruction.place]))
                 continue
-            if each.operation == ca.OP_CONST:
-                at.append(self.place_constant(each.constant))
+            if instruction.operation == ca.OP_CONST:
+                value_places.append(self.place_constant(instruction.constant))
                 continue
-            if each.operation == ca.OP_OUTPUT:
-                operation, target = CODES[ca.OP_ASSIGN], int(targets[each.place])
+            if instruction.operation == ca.OP_OUTPUT:
+                operation, target = CODES[ca.OP_ASSIGN], int(targets[instruction.place])
             else:
-                operation, target = CODES[each.operation], registers.setdefault(each.register, len(registers))
+                operation, target = (
+                    CODES[instruction.operation],
+                    registers.setdefault(instruction.register, len(registers)),
+                )
                 target = -1 - target  # replaced below, where the number of registers is known
-            at.append(target)
+            value_places.append(target)
             self.tape.append((operation, target, arguments[0], arguments[-1]))
         base = self.allocate(len(registers))
         for k in range(begin, len(self.tape)):

@@ -47,32 +47,32 @@ def split_nlp(nlp: Mapping[str, MX]) -> Structure:
     whole = ca.Function("nlp", [x, p], [nlp["f"], nlp["g"]])
     numbers = [k for k in range(whole.n_instructions()) if whole.instruction_id(k) == ca.OP_CALL]
     calls = [call for call in map(whole.instruction_MX, numbers) if call.which_function().class_name() in CALLED]
-    found = [[call.get_output(i) for i in range(call.n_out())] for call in calls]
-    symbols = [[MX.sym("v", output.sparsity()) for output in outputs] for outputs in found]
+    call_outputs = [[call.get_output(i) for i in range(call.n_out())] for call in calls]
+    symbols = [[MX.sym("v", output.sparsity()) for output in outputs] for outputs in call_outputs]
     given = [[call.dep(i) for i in range(call.n_dep())] for call in calls]
     outputs = [nlp["f"], nlp["g"], *chain(*given)]
-    replaced = ca.graph_substitute(outputs, [*chain(*found)], [*chain(*symbols)]) if calls else outputs
+    replaced = ca.graph_substitute(outputs, [*chain(*call_outputs)], [*chain(*symbols)]) if calls else outputs
     glue = _expand(ca.Function("glue", [x, p, *chain(*symbols)], replaced))
     w, q, *v = glue.sx_in()
     cost, rows, *u = glue.call([w, q, *v])
     stages = []
-    for call, inputs, outputs in zip(calls, given, found, strict=True):
+    for call, inputs, outputs in zip(calls, given, call_outputs, strict=True):
         function = call.which_function()
         inner = _expand(function.find_functions(0)[0] if function.class_name() == "Map" else function)
         arguments = inner.sx_in()  # all nonzeros become one vector
-        ends = [ca.vertcat(*map(stack_nonzeros, parts)) for parts in (arguments, inner.call(arguments))]
+        ends = [ca.vertcat(*map(stack_nonzeros, values)) for values in (arguments, inner.call(arguments))]
         inner = ca.Function(inner.name(), ends[:1], ends[1:])
         count = function.nnz_in() // inner.nnz_in()
         read = _by_sample([u.pop(0) for _ in inputs], count)
-        made = _by_sample([v.pop(0) for _ in outputs], count)
-        stages.append(Stage(function=inner, count=count, inputs=read, outputs=made))
+        written = _by_sample([v.pop(0) for _ in outputs], count)
+        stages.append(Stage(function=inner, count=count, inputs=read, outputs=written))
     return Structure(w=w, p=q, stages=tuple(stages), rows=ca.vertcat(ca.densify(cost), ca.densify(rows)))
 
 
 def stack_nonzeros(value: SX) -> SX:
     """Return the structural nonzeros as a dense vector."""
-    found = SX(value.nz[:])  # a row where the value is one
-    return found if found.shape[1] == 1 else found.T
+    column = SX(value.nz[:])  # a row where the value is one
+    return column if column.shape[1] == 1 else column.T
 
 
 def split_nonzeros(value: SX) -> list[SX]:
@@ -89,7 +89,7 @@ def _expand(function: ca.Function) -> ca.Function:
 
 def _by_sample(matrices: list[SX], count: int) -> SX:
     """Return the nonzeros of matrices, a block of columns for each sample, as one vector, sample by sample."""
-    parts = [stack_nonzeros(matrix) for matrix in matrices]
-    starts = np.cumsum([0, *(part.shape[0] for part in parts)])
+    columns = [stack_nonzeros(matrix) for matrix in matrices]
+    starts = np.cumsum([0, *(column.shape[0] for column in columns)])
     order = [np.arange(*ends).reshape(count, -1) for ends in zip(starts[:-1], starts[1:], strict=True)]
-    return ca.vertcat(*parts)[np.hstack(order).ravel().tolist()]
+    return ca.vertcat(*columns)[np.hstack(order).ravel().tolist()]

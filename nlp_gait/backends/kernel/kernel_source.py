@@ -51,7 +51,7 @@ def write_rows_source(function: ca.Function, *, objective: bool = False) -> str:
     """
     inputs = [str(function.numel_in(i)) for i in range(function.n_in())]
     outputs = [str(function.numel_out(i)) for i in range(function.n_out())] + ["1"] * objective
-    parts = [
+    sources = [
         "#include <utility>",
         read_native_source("nlp_gait.backends.kernel", "lanes.hpp"),
         _generate_lane_code(function),
@@ -61,7 +61,7 @@ def write_rows_source(function: ca.Function, *, objective: bool = False) -> str:
         f"static const long long output_size[] = {{{', '.join(outputs)}}};",
         read_native_source("nlp_gait.backends.kernel", "rows.hpp"),
     ]
-    return "\n".join(parts)
+    return "\n".join(sources)
 
 
 def _generate_lane_code(function: ca.Function) -> str:

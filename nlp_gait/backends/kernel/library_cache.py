@@ -41,8 +41,8 @@ def load_library(
     With ``write_source``, which is called to build it, ``source`` is everything that it depends on.
     """
     machine = (platform.system(), platform.machine(), *platform.libc_ver())
-    parts = (source, *compiler.command, compiler.version, *flags, *machine)
-    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+    inputs = (source, *compiler.command, compiler.version, *flags, *machine)
+    key = hashlib.sha256("\0".join(inputs).encode()).hexdigest()[:32]
     # The private folder counts if this process has needed one.
     folders = [find_cache_folder(), *([make_private_folder()] if make_private_folder.cache_info().currsize else [])]
     for library in (file for folder in folders for file in sorted(folder.glob(f"{key}-*{SUFFIX}"))):
@@ -195,10 +195,10 @@ _folders: dict[Path, int] = {}  # descriptors that stay open: CasADi loads by na
 
 
 def _open_folder(folder: Path) -> int:
-    known = _folders.get(folder)
+    descriptor = _folders.get(folder)
     with contextlib.suppress(OSError):  # closed by user code
-        if known is not None and os.path.samestat(os.fstat(known), folder.lstat()):
-            return known
+        if descriptor is not None and os.path.samestat(os.fstat(descriptor), folder.lstat()):
+            return descriptor
     _folders[folder] = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     return _folders[folder]
 

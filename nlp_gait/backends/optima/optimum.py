@@ -193,7 +193,7 @@ class Optimum:
     @lock_casadi
     def rows(self) -> tuple[Array, Array, Array]:
         """Values of all rows with their lower and upper bounds."""
-        _, values, lower, upper = (to_array(part) for part in self.functions.values(self.w, self.parameters))
+        _, values, lower, upper = (to_array(output) for output in self.functions.values(self.w, self.parameters))
         return values, lower, upper
 
 
@@ -218,7 +218,7 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
     """Apply Newton's method to the active rows, which change until all signs are right."""
     w, p = guess.primal.copy(), np.append(problem.p, guess.width)
     lam = np.concatenate([guess.rows, guess.bounds[: functions.model.variables]])
-    _, values, lower, upper = (to_array(part) for part in functions.values(w, p))
+    _, values, lower, upper = (to_array(output) for output in functions.values(w, p))
     equation = upper - lower <= 0.0
     side = np.where(lam > upper - values, 1, np.where(-lam > values - lower, -1, 0))
     side[equation] = np.where(lam[equation] >= 0.0, 1, -1)
@@ -228,14 +228,14 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
         active = np.flatnonzero(side)
         lam[side == 0] = 0.0
         gradient = to_array(functions.gradient(w, p, lam))
-        hessian, jacobian = (np.array(part) for part in functions.matrices(w, p, lam))
+        hessian, jacobian = (np.array(output) for output in functions.matrices(w, p, lam))
         gap = (np.where(side > 0, upper, lower) - values)[active]
         step = solve_kkt(hessian, jacobian[active], -gradient, gap, functions.model.variables)
         if not np.isfinite(step.w).all():
             reason = "Newton's method diverged"
             break
         w, lam[active] = w + step.w, lam[active] + step.multipliers
-        _, values, lower, upper = (to_array(part) for part in functions.values(w, p))
+        _, values, lower, upper = (to_array(output) for output in functions.values(w, p))
         wrong = (lam * side < -WEAK) & ~equation
         violated = np.where(values > upper + RESIDUAL, 1, np.where(values < lower - RESIDUAL, -1, 0)) * (side == 0)
         if wrong.any() or violated.any():
@@ -266,23 +266,23 @@ def _converge(problem: GaitProblem, functions: KktFunctions, guess: Guess) -> Op
     )
 
 
-def _fix_flat_lifts(found: Optimum) -> Optimum:
+def _fix_flat_lifts(optimum: Optimum) -> Optimum:
     """Set lifted variables that nothing determines, because no bound on them has a price, to their exact values.
 
     The row that ties such a variable to its value then counts as an equation, so that it follows x.
     """
-    model, n = found.functions.model, found.functions.model.variables
-    if found.reason is not None or model.lifted == 0:
-        return found
-    hessian, jacobian = found.matrices
-    nothing = np.zeros(len(found.active))
-    flat = solve_kkt(hessian, jacobian[found.active], np.zeros(len(found.w)), nothing, n).flat
+    model, n = optimum.functions.model, optimum.functions.model.variables
+    if optimum.reason is not None or model.lifted == 0:
+        return optimum
+    hessian, jacobian = optimum.matrices
+    nothing = np.zeros(len(optimum.active))
+    flat = solve_kkt(hessian, jacobian[optimum.active], np.zeros(len(optimum.w)), nothing, n).flat
     loose = np.flatnonzero(flat[n:])
     if not loose.size:
-        return found
-    w, side = found.w.copy(), found.side.copy()
-    w[n + loose] = to_array(model.lift_start(w[:n], *np.split(found.parameters, [-1])))[loose]
-    moved = replace(found, w=w)
+        return optimum
+    w, side = optimum.w.copy(), optimum.side.copy()
+    w[n + loose] = to_array(model.lift_start(w[:n], *np.split(optimum.parameters, [-1])))[loose]
+    moved = replace(optimum, w=w)
     values, lower, _ = moved.rows
     first, last = len(model.row_names), len(model.row_names) + len(model.tie_upper)
     ties = np.arange(first, last)

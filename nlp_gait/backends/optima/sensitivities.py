@@ -47,12 +47,12 @@ class SensitivityTable:
 
     def value(self, quantity: str, parameter: str) -> float:
         """Return the change of a variable, or of the objective, per unit of a parameter; raises UnknownNameError."""
-        names, others = ([name for name, _ in pairs] for pairs in (self.quantities, self.parameters))
+        names, parameters = ([name for name, _ in pairs] for pairs in (self.quantities, self.parameters))
         if quantity not in names:
             raise unknown("quantity", quantity, names)
-        if parameter not in others:
-            raise unknown("parameter", parameter, others)
-        return float(self.values[names.index(quantity), others.index(parameter)])
+        if parameter not in parameters:
+            raise unknown("parameter", parameter, parameters)
+        return float(self.values[names.index(quantity), parameters.index(parameter)])
 
     def write_csv(self, path: Path) -> None:
         """Write one row for each parameter; the unit is part of a column's name. Raises OutputError."""
@@ -79,21 +79,21 @@ class _Change(NamedTuple):
 def differentiate_by_parameters(optimum: Optimum) -> Sensitivities:
     """Return derivatives with respect to all parameters, in their order and units; InputError if there are none."""
     _require_derivatives(optimum)
-    parts = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
-    cost, *others = (np.array(part)[:, :-1] for part in parts)  # the last one is the sigmoid's width
-    return _differentiate(optimum, _Change(cost[0], *others))
+    jacobians = optimum.functions.by_parameters(optimum.w, optimum.parameters, optimum.multipliers)
+    cost, *changes = (np.array(jacobian)[:, :-1] for jacobian in jacobians)  # the last one is the sigmoid's width
+    return _differentiate(optimum, _Change(cost[0], *changes))
 
 
 def tabulate_sensitivities(solution: Solution) -> SensitivityTable:
     """Return the derivatives of a solution's best start; InputError if it has no multipliers or there are no derivatives."""
     problem = solution.problem
-    found = differentiate_by_parameters(find_optimum(problem, solution.best))
-    values = np.vstack([found.objective, found.x])
-    values[:, np.logical_not(found.defined)] = np.nan
+    derivatives = differentiate_by_parameters(find_optimum(problem, solution.best))
+    values = np.vstack([derivatives.objective, derivatives.x])
+    values[:, np.logical_not(derivatives.defined)] = np.nan
     goal = problem.objective
     quantities = ((goal.name, goal.unit), *((variable.name, variable.unit) for variable in problem.variables))
     parameters = tuple((parameter.name, parameter.unit) for parameter in problem.parameters)
-    return SensitivityTable(quantities=quantities, parameters=parameters, values=values, reach=found.reach)
+    return SensitivityTable(quantities=quantities, parameters=parameters, values=values, reach=derivatives.reach)
 
 
 @lock_casadi
@@ -106,29 +106,29 @@ def differentiate_by_models(optimum: Optimum, pairs: Iterable[tuple[GaitProblem,
     """
     _require_derivatives(optimum)
     columns = []
-    for more, less, difference in pairs:
-        high, low = (_evaluate(optimum, problem) for problem in (more, less))
+    for larger, smaller, difference in pairs:
+        high, low = (_evaluate(optimum, problem) for problem in (larger, smaller))
         columns.append([(a - b) / difference for a, b in zip(high, low, strict=True)])
-    cost, *others = (np.array(part).T for part in zip(*columns, strict=True))
-    return _differentiate(optimum, _Change(cost, *others))
+    cost, *changes = (np.array(column).T for column in zip(*columns, strict=True))
+    return _differentiate(optimum, _Change(cost, *changes))
 
 
 def _evaluate(optimum: Optimum, problem: GaitProblem) -> _Change:
     """Evaluate another model at the same x, multipliers and parameter values."""
     functions = build_kkt_functions(problem)
-    own, other, n = optimum.functions.model, functions.model, optimum.functions.model.variables
-    if own.row_names != other.row_names or own.lifted != other.lifted:
+    model, changed, n = optimum.functions.model, functions.model, optimum.functions.model.variables
+    if model.row_names != changed.row_names or model.lifted != changed.lifted:
         raise InputError(f"{problem.name}: the other model has other constraints; sensitivities need the same ones")
-    ratio = own.scale / other.scale  # its variables may be scaled to another range
+    ratio = model.scale / changed.scale  # its variables may be scaled to another range
     w, lam = optimum.w.copy(), optimum.multipliers.copy()
-    w[:n] = (optimum.x - other.offset) / other.scale
+    w[:n] = (optimum.x - changed.offset) / changed.scale
     lam[-n:] /= ratio
-    cost, values, lower, upper = (to_array(part) for part in functions.values(w, optimum.parameters))
+    cost, values, lower, upper = (to_array(array) for array in functions.values(w, optimum.parameters))
     gradient = to_array(functions.gradient(w, optimum.parameters, lam))
     gradient[:n] *= ratio
-    for part in (values, lower, upper):  # x and its bounds are the same
-        part[-n:] = 0.0
-        part[~np.isfinite(part)] = 0.0
+    for array in (values, lower, upper):  # x and its bounds are the same
+        array[-n:] = 0.0
+        array[~np.isfinite(array)] = 0.0
     return _Change(cost[0], values, lower, upper, gradient)
 
 
@@ -161,9 +161,9 @@ def _find_reach(optimum: Optimum, change: _Change, moved: Array, multipliers: Ar
     shrinks = [(rate - change.upper)[inactive], (change.lower - rate)[inactive], falls]
     distance, speed = np.maximum(np.concatenate(room), 0.0)[:, None], np.concatenate(shrinks)
     with np.errstate(divide="ignore", invalid="ignore"):
-        at = np.where(np.abs(speed) > STILL, distance / speed, np.inf)
-    up = np.where(at > 0.0, at, np.inf).min(axis=0, initial=np.inf)
-    down = np.where(at < 0.0, at, -np.inf).max(axis=0, initial=-np.inf)
+        change_at_bound = np.where(np.abs(speed) > STILL, distance / speed, np.inf)
+    up = np.where(change_at_bound > 0.0, change_at_bound, np.inf).min(axis=0, initial=np.inf)
+    down = np.where(change_at_bound < 0.0, change_at_bound, -np.inf).max(axis=0, initial=-np.inf)
     return np.array([down, up])
 
 

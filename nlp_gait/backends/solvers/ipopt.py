@@ -271,8 +271,8 @@ def find_linear_solver(wanted: str | None = None) -> str:
         options = {**QUIET, "ipopt.output_file": str(log), "ipopt.file_print_level": 5, **chosen}
         probe = ca.nlpsol("probe", "ipopt", {"x": x, "f": x**2}, options)
         probe(x0=1.0)
-        found = re.search(r"linear solver (\S+?)[,.\s]", log.read_text() if log.exists() else "")
-    used = found.group(1) if found else "unknown"
+        mentioned = re.search(r"linear solver (\S+?)[,.\s]", log.read_text() if log.exists() else "")
+    used = mentioned.group(1) if mentioned else "unknown"
     status = str(probe.stats()["return_status"])
     if wanted is not None and (status != "Solve_Succeeded" or used.lower() != wanted):
         raise InputError(

@@ -17,10 +17,10 @@ SOLVERS: Mapping[str, type[Solver]] = {solver.name: solver for solver in (IpoptS
 
 def make_solver(name: str, /, **settings: Any) -> Solver:
     """Make an NLP solver by its name, with settings that differ from the defaults; raises UnknownNameError and InputError."""
-    known = list_settings(name)
+    names = list_settings(name)
     for setting in settings:
-        if setting not in known:
-            raise unknown(f"setting of {name}", setting, known)
+        if setting not in names:
+            raise unknown(f"setting of {name}", setting, names)
     with convert_errors(f"setting of {name}", InputError):
         decode(SOLVERS[name], settings)
     return SOLVERS[name](**settings)

@@ -144,10 +144,10 @@ class _Functions:
         self.calls += len(Z)
         violations = np.where(violation <= FEASIBILITY_TOLERANCE, 0.0, violation)
         leader = int(np.lexsort((f, violations))[0])
-        found = (float(violations[leader]), float(f[leader]), X[leader].copy())
-        self.best = min(self.best, found, key=lambda best: best[:2])
+        point = (float(violations[leader]), float(f[leader]), X[leader].copy())
+        self.best = min(self.best, point, key=lambda best: best[:2])
         objective = self._problem.objective.sign * self.best[1] if self.best[0] == 0.0 else None
         self.history.append(Best(self.calls, objective, time.perf_counter() - self.started))
         sides = [(g - self._row_lower) / self._row_scale, (self._row_upper - g) / self._row_scale]
         finite = [np.isfinite(self._row_lower), np.isfinite(self._row_upper)]
-        return f, np.hstack([side[:, known] for side, known in zip(sides, finite, strict=True)])
+        return f, np.hstack([side[:, bounded] for side, bounded in zip(sides, finite, strict=True)])

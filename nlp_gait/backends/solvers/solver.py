@@ -59,7 +59,7 @@ class Solver(Protocol):
         return {"kind": type(self).__name__, **(asdict(self) if is_dataclass(self) else {})}
 
 
-def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others: Any) -> Outcome:
+def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **facts: Any) -> Outcome:
     """Return the outcome at x (n,), clipped to the bounds, with the values of the exact functions."""
     x = np.clip(x, problem.lower, problem.upper)
     exact = build_exact_model(problem).at(x, problem.p)
@@ -70,7 +70,7 @@ def judge_point(solver: str, problem: GaitProblem, x0: Array, x: Array, **others
         objective=problem.objective.sign * exact.cost,
         cost=exact.cost,
         violation=exact.violation,
-        **others,
+        **facts,
     )
 
 

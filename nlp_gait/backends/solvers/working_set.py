@@ -75,20 +75,20 @@ class WorkingSet:
             chosen = np.flatnonzero(rows)
             solver, _ = self._get_solver(rows.tobytes())
             sides = {side: np.asarray(arguments[side])[chosen] for side in ("lbg", "ubg")}
-            found = solver(**{**arguments, **sides, "x0": start})
+            solved = solver(**{**arguments, **sides, "x0": start})
             stats = solver.stats()
             self._count(stats)
             multipliers = np.zeros(len(rows))
-            multipliers[chosen] = np.asarray(found["lam_g"]).ravel()
-            result = {"x": found["x"], "lam_x": found["lam_x"], "lam_g": multipliers}
+            multipliers[chosen] = np.asarray(solved["lam_g"]).ravel()
+            result = {"x": solved["x"], "lam_x": solved["lam_x"], "lam_g": multipliers}
             if self._watch.reason:
                 return result, rows
             if not stats["success"]:
                 break
-            violated = self._find_violated(found["x"], arguments) & ~rows
+            violated = self._find_violated(solved["x"], arguments) & ~rows
             if not violated.any():
                 return result, rows
-            rows, start = rows | violated, found["x"]
+            rows, start = rows | violated, solved["x"]
         return None, rows
 
     def _find_violated(self, x: Any, arguments: Mapping[str, Any]) -> Rows:
