@@ -1,8 +1,9 @@
 """The best known point of an ``Instance``, strictly feasible, by IPOPT from random starts, and values that identify it."""
 
+from collections.abc import Callable
 from dataclasses import asdict
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -32,8 +33,13 @@ class Judged(Protocol):
     gait_problem: GaitProblem
     lower: Array
     upper: Array
-    sides: Any
-    jacobian: Any
+
+    @property
+    def sides(self) -> Callable[[Array], Array]:
+        """Function of the kernel's rows (P, ...) that returns the rows G (P, m)."""
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives (m, n) of the rows."""
 
 
 def find_facts(instance: Judged) -> Facts:
@@ -85,8 +91,7 @@ def evaluate_interpreted(instance: Judged, x: Array) -> tuple[float, Array]:
     """Return cost and rows (m,) at x (n,) without compiling anything."""
     kernel = build_kernel(instance.gait_problem)
     cost, g = kernel.function(x, instance.gait_problem.p)
-    rows: Array = instance.sides(np.array(g).reshape(1, -1))[0]
-    return float(cost), rows
+    return float(cost), instance.sides(np.array(g).reshape(1, -1))[0]
 
 
 def make_strictly_feasible(instance: Judged, x: Array) -> Array | None:
