@@ -12,8 +12,7 @@ import matplotlib.pyplot as plt
 
 import nlp_gait
 from nlp_gait.export.formats import FORMATS, write_as
-from nlp_gait.export.set_points import make_set_points
-from nlp_gait.formulation import Result
+from nlp_gait.formulation import Result, sample_at_period
 
 problem = nlp_gait.load("nao-ssp")
 solution = nlp_gait.solve(problem, starts=2)
@@ -31,9 +30,9 @@ print(Path("gait.motion").read_text()[:180], "...")
 # %%
 # The same set-points as arrays.
 
-points = make_set_points(gait, period_ms=40)
+signals = sample_at_period(gait, period_ms=40)
 figure, axes = plt.subplots(figsize=(6, 3.2), layout="constrained")
 for joint in ("RHipPitch", "RKneePitch", "RAnklePitch"):
-    axes.plot([t / 1000 for t in points.times_ms], points.angles[:, points.joints.index(joint)], label=joint)
+    axes.plot(signals["t"], signals[f"q {joint}"], label=joint)
 axes.set(xlabel="time [s]", ylabel="set-point [rad]", title="The swinging leg")
 axes.legend()

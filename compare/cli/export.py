@@ -16,9 +16,8 @@ from compare.study.references import find_reference
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.formats import FORMATS, write_as
+from nlp_gait.export.formats import FORMATS, PERIOD_MS, write_as
 from nlp_gait.export.nl_file import export_nl
-from nlp_gait.export.set_points import PERIOD_MS
 from nlp_gait.export.solver import export_solver
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.result import load_result

@@ -24,7 +24,6 @@ DOORS = {
     "nlp_gait.simulation.simulate": ("Simulation", "simulate_plan"),
     "nlp_gait.simulation.measurements": ("Measurements", "average_pressure", "measure"),
     "nlp_gait.export.formats": ("FORMATS", "write_as"),
-    "nlp_gait.export.set_points": ("SetPoints", "make_set_points"),
     "metaheuristics": (),
     "metaheuristics.multi_objective": (),
     "compare": (),

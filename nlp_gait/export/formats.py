@@ -9,14 +9,17 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from nlp_gait.errors import InputError, unknown
-from nlp_gait.export.set_points import COUPLED, format_motion, make_set_points, to_naoqi
 from nlp_gait.files import format_csv, replace_file, write_json, write_text
-from nlp_gait.formulation import Result, Signals, sample_signals
-from nlp_gait.formulation.result import SCHEMA, sample_at_period
+from nlp_gait.formulation import Array, Result, Signals, sample_at_period, sample_signals
+from nlp_gait.formulation.result import SCHEMA
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.mjcf import make_plan_model
 from nlp_gait.simulation.plan import make_plan
 
+PERIOD_MS = 40  # as in Gupta, Pratihar, Deb (2023), and Webots' worlds for NAO
+APPROACH_S = 2.0  # from the robot's current pose to the first one: a key of NAOqi needs a time > 0
+LONGEST_LINE = 4095  # characters with the line's end: size of the buffer of Webots' parser
+COUPLED = "RHipYawPitch"  # both hip yaw-pitch joints are one motor, which NAOqi commands by the left one's name
 # Usual suffix of a file by format.
 FORMATS = {
     "webots": ".motion",
@@ -29,7 +32,7 @@ FORMATS = {
 }
 
 
-def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
+def write_as(name: str, path: Path, result: Result, period_ms: int = PERIOD_MS) -> None:
     """Write a gait to a file in one of FORMATS.
 
     Rows are exactly a period apart; the last one is that before the end, or after it where the robot is at rest.
@@ -37,32 +40,64 @@ def write_as(name: str, path: Path, result: Result, period_ms: int) -> None:
     """
     if name not in FORMATS:
         raise unknown("format", name, FORMATS)
+    if name == "mjcf":
+        write_text(path, make_plan_model(make_plan(result), Drive()))
+        return
     if name in ("webots", "naoqi", "ros"):
         _check_motors(result)
+    signals = sample_at_period(result, period_ms)
     if name == "webots":
-        write_text(path, format_motion(make_set_points(result, period_ms)))
+        write_text(path, format_motion(signals))
     elif name == "naoqi":
-        points = make_set_points(result, period_ms)
-        if not set(COUPLED) <= set(points.joints):
-            raise InputError(
-                f"only NAO has NAOqi, which commands joints such as {COUPLED[0]!r}; the robot of "
-                f"{result.problem.name!r} has none of that name: export as csv, json, webots or mjcf"
-            )
-        write_json(path, to_naoqi(points))
-    elif name == "mjcf":
-        write_text(path, make_plan_model(make_plan(result), Drive()))
+        write_json(path, to_naoqi(signals, result.problem.name))
     elif name == "mujoco-keyframes":
-        write_text(path, write_keyframes(result, period_ms))
+        write_text(path, format_keyframes(result, signals.arrays["t"]))
     elif name == "csv":
-        write_signals_csv(path, sample_at_period(result, period_ms))
+        write_signals_csv(path, signals)
     elif name == "ros":
-        write_json(path, to_ros(sample_at_period(result, period_ms)))
+        write_json(path, to_ros(signals))
     else:
-        write_signals_json(path, result, sample_at_period(result, period_ms))
+        write_signals_json(path, result, signals)
 
 
-def write_keyframes(result: Result, period_ms: int) -> str:
-    """Return the simulated model with a key for each row of the gait; raises InputError for a robot that moves in a plane.
+def format_motion(signals: Signals) -> str:
+    """Return the content of a `.motion` file of Webots; raises InputError if it cannot express the joints' names or number.
+
+    The grammar is that of Webots' own parser (`src/controller/c/motion.c`): a header with the motors; then rows
+    ``MM:SS:mmm,<pose name>,<radians>,...``, between which it interpolates linearly.
+    """
+    joints = signals.joints
+    lines = [",".join(("#WEBOTS_MOTION", "V1.0", *joints))]
+    if lines[0].count(",") != len(joints) + 1:
+        raise InputError("joints of a .motion file must have names without commas; rename them in the robot's file")
+    for number, (t, row) in enumerate(zip(signals.arrays["t"], signals.arrays["q"].tolist(), strict=True), start=1):
+        seconds, milliseconds = divmod(round(1000.0 * t), 1000)
+        values = ",".join(f"{value:.9f}" for value in row)
+        lines.append(f"{seconds // 60:02d}:{seconds % 60:02d}:{milliseconds:03d},Pose{number},{values}")
+    longest = max(map(len, lines))
+    if longest >= LONGEST_LINE:
+        raise InputError(
+            f"a line of the .motion file has {longest} characters for {len(joints)} joints; Webots' parser needs fewer than "
+            f"{LONGEST_LINE}: export as csv"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def to_naoqi(signals: Signals, owner: str) -> dict[str, Any]:
+    """Return the arguments of ``ALMotion.angleInterpolation``: names, keys [rad] and times [s], in absolute angles."""
+    if COUPLED not in signals.joints:
+        raise InputError(
+            f"only NAO has NAOqi, which commands joints such as {COUPLED!r}; the robot of {owner!r} has none of that name: "
+            "export as csv, json, webots or mjcf"
+        )
+    names = [name for name in signals.joints if name != COUPLED]
+    times = [round(APPROACH_S + t, 3) for t in signals.arrays["t"].tolist()]
+    keys = [signals.arrays["q"][:, signals.joints.index(name)].tolist() for name in names]
+    return {"names": names, "keys": keys, "times": [times for _ in names], "isAbsolute": True}
+
+
+def format_keyframes(result: Result, times: Array) -> str:
+    """Return the simulated model with a key for each time (T,) [s]; raises InputError for a robot that moves in a plane.
 
     ``qpos`` has the root's place [m] and attitude (w, x, y, z) and the joints' angles [rad], ``ctrl`` these angles as set-points.
     """
@@ -72,7 +107,6 @@ def write_keyframes(result: Result, period_ms: int) -> str:
             f"the robot of {result.problem.name!r} moves in a plane and has no keyframes; export it as mjcf"
         )
     root = Xml.fromstring(make_plan_model(plan, Drive()))
-    times = sample_at_period(result, period_ms).arrays["t"]
     # The engine's coordinates are in the order of the joints in the model, its controls in that of the actuators.
     joints, driven = (
         [plan.joints.index(element.attrib["name"]) for element in root.iter(tag)] for tag in ("joint", "position")

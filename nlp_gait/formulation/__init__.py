@@ -17,7 +17,7 @@ from nlp_gait.formulation.assembly import (
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
 from nlp_gait.formulation.registry import list_problems, load, maker
-from nlp_gait.formulation.result import Result, load_result, sample_finely, sample_signals
+from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "make_parameters",
     "make_vector_columns",
     "maker",
+    "sample_at_period",
     "sample_finely",
     "sample_signals",
 ]

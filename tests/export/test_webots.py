@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import nlp_gait
 from nlp_gait.errors import InputError
-from nlp_gait.export.set_points import SetPoints, format_motion, make_set_points
-from nlp_gait.formulation import Result
+from nlp_gait.export.formats import PERIOD_MS, format_motion
+from nlp_gait.formulation import Result, Signals, sample_at_period
 
 OPTIMUM = (0.31, -0.00122, 0.00350, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4)
 HALF_A_DIGIT = 5.1e-10  # nine decimals are written
@@ -16,8 +16,16 @@ HALF_A_DIGIT = 5.1e-10  # nine decimals are written
 
 @pytest.fixture(scope="module")
 def points():
+    return sampled()
+
+
+def sampled(x=OPTIMUM, period_ms=PERIOD_MS):
     problem = nlp_gait.load("nao-ssp")
-    return make_set_points(Result(problem=problem, x=problem.check_x(OPTIMUM)))
+    return sample_at_period(Result(problem=problem, x=problem.check_x(x)), period_ms)
+
+
+def poses_of(joints, times_ms, q):
+    return Signals(joints=joints, arrays={"t": np.array(times_ms) / 1000, "q": q}, columns={})
 
 
 def by_the_grammar(text):
@@ -46,20 +54,18 @@ def test_a_gait_is_written_every_40_ms_and_read_back(points):
     names, times, poses = by_the_grammar(text)
     assert tuple(names) == points.joints and len(names) == 22
     assert times == list(range(0, 4001, 40))
-    np.testing.assert_allclose(poses, points.angles, atol=HALF_A_DIGIT)
+    np.testing.assert_allclose(poses, points.arrays["q"], atol=HALF_A_DIGIT)
     assert text.splitlines()[1].startswith("00:00:000,Pose1,")
 
 
 def test_set_points_are_the_planned_angles(points):
     problem = nlp_gait.load("nao-ssp")
     signals = problem.signals(problem.check_x(OPTIMUM))  # 11 samples, 400 ms apart
-    np.testing.assert_allclose(points.angles[::10], signals.arrays["q"], atol=1e-9)
+    np.testing.assert_allclose(points.arrays["q"][::10], signals.arrays["q"], atol=1e-9)
 
 
 def test_the_last_pose_is_the_end_of_the_phase():
-    problem = nlp_gait.load("nao-ssp")
-    found = make_set_points(Result(problem=problem, x=problem.check_x((*OPTIMUM[:-1], 0.4567))))
-    assert found.times_ms[-3:] == (360, 400, 440)
+    assert sampled((*OPTIMUM[:-1], 0.4567))["t"][-3:].tolist() == [0.36, 0.4, 0.44]
 
 
 @pytest.mark.slow
@@ -68,10 +74,10 @@ def test_the_last_pose_is_the_end_of_the_phase():
     st.lists(st.floats(-4, 4), min_size=3, max_size=3),
 )
 def test_any_set_points_survive_the_round_trip(times, row):
-    points = SetPoints(joints=("A", "B", "C"), times_ms=tuple(sorted(times)), angles=np.array([row] * len(times)))
+    points = poses_of(("A", "B", "C"), sorted(times), np.array([row] * len(times)))
     names, back_ms, angles = by_the_grammar(format_motion(points))
-    assert tuple(names) == points.joints and tuple(back_ms) == points.times_ms
-    np.testing.assert_allclose(angles, points.angles, atol=HALF_A_DIGIT)
+    assert tuple(names) == points.joints and back_ms == sorted(times)
+    np.testing.assert_allclose(angles, points.arrays["q"], atol=HALF_A_DIGIT)
 
 
 @pytest.mark.parametrize(
@@ -82,13 +88,11 @@ def test_any_set_points_survive_the_round_trip(times, row):
     ],
 )
 def test_joints_that_the_format_cannot_express_are_refused(joints, words):
-    points = SetPoints(joints=joints, times_ms=(0,), angles=np.zeros((1, len(joints))))
     with pytest.raises(InputError, match=words):
-        format_motion(points)
+        format_motion(poses_of(joints, [0], np.zeros((1, len(joints)))))
 
 
 @pytest.mark.parametrize("period", [0, -40, 2.5, True])
 def test_the_period_is_whole_milliseconds(period):
-    problem = nlp_gait.load("nao-ssp")
-    with pytest.raises(InputError, match="whole number of milliseconds"):
-        make_set_points(Result(problem=problem, x=problem.check_x(OPTIMUM)), period)
+    with pytest.raises(InputError, match="period_ms must be a whole number >= 1"):
+        sampled(period_ms=period)
