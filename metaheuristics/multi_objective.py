@@ -99,14 +99,3 @@ def minimize_many(
         # A violation that is not finite counts as the worst.
         search.tell(X, F, np.nan_to_num(violation, nan=1e30, posinf=1e30))
         used += len(X)
-
-
-__all__ = [
-    "FRONT_ALGORITHMS",
-    "ManyObjectives",
-    "MultiObjective",
-    "Snapshot",
-    "check_budgets",
-    "make_front_algorithm",
-    "minimize_many",
-]

@@ -155,31 +155,23 @@ def name_of(algorithm: Algorithm) -> str:
     return str(getattr(algorithm, "name", type(algorithm).__name__))
 
 
-def check_points(asked: object, lower: Array, upper: Array, source: str = "ask") -> Array:
+def check_points(given: object, lower: Array, upper: Array, source: str = "ask") -> Array:
     """Return the points (P, n) of a source; SearchError for another shape, no point, NaN, or a point outside the bounds."""
+    wanted = f"{source}: points must have shape (P, {len(lower)}) with P >= 1"
     try:
-        points = to_real_array(asked)
-    except (TypeError, ValueError) as error:
-        raise SearchError(
-            f"{source} must return points (P, {len(lower)}); it returned something other than numbers: {error}"
-        ) from error
+        points = to_real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SearchError(f"{wanted}; got something other than numbers: {error}") from error
     if points.ndim != 2 or points.shape[1] != len(lower) or not len(points):
+        raise SearchError(f"{wanted}; got shape {points.shape}")
+    outside = np.argwhere(~((points >= lower) & (points <= upper)))  # NaN is outside too
+    if len(outside):
+        row, column = outside[0]
         raise SearchError(
-            f"{source} must return points of shape (P, {len(lower)}) with P >= 1, got shape {points.shape}"
-        )
-    if (outside := _find_outside(points, lower, upper)) is not None:
-        row, column = outside
-        raise SearchError(
-            f"{source} returned {points[row, column]} for variable {column} of point {row}, outside the bounds "
+            f"{source}: {points[row, column]} for variable {column} of point {row}, outside the bounds "
             f"{lower[column]}..{upper[column]}: clip the points"
         )
     return points
-
-
-def _find_outside(points: Array, lower: Array, upper: Array) -> tuple[int, int] | None:
-    """Return row and column of the first value of points (P, n) outside the bounds (n,), or None."""
-    outside = np.argwhere(~((points >= lower) & (points <= upper)))  # NaN is outside too
-    return (int(outside[0, 0]), int(outside[0, 1])) if len(outside) else None
 
 
 def seed_sequence(seed: int | np.random.SeedSequence) -> np.random.SeedSequence:
@@ -210,21 +202,9 @@ def draw_starting_points(
     draws = np.random.default_rng(seed).random((population, len(lower)))
     points = np.clip(lower + draws * (upper - lower), lower, upper)
     if given is not None:
-        try:
-            rows = np.array(to_real_array(given))
-        except (TypeError, ValueError, OverflowError) as error:
-            raise SearchError(f"initial must be rows of numbers, got {abbreviate(given)}: {error}") from error
-        if rows.ndim != 2 or rows.shape[1] != len(lower) or not 1 <= len(rows) <= population:
-            raise SearchError(
-                f"initial must have shape (R, {len(lower)}) with 1 <= R <= {population}, the population of the "
-                f"algorithm; got {rows.shape}"
-            )
-        if (outside := _find_outside(rows, lower, upper)) is not None:
-            row, column = outside
-            raise SearchError(
-                f"initial row {row}, variable {column}: {rows[row, column]} is outside the bounds "
-                f"{lower[column]}..{upper[column]}; clip the points or widen the bounds"
-            )
+        rows = check_points(given, lower, upper, "initial")
+        if len(rows) > population:
+            raise SearchError(f"initial: at most {population} points, the population of the algorithm, got {len(rows)}")
         points[: len(rows)] = rows
     points.setflags(write=False)
     return points

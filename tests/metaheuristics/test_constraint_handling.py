@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from metaheuristics import ConstraintHandling, Deb, EpsilonLevel, SearchError, StaticPenalty
+from metaheuristics import ConstraintHandling, Deb, EpsilonLevel, StaticPenalty
 from metaheuristics.interface import Array
 from metaheuristics.minimize import mark_failed
 
@@ -117,29 +117,3 @@ def test_a_violation_equal_to_epsilon_counts_as_none() -> None:
     assert (major.tolist(), minor.tolist()) == ([0.0, 0.0], [5.0, 6.0])
     strict = EpsilonLevel().rule(1.0, np.array([2.0]))
     assert strict.order(np.array([0.0, 1.0, 0.5]), np.array([0.5, 0.0, 0.75])).tolist() == [1, 0, 2]
-
-
-@pytest.mark.parametrize(
-    "settings", [{"exponent": 0.1}, {"control": 0.1}, {"control": 1.0}, {"share": 0.0}, {"share": 1.0}]
-)
-def test_settings_at_the_edge_are_allowed(settings: dict[str, float]) -> None:
-    EpsilonLevel(**settings)
-    StaticPenalty(weight=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("factory", "settings", "message"),
-    [
-        (StaticPenalty, {"weight": 0.0}, r"StaticPenalty: weight must be a finite number > 0\.0, got 0\.0"),
-        (StaticPenalty, {"weight": np.nan}, "weight"),
-        (EpsilonLevel, {"share": 1.5}, "share must be .* >= 0.0 and <= 1.0, got 1.5"),
-        (EpsilonLevel, {"exponent": -1.0}, "exponent"),
-        (EpsilonLevel, {"exponent": 0.0}, "exponent"),
-        (EpsilonLevel, {"control": 0.0}, "control"),
-        (EpsilonLevel, {"control": 1.1}, "control"),
-        (EpsilonLevel, {"share": -0.1}, "share"),
-    ],
-)
-def test_bad_settings(factory: type, settings: dict[str, float], message: str) -> None:
-    with pytest.raises(SearchError, match=message):
-        factory(**settings)

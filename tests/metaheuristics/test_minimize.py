@@ -148,12 +148,12 @@ def test_bad_bounds(lower: list[float], upper: list[float], message: str) -> Non
         ({"target": np.nan}, "target"),
         ({"stagnation": 0}, "stagnation must be"),
         ({"time_limit_s": 0.0}, "time_limit_s must be > 0"),
-        ({"initial": np.zeros(2)}, r"shape \(R, 2\).*got \(2,\)"),
-        ({"initial": np.zeros((11, 2))}, "R <= 10"),
-        ({"initial": np.full((1, 2), 9.0)}, r"initial row 0, variable 0: 9\.0 is outside"),
+        ({"initial": np.zeros(2)}, r"initial: .* shape \(P, 2\).*got shape \(2,\)"),
+        ({"initial": np.zeros((11, 2))}, "initial: at most 10 points"),
+        ({"initial": np.full((1, 2), 9.0)}, r"initial: 9\.0 for variable 0 of point 0, outside the bounds"),
         ({"initial": np.full((1, 2), np.nan)}, "outside the bounds"),
-        ({"initial": np.full((1, 2), 0.5j)}, "initial must be rows of numbers"),
-        ({"initial": np.ma.masked_array(np.zeros((1, 2)), mask=[[True, False]])}, "initial must be rows of numbers"),
+        ({"initial": np.full((1, 2), 0.5j)}, "initial: .* other than numbers"),
+        ({"initial": np.ma.masked_array(np.zeros((1, 2)), mask=[[True, False]])}, "initial: .* other than numbers"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, object], message: str) -> None:

@@ -63,11 +63,6 @@ def test_budgets_that_cannot_be_are_refused(budgets: tuple[int, ...]) -> None:
         minimize_many(TwoParabolas(), make_front_algorithm("NSGA2", population=20), evaluations=budgets)
 
 
-def test_an_unknown_algorithm_is_refused() -> None:
-    with pytest.raises(SearchError, match="did you mean 'NSGA2'"):
-        make_front_algorithm("NSGA")
-
-
 def test_nothing_to_vary_is_refused() -> None:
     class Fixed(TwoParabolas):
         upper = TwoParabolas.lower

@@ -1,4 +1,4 @@
-"""Algorithms of other packages and constraint handlings, by name."""
+"""Algorithms of other packages, differential evolution and L-SHADE."""
 
 from __future__ import annotations
 
@@ -11,40 +11,30 @@ import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
 
-from metaheuristics import (
-    ADAPTERS,
-    Deb,
-    EpsilonLevel,
-    SearchError,
-    StaticPenalty,
-    make_algorithm,
-    make_handling,
-    minimize,
-)
+from metaheuristics import SearchError, list_installed_algorithms, make_algorithm, minimize
 from metaheuristics.adapters.cma import CmaEs
-from metaheuristics.adapters.pymoo import MODULES, Pymoo
-from metaheuristics.algorithms.differential_evolution import STRATEGIES, DifferentialEvolution
+from metaheuristics.adapters.pymoo import MODULES
+from metaheuristics.algorithms.differential_evolution import (
+    STRATEGIES,
+    DifferentialEvolution,
+    compute_gains,
+    compute_lehmer_mean,
+)
 from metaheuristics.interface import FEASIBILITY, Array, Start
 from tests.metaheuristics.problems import disc, sphere
 
 
-def test_names_of_adapters() -> None:
-    assert make_algorithm("cma", population=20) == CmaEs(population=20)
-    assert make_algorithm("de", strategy="rand1bin") == DifferentialEvolution(strategy="rand1bin")
-    assert (
-        make_algorithm("pymoo:NSGA2") == Pymoo(algorithm="NSGA2")
-        and make_algorithm("pymoo:NSGA2").name == "pymoo:NSGA2"
-    )
-    assert all(make_algorithm(name).name == name for name in ADAPTERS)
-
-
-def test_a_package_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_is_missing_is_named_and_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("cma", "pymoo"):
+        pytest.importorskip(package)
+    assert {"lshade", "cma", "pymoo:GA"} <= set(list_installed_algorithms())
     monkeypatch.setattr("metaheuristics.settings.find_spec", lambda name: None)
-    with pytest.raises(SearchError, match=r"'cma' needs the package cma.*pip install 'nlp-gait\[algorithms\]'"):
-        make_algorithm("cma")
-    with pytest.raises(SearchError, match="'pymoo:GA' needs the package pymoo"):
-        make_algorithm("pymoo:GA")
-    assert make_algorithm("pso").name == "pso"
+    assert "lshade" in list_installed_algorithms() and not {"cma", "pymoo:GA"} & set(list_installed_algorithms())
+    for name, package in (("cma", "cma"), ("pymoo:GA", "pymoo")):
+        with pytest.raises(
+            SearchError, match=rf"'{name}' needs the package {package}.*pip install 'nlp-gait\[algorithms\]'"
+        ):
+            make_algorithm(name)
 
 
 def test_importing_the_package_imports_none_of_them() -> None:
@@ -54,39 +44,8 @@ def test_importing_the_package_imports_none_of_them() -> None:
     assert not {"cma", "pymoo", "scipy"} & set(done.stdout.split())
 
 
-def test_handlings_by_name() -> None:
-    assert make_handling("deb") == Deb() and make_handling("epsilon", control=0.5) == EpsilonLevel(control=0.5)
-    assert make_handling("penalty", weight=3.0) == StaticPenalty(weight=3.0)
-    for name, settings, message in (
-        ("penalty", {}, "constraint handling 'penalty' needs a value for 'weight'"),
-        ("deb", {"weight": 1.0}, "constraint handling 'deb' has no setting 'weight'"),
-        ("epsilonn", {}, "unknown constraint handling 'epsilonn'; did you mean 'epsilon'"),
-    ):
-        with pytest.raises(SearchError, match=message):
-            make_handling(name, **settings)
-
-
-@pytest.mark.parametrize(
-    ("name", "settings", "message"),
-    [
-        ("cma", {"population": 3}, "population must be a whole number >= 4"),
-        ("cma", {"sigma": 0.0}, "sigma"),
-        ("cma", {"growth": 0.5}, "growth"),
-        ("de", {"population": 4}, "population must be a whole number >= 5"),
-        ("de", {"strategy": "best"}, "strategy must be one of best1bin"),
-        ("de", {"mutation_low": 1.2}, "mutation_low must be .* <= 1.0"),
-        ("de", {"recombination": 2.0}, "recombination"),
-        ("pymoo:GA", {"population": 1}, "population"),
-        ("pymoo:GAA", {}, "unknown algorithm 'pymoo:GAA'; did you mean 'pymoo:GA'"),
-        ("pymoo:GA", {"settings": {"nonsense": 1, "seed": 1}}, None),
-    ],
-)
-def test_bad_settings_of_adapters(name: str, settings: dict[str, object], message: str | None) -> None:
-    if message is None:  # what pymoo itself takes, it takes: its own settings are passed on
-        assert make_algorithm(name, **settings).population == 50
-        return
-    with pytest.raises(SearchError, match=message):
-        make_algorithm(name, **settings)
+def test_settings_of_pymoos_own_are_passed_on() -> None:
+    assert make_algorithm("pymoo:GA", settings={"nonsense": 1, "seed": 1}).population == 50
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -144,11 +103,6 @@ def test_trials_of_differential_evolution_are_those_of_scipy(strategy: str) -> N
     np.testing.assert_allclose(search.ask(), generations[1], rtol=1e-14)
 
 
-def test_two_mutants_of_random_members_need_six() -> None:
-    with pytest.raises(SearchError, match="population must be a whole number >= 6"):
-        DifferentialEvolution(strategy="rand2bin", population=5)
-
-
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_every_strategy_of_differential_evolution_converges(strategy: str) -> None:
     result = minimize(sphere(2), DifferentialEvolution(strategy=strategy, population=20), evaluations=4000, seed=3)
@@ -167,3 +121,20 @@ def test_cma_does_not_touch_the_global_generator() -> None:
     before = np.random.get_state()[1].copy()  # type: ignore[union-attr]
     minimize(disc(), CmaEs(), evaluations=500, seed=1)
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # type: ignore[index]
+
+
+def test_the_population_of_lshade_shrinks_to_four() -> None:
+    problem = sphere(2)
+    minimize(problem, make_algorithm("lshade", population=40), evaluations=1000)
+    assert problem.calls[0] == 40 and problem.calls[-2] <= 5
+    assert all(after <= before for before, after in zip(problem.calls, problem.calls[1:], strict=False))
+
+
+def test_means_and_gains_of_lshade_by_hand() -> None:
+    assert compute_lehmer_mean(np.array([0.2, 0.6]), np.array([1.0, 3.0])) == pytest.approx(
+        (0.04 + 3 * 0.36) / (0.2 + 1.8)
+    )
+    assert compute_lehmer_mean(np.zeros(2), np.ones(2)) == 0.0
+    before = np.array([4.0, 2.0, 0.0, 0.0]), np.array([1.0, 1.0, 10.0, 10.0])
+    after = np.array([0.0, 1.0, 0.0, 0.0]), np.array([9.0, 9.0, 5.0, 8.0])
+    np.testing.assert_allclose(compute_gains(before, after), [1.0, 0.25, 1.0, 0.4])

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
 from metaheuristics import (
+    ADAPTERS,
     ALGORITHMS,
     AntColony,
     AntColonyGrid,
+    Deb,
+    EpsilonLevel,
     Flip,
     GeneticAlgorithm,
     ParticleSwarm,
@@ -18,8 +23,14 @@ from metaheuristics import (
     SearchError,
     SimulatedBinary,
     SinglePoint,
+    StaticPenalty,
     make_algorithm,
+    make_handling,
 )
+from metaheuristics.adapters.cma import CmaEs
+from metaheuristics.adapters.pymoo import Pymoo
+from metaheuristics.algorithms.differential_evolution import DifferentialEvolution, LShade
+from metaheuristics.multi_objective import make_front_algorithm
 
 
 @pytest.mark.parametrize(
@@ -46,28 +57,69 @@ from metaheuristics import (
         (AntColonyGrid, {"levels": 1}, "levels"),
         (AntColonyGrid, {"evaporation": 0.0}, "evaporation"),
         (AntColonyGrid, {"population": 4, "depositors": 6}, "depositors must be .* <= 5"),
+        (DifferentialEvolution, {"population": 4}, "population must be a whole number >= 5"),
+        (DifferentialEvolution, {"strategy": "rand2bin", "population": 5}, "population must be a whole number >= 6"),
+        (DifferentialEvolution, {"strategy": "best"}, "strategy must be one of best1bin"),
+        (DifferentialEvolution, {"mutation_low": 1.2}, "mutation_low must be .* <= 1.0"),
+        (DifferentialEvolution, {"recombination": 2.0}, "recombination"),
+        (LShade, {"population": 3}, "LShade: population must be a whole number >= 4, got 3"),
+        (LShade, {"best": 0.0}, "best must be a finite number > 0.0 and <= 1.0, got 0.0"),
+        (LShade, {"archive": -1.0}, "archive must be a finite number >= 0.0, got -1.0"),
+        (CmaEs, {"population": 3}, "population must be a whole number >= 4"),
+        (CmaEs, {"sigma": 0.0}, "sigma"),
+        (CmaEs, {"growth": 0.5}, "CmaEs: growth must be a finite number >= 1.0, got 0.5"),
+        (partial(Pymoo, algorithm="GA"), {"population": 1}, "population"),
+        (StaticPenalty, {"weight": 0.0}, r"StaticPenalty: weight must be a finite number > 0\.0, got 0\.0"),
+        (StaticPenalty, {"weight": np.nan}, "weight"),
+        (EpsilonLevel, {"share": 1.5}, "share must be .* >= 0.0 and <= 1.0, got 1.5"),
+        (EpsilonLevel, {"share": -0.1}, "share"),
+        (EpsilonLevel, {"exponent": 0.0}, "exponent"),
+        (EpsilonLevel, {"control": 0.0}, "control"),
+        (EpsilonLevel, {"control": 1.1}, "control"),
     ],
 )
-def test_bad_settings(factory: type, settings: dict[str, object], message: str) -> None:
+def test_bad_settings(factory: Callable[..., object], settings: dict[str, object], message: str) -> None:
     with pytest.raises(SearchError, match=message):
         factory(**settings)
 
 
-@pytest.mark.parametrize("name", ALGORITHMS)
+@pytest.mark.parametrize(
+    "settings", [{"exponent": 0.1}, {"control": 0.1}, {"control": 1.0}, {"share": 0.0}, {"share": 1.0}]
+)
+def test_settings_at_the_edge_are_allowed(settings: dict[str, float]) -> None:
+    assert EpsilonLevel(**settings) != EpsilonLevel()
+
+
+@pytest.mark.parametrize("name", [*ALGORITHMS, *ADAPTERS])
 def test_lookup_by_name(name: str) -> None:
-    made = make_algorithm(name, population=12)
-    assert made.name == name and made.population == 12 and made == ALGORITHMS[name](population=12)
+    algorithm = make_algorithm(name, population=12)
+    assert (algorithm.name, algorithm.population) == (name, 12)
+    assert algorithm == {**ALGORITHMS, **ADAPTERS}[name](population=12)
 
 
-def test_unknown_names_are_answered_with_near_ones() -> None:
-    with pytest.raises(
-        SearchError, match="unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, aco, aco-grid"
-    ):
-        make_algorithm("psoo")
-    with pytest.raises(SearchError, match="'pso' has no setting 'inertial'; did you mean 'inertia'"):
-        make_algorithm("pso", inertial=1.0)
-    with pytest.raises(SearchError, match="unknown algorithm 'simplex'; Known"):
-        make_algorithm("simplex")
+def test_handlings_by_name() -> None:
+    assert make_handling("deb") == Deb() and make_handling("epsilon", control=0.5) == EpsilonLevel(control=0.5)
+    assert make_handling("penalty", weight=3.0) == StaticPenalty(weight=3.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "settings", "message"),
+    [
+        (make_algorithm, "psoo", {}, "unknown algorithm 'psoo'; did you mean 'pso'.*Known: pso, pso-constant, ga, aco"),
+        (make_algorithm, "simplex", {}, "unknown algorithm 'simplex'; Known"),
+        (make_algorithm, "pymoo:GAA", {}, "unknown algorithm 'pymoo:GAA'; did you mean 'pymoo:GA'"),
+        (make_algorithm, "pso", {"inertial": 1.0}, "'pso' has no setting 'inertial'; did you mean 'inertia'"),
+        (make_front_algorithm, "NSGA", {}, "did you mean 'NSGA2'"),
+        (make_handling, "penalty", {}, "constraint handling 'penalty' needs a value for 'weight'"),
+        (make_handling, "deb", {"weight": 1.0}, "constraint handling 'deb' has no setting 'weight'"),
+        (make_handling, "epsilonn", {}, "unknown constraint handling 'epsilonn'; did you mean 'epsilon'"),
+    ],
+)
+def test_unknown_names_are_answered_with_near_ones(
+    make: Callable[..., object], name: str, settings: dict[str, object], message: str
+) -> None:
+    with pytest.raises(SearchError, match=message):
+        make(name, **settings)
 
 
 def test_settings_are_immutable() -> None:
