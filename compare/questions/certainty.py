@@ -8,14 +8,12 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.best_known import compute_gap
-from compare.analysis.units import make_axis_label, with_unit
-from compare.drawing.figures import COLOURS, make_axes, use_style
+from compare.analysis.units import with_unit
 from compare.questions.local_optima import LocalOptimum, UnseenOptima, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Answer, Question, Work
-from compare.report.document import Figure, make_text_table
+from compare.report.document import make_text_table
 from compare.study.references import find_reference
 from compare.study.task import describe_problem
 from metaheuristics.minimize import minimize
@@ -33,7 +31,7 @@ from nlp_gait.proofs.checkpoint import PROVER
 
 # Branch and bound is for this many variables, because its work grows exponentially with them; a least-power form allows nine.
 MOST_VARIABLES = 4
-DRAWN, LISTED = 20, 10  # best distinct optima
+LISTED = 10  # best distinct optima
 CHECK_EVALUATIONS = 20_000  # of a search that a certificate is compared with
 
 
@@ -139,8 +137,8 @@ class Certainty(Question[FoundCertainty]):
             InputError: no start converged.
             CompilerError: a search or a proof is requested and there is no compiler.
         """
-        problem, store, progress = self.problem, work.store, work.progress
-        ends = run_stored_starts(problem, store, starts=self.starts, seed=self.seed, progress=progress)
+        problem, store = self.problem, work.store
+        ends = run_stored_starts(problem, work, starts=self.starts, seed=self.seed)
         optima = cluster_ends(problem, ends)
         if not optima:
             raise InputError(
@@ -156,7 +154,7 @@ class Certainty(Question[FoundCertainty]):
         def prove() -> Certificate:
             name = f"proof-{hash_json({**make_key(identity), 'tolerance': self.tolerance})[:12]}.npz"
             checkpoint = None if store.folder is None else store.folder / name
-            return certify(problem, np.array(x), **limits, progress=progress, checkpoint=checkpoint)
+            return certify(problem, np.array(x), **limits, progress=work.progress, checkpoint=checkpoint)
 
         search = certificate = None
         if self.evaluations:
@@ -170,7 +168,7 @@ class Certainty(Question[FoundCertainty]):
         yield FoundCertainty(
             problem=problem,
             starts=self.starts,
-            statuses=dict(Counter(ends.status)),
+            statuses=dict(Counter(end.status for end in ends)),
             optima=tuple(optima),
             unseen=estimate_unseen(optima),
             search=search,
@@ -196,7 +194,6 @@ class Certainty(Question[FoundCertainty]):
         ]
         statuses = [(status, f"{count:,}") for status, count in findings.statuses.items()]
         listed = f"Distinct optima of {findings.starts:,} starts, {len(optima)} shown"
-        shown = "Ends of the starts, the proven bound and the end of the long search."
         certificates = {}
         if proof is not None and proof.closed:
             certificates[f"{problem.name}-certificate"] = asdict(make_certificate_file(problem, proof))
@@ -210,7 +207,6 @@ class Certainty(Question[FoundCertainty]):
                 make_text_table(
                     ("estimate", "value"), estimates, "Optima that no start reached: estimates, not proven"
                 ),
-                Figure(name=stem, caption=shown, drawing=plot_evidence(findings)),
             ),
             results=certificates,
             data=findings.to_json(),
@@ -229,28 +225,3 @@ def _search(problem: GaitProblem, best: float, evaluations: int, seed: int) -> L
         return LongSearch(objective=None, evaluations=result.evaluations, gap=None)
     value = problem.objective.sign * result.objective
     return LongSearch(objective=value, evaluations=result.evaluations, gap=compute_gap(value, best, problem.objective))
-
-
-def plot_evidence(evidence: FoundCertainty) -> Drawing:
-    """Plot objective and share of the best distinct optima, with the proven bound and the end of the long search as lines."""
-    objective, search, proof = evidence.problem.objective, evidence.search, evidence.certificate
-    shown = evidence.optima[:DRAWN]
-    values, shares = [o.objective for o in shown], [100 * o.share for o in shown]
-    with use_style():
-        figure, axes = make_axes(5.6, 3.6)
-        axes.vlines(values, 0.0, shares, color=COLOURS["ipopt"], linewidth=1)
-        label = f"distinct optima of {evidence.starts:,} starts of IPOPT ({len(shown)} of {len(evidence.optima)} shown)"
-        axes.plot(values, shares, "o", color=COLOURS["ipopt"], label=label)
-        if search is not None and search.objective is not None:
-            label = f"CMA-ES, {search.evaluations:,} evaluations"
-            axes.axvline(search.objective, color=COLOURS["cma"], linestyle="--", label=label)
-        if proof is not None and np.isfinite(proof.bound):
-            values.append(proof.bound)
-            axes.axvline(proof.bound, color=COLOURS["ga"], linestyle=":", label="proven bound")
-        pad = 0.05 * max(np.ptp(values), 0.01 * abs(values[0]))
-        axes.set_xlim(min(values) - pad, max(values) + pad)
-        axes.set_ylim(0.0, 105.0)
-        axes.set_xlabel(make_axis_label(objective.name, objective.unit))
-        axes.set_ylabel("share of converged starts [%]")
-        figure.legend(loc="outside lower center")
-    return figure

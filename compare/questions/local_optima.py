@@ -2,20 +2,18 @@
 
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from compare.study.store import Store
+from compare.questions.question import Work
 from nlp_gait.backends.identity import fingerprint
 from nlp_gait.backends.solvers.ipopt import IpoptSettings
 from nlp_gait.backends.solvers.solver import Solver
 from nlp_gait.errors import InputError
-from nlp_gait.files import replace_nan
 from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.progress import Progress, ignore_progress
 
 BATCH = 250  # starts that are stored together
 # Ends are one optimum if their objectives differ by no more than this, relative, and no variable by more than this share of its
@@ -25,14 +23,14 @@ SAME_X = 0.01
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Ends:
-    """Ends of all starts."""
+@dataclass(frozen=True, kw_only=True)
+class End:
+    """End of a start."""
 
-    x: Array  #: (N, n) end points
-    objective: Array  #: (N,) exact values, in the problem's sense
-    feasible: np.ndarray[Any, np.dtype[np.bool_]]  #: (N,) converged, and feasible for the exact functions
-    status: tuple[str, ...]  #: (N,) in words
+    x: tuple[float, ...]  #: (n,)
+    objective: float  #: exact value, in the problem's sense
+    feasible: bool  #: converged, and feasible for the exact functions
+    status: str  #: in words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,22 +55,15 @@ class UnseenOptima:
     good_turing: float  #: share of starts that would reach an unseen optimum: the optima reached once, divided by N
     #: Expected number of all local optima, for a uniform prior on their number and shares; None if the sample is too small
     expected_optima: float | None
-    expected_covered: (
-        float | None
-    )  #: expected share of starts that reach seen optima, for the same prior; None likewise
+    #: expected share of starts that reach seen optima, for the same prior; None likewise
+    expected_covered: float | None
     largest_missed: float  #: upper bound, with 95 % confidence, of the share of starts that one unseen optimum attracts
 
 
 def run_stored_starts(
-    problem: GaitProblem,
-    store: Store,
-    *,
-    starts: int,
-    seed: int = 0,
-    solver: Solver | None = None,
-    progress: Progress = ignore_progress,
-) -> Ends:
-    """Run a solver (by default IPOPT) from random starts, in stored batches, with a note about each of them.
+    problem: GaitProblem, work: Work, *, starts: int, seed: int = 0, solver: Solver | None = None
+) -> list[End]:
+    """Run a solver (by default IPOPT) from random starts, in stored batches, with a note about each batch.
 
     The start points of batch k depend on the seed and k only.
 
@@ -82,57 +73,42 @@ def run_stored_starts(
     """
     if starts < 1:
         raise InputError(f"starts must be at least 1, got {starts}")
-    chosen = solver or IpoptSettings()
-    ready = chosen.prepare(problem, starts)
-    code = [sys.modules[__name__]]
-    identity = {**fingerprint(problem), "seed": seed, "settings": repr(chosen)}
-    rows: list[list[Any]] = []
+    solver = solver or IpoptSettings()
+    ready = solver.prepare(problem, starts)
+    identity = {**fingerprint(problem), "seed": seed, "settings": repr(solver)}
+    ends: list[End] = []
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
         batch = partial(_run_batch, problem, ready, seed, k, count)
-        rows += store.compute(f"starts-{first}", inputs, batch, code=code, progress=progress)
-        progress(f"{len(rows)} starts")
-    x, objective, feasible, status = zip(*rows, strict=True)
-    return Ends(
-        x=np.array(x, dtype=float),
-        objective=np.array(objective, dtype=float),  # NaN where null was stored
-        feasible=np.array(feasible, dtype=bool),
-        status=tuple(status),
+        ends += work.compute(tuple[End, ...], f"starts-{first}", inputs, batch, code=[sys.modules[__name__]])
+        work.progress(f"{len(ends)} starts")
+    return ends
+
+
+def _run_batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> tuple[End, ...]:
+    rng = np.random.default_rng([seed, batch])
+    outcomes = [solver.run(problem, problem.start_point(rng)) for _ in range(count)]
+    return tuple(
+        End(x=tuple(end.x.tolist()), objective=end.objective, feasible=bool(end.converged), status=end.status)
+        for end in outcomes
     )
 
 
-def _run_batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> list[list[Any]]:
-    """Return x, objective, feasible and status of each start of a batch, as plain data."""
-    rng = np.random.default_rng([seed, batch])
-    rows: list[list[Any]] = []
-    for _ in range(count):
-        end = solver.run(problem, problem.start_point(rng))
-        rows.append([end.x.tolist(), end.objective, bool(end.converged), end.status])
-    return list(replace_nan(rows))
-
-
-def cluster_ends(problem: GaitProblem, ends: Ends) -> list[LocalOptimum]:
+def cluster_ends(problem: GaitProblem, ends: Sequence[End]) -> list[LocalOptimum]:
     """Return the distinct optima among the feasible ends, best first."""
-    feasible = np.flatnonzero(ends.feasible)
-    order: list[int] = feasible[np.argsort(problem.objective.sign * ends.objective[feasible], kind="stable")].tolist()
-    scaled = ends.x / problem.scale
+    feasible = sorted((end for end in ends if end.feasible), key=lambda end: problem.objective.sign * end.objective)
 
-    def same(i: int, head: int) -> bool:
-        near = abs(ends.objective[i] - ends.objective[head]) <= SAME_OBJECTIVE * abs(ends.objective[head])
-        return bool(near and np.max(np.abs(scaled[i] - scaled[head])) <= SAME_X)
+    def is_same(end: End, head: End) -> bool:
+        near = abs(end.objective - head.objective) <= SAME_OBJECTIVE * abs(head.objective)
+        return near and bool(np.max(np.abs(np.subtract(end.x, head.x)) / problem.scale) <= SAME_X)
 
-    counts: dict[int, int] = {}  # by the best end of each optimum
-    for i in order:
-        best = next((head for head in counts if same(i, head)), i)
+    counts: dict[End, int] = {}  # by the best end of each optimum
+    for end in feasible:
+        best = next((head for head in counts if is_same(end, head)), end)
         counts[best] = counts.get(best, 0) + 1
     return [
-        LocalOptimum(
-            objective=float(ends.objective[head]),
-            count=count,
-            share=count / len(feasible),
-            x=tuple(ends.x[head].tolist()),
-        )
+        LocalOptimum(objective=head.objective, count=count, share=count / len(feasible), x=head.x)
         for head, count in counts.items()
     ]
 

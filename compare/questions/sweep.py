@@ -16,7 +16,7 @@ from compare.drawing.figures import COLOURS, make_axes, mark_values, use_style
 from compare.questions.question import Answer, Question, Work, make_record_table
 from compare.questions.swept_walks import COST, SweepPoint, check_cycle, report_walks, simulate_walk
 from compare.report.document import Figure, make_text_table
-from compare.study.record import RunRecord, parse_record
+from compare.study.record import RunRecord, Verdict, parse_record
 from compare.study.references import find_reference
 from compare.study.run_task import run_task, try_task
 from compare.study.task import GRADIENT_SOLVERS, IPOPT, ProblemSpec, Stop, Task, check_task, describe_problem
@@ -25,7 +25,7 @@ from nlp_gait.backends.identity import identify_problem
 from nlp_gait.backends.solve import solve_both_ways
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, Result
-from nlp_gait.formulation.solution import Solution
+from nlp_gait.formulation.solution import Outcome, Solution
 from nlp_gait.interrupts import Interrupted, remember_interrupts
 from nlp_gait.simulation.engine import load_mujoco
 
@@ -125,12 +125,9 @@ class Sweep(Question[list[SweepPoint]]):
             ends, interrupt = cast("list[Solution | RunRecord | None]", error.partial), error
             if not tasks[0].is_search:
                 interrupt = Interrupted(f"{error.sentence}, not all of them solved in both directions", None)
-        found = {
-            tuple(at.values()): self._make_point(at, end)
-            for at, end in zip(path, ends, strict=False)
-            if end is not None
-        }
-        grid = [found[at] for at in itertools.product(*(axis.values for axis in self.axes)) if at in found]
+        ended = ((at, end) for at, end in zip(path, ends, strict=False) if end is not None)
+        points = {tuple(at.values()): self._make_point(at, end) for at, end in ended}
+        grid = [points[at] for at in itertools.product(*(axis.values for axis in self.axes)) if at in points]
         if grid:
             yield grid
         if interrupt is not None:
@@ -144,31 +141,25 @@ class Sweep(Question[list[SweepPoint]]):
             work.progress("")
 
     def _make_point(self, at: Mapping[str, float], end: Solution | RunRecord) -> SweepPoint:
+        judged: Outcome | Verdict
+        indexes: Mapping[str, float]
         if isinstance(end, Solution):
-            placed = self.problem.place(at)
-            indexes = build_exact_model(placed).at(placed.check_x(end.x), placed.p).indexes
-            return SweepPoint(
-                at=at,
-                objective=end.objective,
-                feasible=end.converged,
-                status=end.status,
-                x=end.x,
-                violation=end.best.violation,
-                evaluations=end.evaluations.f,
-                time_s=end.time_s.solve,
-                indexes=indexes,
-            )
-        verdict = end.verdict
+            judged, feasible, status, evaluations = end.best, end.converged, end.status, end.evaluations.f
+            indexes = build_exact_model(end.problem).at(end.best.x, end.problem.p).indexes
+        else:
+            judged, feasible, status, evaluations = end.verdict, end.verdict.feasible, end.status, end.evaluations["f"]
+            status = status if feasible else f"infeasible: {'; '.join(end.verdict.violated)}"
+            indexes = end.verdict.indexes
         return SweepPoint(
             at=at,
-            objective=verdict.objective,
-            feasible=verdict.feasible,
-            status=end.status if verdict.feasible else f"infeasible: {'; '.join(verdict.violated)}",
+            objective=judged.objective,
+            feasible=feasible,
+            status=status,
             x=end.x,
-            violation=verdict.violation,
-            evaluations=end.evaluations["f"],
+            violation=judged.violation,
+            evaluations=evaluations,
             time_s=end.time_s.solve,
-            indexes=verdict.indexes,
+            indexes=indexes,
         )
 
     @cached_property

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from compare.analysis.simulated_gaits import compute_agreement
@@ -45,9 +44,9 @@ class SweepPoint:
         """Return the cells of a table, with the main numbers of the simulation."""
         row = {name: value for name, value in vars(self).items() if name != "walk"}
         if self.walk is not None:
-            found = self.walk.measurements
-            power = {"mechanical_W": found.measured.mechanical_W, "heat_W": found.measured.heat_W}
-            row["engine"] = {**self.walk.course(), "largest_tilt_deg": found.largest_tilt_deg, **power}
+            numbers = self.walk.measurements
+            power = {"mechanical_W": numbers.measured.mechanical_W, "heat_W": numbers.measured.heat_W}
+            row["engine"] = {**self.walk.course(), "largest_tilt_deg": numbers.largest_tilt_deg, **power}
         return row
 
 
@@ -104,34 +103,23 @@ def _name_phase(time: str) -> str:
 
 
 def _report_simulations(axes: str, points: Sequence[SweepPoint]) -> list[Part]:
-    """Tables of the simulated gaits, and how well they confirm the model."""
+    """Table of the simulated gaits, and how well they confirm the model."""
     walks = [(_format_place(point), point.walk) for point in points if point.walk is not None]
     if not walks:
         return []
-    energies: Mapping[str, Callable[[tuple[str, Walk]], str]] = {
+    columns: Mapping[str, Callable[[tuple[str, Walk]], str]] = {
         axes: lambda row: row[0],
         "model": lambda row: with_unit(row[1].model_J_per_m, "J/m", ".2f"),
         "engine": lambda row: with_unit(row[1].engine_J_per_planned_m, "J/m", ".2f"),
         "error": lambda row: _format_error(row[1]),
-        "per walked m": lambda row: with_unit(row[1].engine_J_per_m, "J/m", ".2f"),
-        "end": lambda row: _describe_end(row[1]),
-    }
-    courses: Mapping[str, Callable[[tuple[str, Walk]], str]] = {
-        axes: lambda row: row[0],
         "walked": lambda row: format_millimetres(row[1].walked_m, ".0f"),
         "of": lambda row: format_millimetres(row[1].planned_m, ".0f"),
         "drift": lambda row: format_millimetres(row[1].drift_m),
-        "heading": lambda row: with_unit(row[1].heading_deg, "deg", ".2f"),
-        "tilt": lambda row: with_unit(row[1].measurements.largest_tilt_deg, "deg", ".1f"),
-        "tracking": lambda row: with_unit(row[1].measurements.tracking_max_rad, "rad", ".4f"),
+        "end": lambda row: _describe_end(row[1]),
     }
-    steps = walks[0][1].steps
-    agreed = compute_agreement([w.model_J_per_m for _, w in walks], [w.engine_J_per_planned_m for _, w in walks])
-    return [
-        make_table(f"Energy of {steps} steps in the engine, for each planned metre", walks, energies),
-        agreed.describe(),
-        make_table(f"Course of the {steps} steps", walks, courses),
-    ]
+    title = f"Energy of {walks[0][1].steps} steps in the engine, for each planned metre, and their course"
+    model, engine = zip(*((walk.model_J_per_m, walk.engine_J_per_planned_m) for _, walk in walks), strict=True)
+    return [make_table(title, walks, columns), compute_agreement(model, engine).describe()]
 
 
 def _format_error(walk: Walk) -> str:
@@ -155,7 +143,16 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
         figure = make_figure(6.3, 5.0)
         cost, lengths, times = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 1))
         cost.plot(at, [point.indexes[COST] for point in good], "o-", color=MODEL, label="model")
-        _plot_engine_costs(cost, name, good)
+        walks = [(point, point.walk) for point in good if point.walk is not None]
+        covered = [  # energy over the distance that was really covered
+            (point.at[name], walk.engine_J_per_m / point.indexes["energy_J_per_m"] * point.indexes[COST])
+            for point, walk in walks
+            if walk.engine_J_per_m is not None
+        ]
+        if covered:
+            cost.plot(*zip(*covered, strict=True), "s--", color=ENGINE, label="engine")
+        fallen = [point.at[name] for point, walk in walks if walk.measurements.fallen]
+        mark_values(cost, fallen, "falls", "v", FALLS, 0.1)
         mark_values(cost, [point.at[name] for point in points if not point.feasible], "infeasible")
         cost.set(ylabel="cost of transport\nP / (m g v)")
         cost.legend()
@@ -168,16 +165,3 @@ def plot_costs(points: Sequence[SweepPoint], problem: GaitProblem) -> Drawing:
         for axes in (cost, lengths, times):
             axes.set_ylim(bottom=0.0)
     return figure
-
-
-def _plot_engine_costs(axes: Axes, name: str, points: Sequence[SweepPoint]) -> None:
-    """Energy of the simulated walks over the distance that they really covered."""
-    covered = [
-        (point.at[name], point.walk.engine_J_per_m / point.indexes["energy_J_per_m"] * point.indexes[COST])
-        for point in points
-        if point.walk is not None and point.walk.engine_J_per_m is not None
-    ]
-    if covered:
-        axes.plot(*zip(*covered, strict=True), "s--", color=ENGINE, label="engine")
-    fallen = [point.at[name] for point in points if point.walk is not None and point.walk.measurements.fallen]
-    mark_values(axes, fallen, "falls", "v", FALLS, 0.1)

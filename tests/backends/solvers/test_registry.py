@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from compare.questions.local_optima import run_stored_starts
+from compare.questions.question import Work
 from compare.study.store import Store
 from nlp_gait.backends.optima.optimum import find_optimum
 from nlp_gait.backends.solve import Continuation, find_cheapest_feasible, solve, solve_both_ways
@@ -75,8 +76,8 @@ def test_a_solver_with_a_name_and_a_run_is_enough(tmp_path: Path) -> None:
         "",
         "interpreted",
     )
-    ends = run_stored_starts(problem, Store(tmp_path), starts=3, solver=Corners(), progress=lambda note: None)
-    assert ends.feasible.all() and ends.objective == pytest.approx([1.5] * 3)
+    ends = run_stored_starts(problem, Work(store=Store(tmp_path)), starts=3, solver=Corners())
+    assert all(end.feasible for end in ends) and [end.objective for end in ends] == pytest.approx([1.5] * 3)
 
 
 def test_what_needs_multipliers_says_which_solver_gives_none() -> None:

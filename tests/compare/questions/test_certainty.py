@@ -10,7 +10,7 @@ from casadi import MX
 
 import nlp_gait
 from compare.questions.certainty import Certainty
-from compare.questions.local_optima import Ends, LocalOptimum, cluster_ends, estimate_unseen, run_stored_starts
+from compare.questions.local_optima import End, LocalOptimum, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Work, find
 from compare.study.references import find_reference
 from compare.study.store import Store
@@ -60,19 +60,14 @@ def test_an_infeasible_incumbent_is_refused() -> None:
         certify(toy(two_valleys, limit=2.0), np.array([0.0, 0.0]))
 
 
-def ends(x: list[float], objective: list[float], feasible: list[bool]) -> Ends:
-    return Ends(
-        x=np.array([[value, 0.0] for value in x]),
-        objective=np.array(objective),
-        feasible=np.array(feasible),
-        status=("converged",) * len(x),
-    )
+def make_end(x: float, objective: float, feasible: bool) -> End:
+    return End(x=(x, 0.0), objective=objective, feasible=feasible, status="")
 
 
 def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_none() -> None:
-    found = cluster_ends(
-        toy(two_valleys), ends([1.0, -1.0, 1.001, 0.5], [2.0, 2.0, 2.00001, 1.0], [True, True, True, False])
-    )
+    pairs = ((1.0, 2.0), (-1.0, 2.0), (1.001, 2.00001))
+    ends = [*(make_end(x, objective, True) for x, objective in pairs), make_end(0.5, 1.0, False)]
+    found = cluster_ends(toy(two_valleys), ends)
     assert [optimum.count for optimum in found] == [2, 1]
     assert [optimum.objective for optimum in found] == [2.0, 2.0]
     assert sum(optimum.share for optimum in found) == pytest.approx(1.0)
@@ -91,18 +86,17 @@ def test_estimates_by_hand() -> None:
 def test_interrupted_starts_continue_to_the_same_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("compare.questions.local_optima.BATCH", 4)
     problem = toy(two_valleys)
-    whole = run_stored_starts(problem, Store(tmp_path / "whole"), starts=8)
+    whole = run_stored_starts(problem, Work(store=Store(tmp_path / "whole")), starts=8)
 
     def interrupt(note: str) -> None:
         if note == "4 starts":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_stored_starts(problem, Store(tmp_path / "cut"), starts=8, progress=interrupt)
-    notes: list[str] = []
-    resumed = run_stored_starts(problem, Store(tmp_path / "cut"), starts=8, progress=notes.append)
-    assert "starts-0: stored by an earlier run" in notes
-    np.testing.assert_array_equal(whole.x, resumed.x)
+        run_stored_starts(problem, Work(store=Store(tmp_path / "cut"), progress=interrupt), starts=8)
+    store = Store(tmp_path / "cut")
+    assert run_stored_starts(problem, Work(store=store), starts=8) == whole
+    assert store.summary == "1 of 2 results were stored by an earlier run"
 
 
 def test_gaps_are_measured_from_the_shipped_value_and_not_from_the_best_start() -> None:
