@@ -24,7 +24,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class End:
+class StartEnd:
     """End of a start."""
 
     x: tuple[float, ...]  #: (n,)
@@ -62,7 +62,7 @@ class UnseenOptima:
 
 def run_stored_starts(
     problem: GaitProblem, work: Work, *, starts: int, seed: int = 0, solver: Solver | None = None
-) -> list[End]:
+) -> list[StartEnd]:
     """Run a solver (by default IPOPT) from random starts, in stored batches, with a note about each batch.
 
     The start points of batch k depend on the seed and k only.
@@ -76,34 +76,34 @@ def run_stored_starts(
     solver = solver or IpoptSettings()
     ready = solver.prepare(problem, starts)
     identity = {**fingerprint(problem), "seed": seed, "settings": repr(solver)}
-    ends: list[End] = []
+    ends: list[StartEnd] = []
     for k, first in enumerate(range(0, starts, BATCH)):
         count = min(BATCH, starts - first)
         inputs = {**identity, "batch": k, "count": count}
         batch = partial(_run_batch, problem, ready, seed, k, count)
-        ends += work.compute(tuple[End, ...], f"starts-{first}", inputs, batch, code=[sys.modules[__name__]])
+        ends += work.compute(tuple[StartEnd, ...], f"starts-{first}", inputs, batch, code=[sys.modules[__name__]])
         work.progress(f"{len(ends)} starts")
     return ends
 
 
-def _run_batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> tuple[End, ...]:
+def _run_batch(problem: GaitProblem, solver: Solver, seed: int, batch: int, count: int) -> tuple[StartEnd, ...]:
     rng = np.random.default_rng([seed, batch])
     outcomes = [solver.run(problem, problem.start_point(rng)) for _ in range(count)]
     return tuple(
-        End(x=tuple(end.x.tolist()), objective=end.objective, feasible=bool(end.converged), status=end.status)
+        StartEnd(x=tuple(end.x.tolist()), objective=end.objective, feasible=bool(end.converged), status=end.status)
         for end in outcomes
     )
 
 
-def cluster_ends(problem: GaitProblem, ends: Sequence[End]) -> list[LocalOptimum]:
+def cluster_ends(problem: GaitProblem, ends: Sequence[StartEnd]) -> list[LocalOptimum]:
     """Return the distinct optima among the feasible ends, best first."""
     feasible = sorted((end for end in ends if end.feasible), key=lambda end: problem.objective.sign * end.objective)
 
-    def is_same(end: End, head: End) -> bool:
+    def is_same(end: StartEnd, head: StartEnd) -> bool:
         near = abs(end.objective - head.objective) <= SAME_OBJECTIVE * abs(head.objective)
         return near and bool(np.max(np.abs(np.subtract(end.x, head.x)) / problem.scale) <= SAME_X)
 
-    counts: dict[End, int] = {}  # by the best end of each optimum
+    counts: dict[StartEnd, int] = {}  # by the best end of each optimum
     for end in feasible:
         best = next((head for head in counts if is_same(end, head)), end)
         counts[best] = counts.get(best, 0) + 1

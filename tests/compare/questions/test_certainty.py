@@ -10,7 +10,7 @@ from casadi import MX
 
 import nlp_gait
 from compare.questions.certainty import Certainty
-from compare.questions.local_optima import End, LocalOptimum, cluster_ends, estimate_unseen, run_stored_starts
+from compare.questions.local_optima import LocalOptimum, StartEnd, cluster_ends, estimate_unseen, run_stored_starts
 from compare.questions.question import Work, find
 from compare.study.references import find_reference
 from compare.study.store import Store
@@ -60,8 +60,8 @@ def test_an_infeasible_incumbent_is_refused() -> None:
         certify(toy(two_valleys, limit=2.0), np.array([0.0, 0.0]))
 
 
-def make_end(x: float, objective: float, feasible: bool) -> End:
-    return End(x=(x, 0.0), objective=objective, feasible=feasible, status="")
+def make_end(x: float, objective: float, feasible: bool) -> StartEnd:
+    return StartEnd(x=(x, 0.0), objective=objective, feasible=feasible, status="")
 
 
 def test_ends_of_equal_value_far_apart_are_two_optima_and_failures_count_for_none() -> None:
