@@ -6,7 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -34,17 +34,22 @@ Maker = Callable[..., GaitProblem]
 def maker(make: Maker) -> Maker:
     """Turn a function of keyword options into a maker of problems: options are checked, and recorded in the problem.
 
-    The function's signature is the only list of the options. An option annotated with a ``Literal`` takes its values only. The
-    problem is refined by the option that its grid names.
+    The function's signature is the only list of the options; an argument annotated with a data class stands for its fields. An
+    option annotated with a ``Literal`` takes its values only. The problem is refined by the option that its grid names.
     """
+    hints: dict[str, Any] = get_type_hints(make)
+    groups = {name: hint for name, hint in hints.items() if hasattr(hint, "__dataclass_fields__") and name != "return"}
+    listed = [inspect.signature(kind).parameters for kind in groups.values()] or [inspect.signature(make).parameters]
+    known = {name: option for options in listed for name, option in options.items()}
 
     @lock_casadi
     @functools.wraps(make)
     def make_problem(**options: Any) -> GaitProblem:
         options = {name: _to_python(value) for name, value in options.items()}
-        check_options(make, options)
-        call = {name: option.default for name, option in inspect.signature(make).parameters.items()} | options
-        problem = make(**call)
+        check_options(make_problem, options)
+        call = {name: option.default for name, option in known.items()} | options
+        given = {name: kind(**{f.name: call[f.name] for f in fields(kind)}) for name, kind in groups.items()}
+        problem = make(**(given or call))
         if not isinstance(problem, GaitProblem):
             raise InputError(f"{make.__name__!r} must make a GaitProblem, it made {type(problem).__name__}")
         grid = problem.grid
@@ -58,6 +63,8 @@ def maker(make: Maker) -> Maker:
             problem = replace(problem, refine=lambda factor: make_problem(**{**call, refined_by: count * factor}))
         return problem.with_origin(make_problem, call)
 
+    make_problem.__signature__ = inspect.Signature(list(known.values()))  # type: ignore[attr-defined]
+    make_problem.__annotations__ = {k: v for kind in groups.values() or [make] for k, v in get_type_hints(kind).items()}
     make_problem.checks_options = True  # type: ignore[attr-defined]
     return make_problem
 

@@ -126,6 +126,13 @@ class Body(ABC):
             raise InputError(f"slope_deg must be within +-{STEEPEST_DEG:g}, got {slope_deg!r}")
         return replace(self, slope_rad=math.radians(slope_deg))
 
+    def check_step_length(self, step_m: float) -> float:
+        """Return a step length; 0 stands for NAO's in proportion [m]. Raises InputError unless it is finite and >= 0."""
+        number = isinstance(step_m, (int, float)) and not isinstance(step_m, bool)
+        if not (number and 0.0 <= step_m < math.inf):
+            raise InputError(f"step_length_m must be a finite number > 0, or 0 for one in proportion, got {step_m!r}")
+        return step_m if step_m > 0.0 else self.step_length_m
+
     @property
     def gravity_vector(self) -> tuple[float, float, float]:
         """Gravity (3,) in the axes of the ground [m/s^2]."""

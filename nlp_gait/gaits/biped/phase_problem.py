@@ -21,8 +21,6 @@ from nlp_gait.gaits.biped.skeleton import draw_robot
 from nlp_gait.symbolic.nonsmooth import Exact
 
 Criterion = Literal["power", "jerk", "torque", "torque-smoothness"]
-# Titles of the phases' problems.
-SINGLE_SUPPORT, DOUBLE_SUPPORT = "single support: least mean power", "double support: least mean power"
 DRAWS = 50  # of a start point, at most
 
 

@@ -1,6 +1,5 @@
 """Any humanoid as its gaits take it: sizes that scale NAO's bounds and limits, and legs under a torso that leans."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -45,13 +44,6 @@ class Humanoid(Body):
 
     biped: Biped  # its legs and size
     newton_steps: Mapping[str, int]  # of Newton's method, by foot
-
-    def check_step_length(self, step_m: float) -> float:
-        """Return a step length; 0 stands for NAO's in proportion [m]. Raises InputError unless it is finite and >= 0."""
-        number = isinstance(step_m, (int, float)) and not isinstance(step_m, bool)
-        if not (number and 0.0 <= step_m < math.inf):
-            raise InputError(f"step_length_m must be a finite number > 0, or 0 for one in proportion, got {step_m!r}")
-        return step_m if step_m > 0.0 else self.step_length_m
 
     @property
     def angle_variables(self) -> tuple[Variable, ...]:

@@ -9,7 +9,7 @@ Options that the problems share:
     derivatives            analytic, or finite-difference: of the sampled angles, as in the paper, of first order at the
                            ends; finite-difference-2: of second order there, too
     rotational_inertia     false takes every link as a point mass, in torques and ZMP
-    step_length_m          from foot to foot
+    step_length_m          from foot to foot; 0 for 0.06 m in proportion
     torso_share            rule that divides the torso's mass between the legs in double support, see
                            ``load_sharing.share_torso``; free plans the ground's wrench on the second foot instead
     load_degree            of that wrench's polynomials over double support

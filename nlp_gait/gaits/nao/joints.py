@@ -85,13 +85,6 @@ def measure_leg(robot: Robot, side: str) -> LegGeometry:
     return LegGeometry(hip, -knee.origin_m[2], -ankle.origin_m[2], foot.ankle_height_m)  # type: ignore[arg-type]
 
 
-def check_step_length(step_length_m: float) -> None:
-    """Raise InputError unless it is a finite number > 0."""
-    number = isinstance(step_length_m, (int, float)) and not isinstance(step_length_m, bool)
-    if not (number and 0.0 < step_length_m < math.inf):
-        raise InputError(f"step_length_m must be a finite number > 0, got {step_length_m!r}")
-
-
 def _check_chain(robot: Robot, joints: tuple[Joint, ...]) -> None:
     above = robot.root
     for joint in joints:

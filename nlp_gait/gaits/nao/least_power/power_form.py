@@ -7,6 +7,7 @@ of the time T, and a torque is that of gravity plus 1 / T^2 times that of the mo
 
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,10 +21,25 @@ from nlp_gait.gaits.nao.joints import measure_leg
 from nlp_gait.gaits.nao.least_power.power_instants import PAIRS, PowerInstant, PowerPhase
 from nlp_gait.robots import Robot
 
-# Derivatives, trajectory, objective, motors, arms, sign of g and rule of these formulas, with one sample in each interval.
-FORM_OPTIONS = ("analytic", "cubic", "power", "", "carried", "physical", "trapezoid")
+# Options of the phases that these formulas are for.
+FORM_OPTIONS = {
+    "derivatives": "analytic",
+    "trajectory": "cubic",
+    "objective": "power",
+    "motors": "",
+    "arms": "carried",
+    "zmp_gravity": "physical",
+    "zmp_masses": 25,
+    "rule": "trapezoid",
+}
 # Up to this angle its tangent is monotone; slack for angles that break their limits within the judge's tolerance [rad].
 STEEPEST, ANGLE_SLACK = 1.5, 1e-5
+
+
+def fits_power_form(options: Mapping[str, Any]) -> bool:
+    """Return whether these formulas are those of a phase with the options, with one sample in each interval."""
+    usual = all(options.get(name, value) == value for name, value in FORM_OPTIONS.items())
+    return usual and bool(options["samples_per_interval"] < 2)
 
 
 def make_power_form_maker(
