@@ -20,8 +20,8 @@ from nlp_gait.gaits.biped.walk import plan_whole_walk
 
 
 @dataclass(frozen=True, kw_only=True)
-class Samples:
-    """Samples of a phase, and the rule of means."""
+class SampleOptions:
+    """SampleOptions of a phase, and the rule of means."""
 
     intervals: int = 10
     samples_per_interval: int = 0
@@ -34,7 +34,7 @@ class Samples:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhaseOptions(Samples):
+class PhaseOptions(SampleOptions):
     """A phase as in the paper."""
 
     step_length_m: float = 0.0
@@ -51,7 +51,7 @@ class LoadOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CycleOptions(Samples, LoadOptions):
+class CycleOptions(SampleOptions, LoadOptions):
     """One step, whose mirror image is the next one."""
 
     objective: CycleObjective = "energy-per-metre"
@@ -59,7 +59,7 @@ class CycleOptions(Samples, LoadOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class WalkOptions(Samples):
+class WalkOptions(SampleOptions):
     """A walk from standing to standing."""
 
     steps: int = 10

@@ -21,7 +21,7 @@ from nlp_gait.gaits.humanoid.turning import check_turns
 
 
 @dataclass(frozen=True, kw_only=True)
-class Robot:
+class HumanoidOptions:
     """The robot, and which of its limits count."""
 
     robot: str = "nao-v5"
@@ -43,7 +43,7 @@ class Stairs:
 
 
 @maker
-def humanoid_ssp(robot: Robot, options: PhaseOptions) -> GaitProblem:
+def humanoid_ssp(robot: HumanoidOptions, options: PhaseOptions) -> GaitProblem:
     """Single support; the swing foot moves by twice the step length.
 
     Source:
@@ -53,7 +53,7 @@ def humanoid_ssp(robot: Robot, options: PhaseOptions) -> GaitProblem:
 
 
 @maker
-def humanoid_dsp(robot: Robot, options: PhaseOptions, loads: LoadOptions) -> GaitProblem:
+def humanoid_dsp(robot: HumanoidOptions, options: PhaseOptions, loads: LoadOptions) -> GaitProblem:
     """Double support, the right foot a step ahead.
 
     Source:
@@ -63,7 +63,7 @@ def humanoid_dsp(robot: Robot, options: PhaseOptions, loads: LoadOptions) -> Gai
 
 
 @maker
-def humanoid_cycle(robot: Robot, options: CycleOptions) -> GaitProblem:
+def humanoid_cycle(robot: HumanoidOptions, options: CycleOptions) -> GaitProblem:
     """Walking cycle: one step, whose mirror image is the next one.
 
     ``objective=power``, and ``torque`` for the mean of the sum of squared torques, are those at the speed ``speed_m_s``, a
@@ -77,7 +77,7 @@ def humanoid_cycle(robot: Robot, options: CycleOptions) -> GaitProblem:
 
 
 @maker
-def humanoid_walk(robot: Robot, options: WalkOptions, stairs: Stairs) -> GaitProblem:
+def humanoid_walk(robot: HumanoidOptions, options: WalkOptions, stairs: Stairs) -> GaitProblem:
     """Whole walk from standing to standing: weight shift, half step, steps, half step, weight shift.
 
     All inner steps are one cycle, as in ``humanoid-cycle``; its speed may have limits, which are parameters. The feet advance by

@@ -30,14 +30,14 @@ from nlp_gait.gaits.biped.support_phases import make_support_phase, place_hip, p
 from nlp_gait.gaits.nao.body import ARM_SWING, Arms, NaoBody, ZmpGravity, ZmpMasses, make_nao
 from nlp_gait.gaits.nao.free_joints import fit_joints, make_free_single_support_phase
 from nlp_gait.gaits.nao.leaning_torso import make_leaning_nao
-from nlp_gait.gaits.nao.least_power.power_form import fits_power_form, make_power_form_maker
+from nlp_gait.gaits.nao.least_power.power_form import has_power_form, make_power_form_maker
 from nlp_gait.gaits.nao.least_power.power_instants import make_double_support, make_single_support
 
 STEP_M = 0.06
 
 
 @dataclass(frozen=True, kw_only=True)
-class Robot:
+class NaoOptions:
     """The robot and its limits."""
 
     robot: str = "nao-v5"
@@ -50,14 +50,14 @@ class Robot:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotWithMotors(Robot):
+class NaoMotorOptions(NaoOptions):
     """The robot, perhaps with its real motors."""
 
     motors: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReadRobot(RobotWithMotors):
+class NaoReading(NaoMotorOptions):
     """The robot in a reading of the paper."""
 
     arms: Arms = "carried"
@@ -65,7 +65,7 @@ class ReadRobot(RobotWithMotors):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReadDoubleSupport(ReadRobot):
+class DoubleSupportReading(NaoReading):
     """The same in double support."""
 
     zmp_masses: ZmpMasses = 25
@@ -87,7 +87,7 @@ class PaperLoads(LoadOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreePhase:
+class FreeOptions:
     """A phase whose joints are free."""
 
     intervals: int = 10
@@ -102,7 +102,7 @@ class FreePhase:
 
 
 @maker
-def nao_ssp(robot: ReadRobot, options: PaperPhase) -> GaitProblem:
+def nao_ssp(robot: NaoReading, options: PaperPhase) -> GaitProblem:
     """Single support of NAO; the swing foot moves by twice the step length.
 
     Source:
@@ -110,7 +110,7 @@ def nao_ssp(robot: ReadRobot, options: PaperPhase) -> GaitProblem:
     """
     body = robot.make_body()
     problem = make_support_problem(body, options, derivatives=options.derivatives)
-    if not fits_power_form(vars(robot) | vars(options)):
+    if not has_power_form(vars(robot) | vars(options)):
         return problem
     places = place_stance(body, body.check_step_length(options.step_length_m)), ARM_SWING[Support.SINGLE]
     make_phase = partial(make_single_support, body.robot, *places)
@@ -118,7 +118,7 @@ def nao_ssp(robot: ReadRobot, options: PaperPhase) -> GaitProblem:
 
 
 @maker
-def nao_dsp(robot: ReadDoubleSupport, options: PaperPhase, loads: PaperLoads) -> GaitProblem:
+def nao_dsp(robot: DoubleSupportReading, options: PaperPhase, loads: PaperLoads) -> GaitProblem:
     """Double support of NAO.
 
     The phase is taken apart into two single supports: each leg stands on its own foot and carries its own arm and a share of the
@@ -133,7 +133,7 @@ def nao_dsp(robot: ReadDoubleSupport, options: PaperPhase, loads: PaperLoads) ->
         )
     body = robot.make_body()
     problem = make_support_problem(body, options, loads, options.derivatives)
-    if loads.torso_share == "free" or not fits_power_form(vars(robot) | vars(options)):
+    if loads.torso_share == "free" or not has_power_form(vars(robot) | vars(options)):
         return problem
     soles = place_soles(body, body.check_step_length(options.step_length_m))
     places = soles, place_hip(body, soles), ARM_SWING[Support.DOUBLE]
@@ -142,7 +142,7 @@ def nao_dsp(robot: ReadDoubleSupport, options: PaperPhase, loads: PaperLoads) ->
 
 
 @maker
-def nao_cycle(robot: RobotWithMotors, options: CycleOptions) -> GaitProblem:
+def nao_cycle(robot: NaoMotorOptions, options: CycleOptions) -> GaitProblem:
     """Walking cycle of NAO: one step, whose mirror image is the next one.
 
     The published phases cannot be chained: single support ends with the hip 0.03 m ahead of the stance foot, double support
@@ -160,7 +160,7 @@ def nao_cycle(robot: RobotWithMotors, options: CycleOptions) -> GaitProblem:
 
 
 @maker
-def nao_walk(robot: RobotWithMotors, options: WalkOptions) -> GaitProblem:
+def nao_walk(robot: NaoMotorOptions, options: WalkOptions) -> GaitProblem:
     """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
 
     All inner steps are one cycle, as in ``nao-cycle``; its speed may have limits, which are parameters. The feet advance by one
@@ -182,7 +182,7 @@ def nao_walk(robot: RobotWithMotors, options: WalkOptions) -> GaitProblem:
 
 
 @maker
-def nao_ssp_free(robot: Robot, options: FreePhase) -> GaitProblem:
+def nao_ssp_free(robot: NaoOptions, options: FreeOptions) -> GaitProblem:
     """Single support of NAO with free joints. One of the samples must be the middle.
 
     Source:
@@ -207,7 +207,7 @@ def nao_ssp_free(robot: Robot, options: FreePhase) -> GaitProblem:
 
 
 @maker
-def nao_dsp_free(robot: Robot, options: FreePhase, loads: PaperLoads) -> GaitProblem:
+def nao_dsp_free(robot: NaoOptions, options: FreeOptions, loads: PaperLoads) -> GaitProblem:
     """Double support of NAO with every freedom that two flat soles leave.
 
     The curves are those of ``nao-dsp`` and the torso's roll and pitch, zero and at rest at both ends; with zero coefficients on

@@ -36,7 +36,7 @@ FORM_OPTIONS = {
 STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 
 
-def fits_power_form(options: Mapping[str, Any]) -> bool:
+def has_power_form(options: Mapping[str, Any]) -> bool:
     """Return whether these formulas are those of a phase with the options, with one sample in each interval."""
     usual = all(options.get(name, value) == value for name, value in FORM_OPTIONS.items())
     return usual and bool(options["samples_per_interval"] < 2)
