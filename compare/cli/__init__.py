@@ -1,33 +1,108 @@
 """Command line: ``nlp-gait COMMAND``.
 
 Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence says why), 2 wrong usage,
-130 interrupted.
+130 interrupted. Only the module of the command that is called is imported.
 """
 
-from typing import Annotated
+from collections.abc import Sequence
+from functools import cache
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+from typer.main import get_command
 
-import nlp_gait
-from compare.cli.bench import bench
-from compare.cli.command import run_app
-from compare.cli.compare import compare
-from compare.cli.evaluate import evaluate
-from compare.cli.exchange import import_results, verify
-from compare.cli.export import export
-from compare.cli.list import list_problems
-from compare.cli.old_names import Commands
-from compare.cli.questions.optima import certainty, pareto, prices, robust, sweep, variants
-from compare.cli.report import report, reproduce
-from compare.cli.simulate import simulate
-from compare.cli.solve import plan, solve
+from nlp_gait.providers import import_object
 
+# By panel of the help: each command's function, and one line about it.
 PANELS = {
-    "Problems, optima and searches": (list_problems, evaluate, solve, plan),
-    "Comparison": (compare, import_results, report, reproduce, bench, verify),
-    "Questions": (sweep, prices, pareto, certainty, variants, robust),
-    "Show and share": (simulate, export),
+    "Problems, optima and searches": {
+        "list": ("list:list_problems", "List problems, algorithms and robots, or describe one."),
+        "evaluate": ("evaluate:evaluate", "Judge candidates by the exact functions."),
+        "solve": ("solve:solve", "Solve a problem by IPOPT or SLSQP."),
+        "plan": ("solve:plan", "Plan a whole walk from standing to standing."),
+    },
+    "Comparison": {
+        "compare": ("compare:compare", "Compare searches and IPOPT."),
+        "import": ("exchange:import_results", "Add results of other programs to a study."),
+        "report": ("report:report", "Write a study's report again."),
+        "reproduce": ("report:reproduce", "Recompute a paper's tables, figures and claims."),
+        "bench": ("bench:bench", "Rank an algorithm on GaitBench."),
+        "verify": ("exchange:verify", "Check a study or its archive, or pack it."),
+    },
+    "Questions": {
+        "sweep": ("questions:sweep", "Solve a problem over a grid of values."),
+        "prices": ("questions:prices", "What each limit and each error of the robot costs."),
+        "pareto": ("questions:pareto", "Power against stability or speed."),
+        "certainty": ("questions:certainty", "Is the best known optimum the global one?"),
+        "variants": ("questions:variants", "What changes with motors, motions or options."),
+        "robust": ("questions:robust", "One gait for all masses and soles within tolerances."),
+    },
+    "Show and share": {
+        "simulate": ("simulate:simulate", "Simulate a gait in MuJoCo."),
+        "export": ("export:export", "Write a gait, an instance or a problem for others."),
+    },
 }
+# What serves instead of removed names: "command", "command --option", or "--option" of any command.
+REPLACEMENTS = {
+    name.strip(): sentence
+    for names, sentence in {
+        "animate": "export --to gif (or html) draws a gait",
+        "archive, bench --submit": "verify FOLDER --pack FILE.zip packs a study",
+        "bench --verify, bench --rerun, bench --code": "verify FILE.zip checks an archive, with --rerun and --code",
+        "bench --objectives": "pareto PROBLEM --search NSGA2=10000 compares searches with the true front",
+        "capabilities": "sweep --capabilities reports what a robot can do",
+        "cite": "list --cite [NAME] prints BibTeX",
+        "export-objective, export-solver, export --format": "export --to KIND names the kind of the file",
+        "list --algorithms": "list algorithms shows the settings of all",
+        "logs": "report FOLDER --logs writes the runs as logs for iohinspector",
+        "motions, motors": "variants compares motors, motions and options",
+        "search": "compare PROBLEM --algorithms pso --starts 0 --runs 1 runs a search",
+        "walk": "sweep --engine simulates the cheapest cycle at each speed",
+        "pareto --objectives": "pareto --against NAME trades power against one mean margin or the speed",
+        "simulate --feed-forward, simulate --feedback-delay-ms, simulate --feedback-noise, simulate --feedback-seed, "
+        "simulate --interpolation, simulate --period-ms": "its value belongs into the file of --drive FILE.toml",
+        "simulate --push-at-s": "simulate --push X,Y,S has the time of the push",
+        "--derivatives, --intervals, --option, --fix": "--set NAME=VALUE sets options and fixes variables",
+        "compare --csv, import --csv": "report DIR --csv writes CSV files of a study",
+        "compare --engine": "report DIR --engine simulates the best gaits of a study",
+        "compare --penalty-weight": "give --handling penalty=WEIGHT",
+        "compare --stagnation, compare --target": "a study file has it, see --config",
+    }.items()
+    for name in names.split(",")
+}
+
+
+@cache
+def load_command(name: str) -> Any:
+    """Import a command and return its parser."""
+    places = {name: place for commands in PANELS.values() for name, (place, _) in commands.items()}
+    alone = typer.Typer(add_completion=False, rich_markup_mode="markdown")
+    alone.command(name)(import_object(f"compare.cli.{places[name]}"))
+    return get_command(alone)
+
+
+class Commands(TyperGroup):
+    """Commands that are imported when they are called; a removed name ends with one sentence that names the new way."""
+
+    def resolve_command(self, context: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Return name, parser and arguments of the command."""
+        parser = load_command(args[0]) if args[0] in self.commands else None
+        for name in [args[0]] if parser is None else _list_unknown_options(parser, args):
+            if name in REPLACEMENTS:
+                from compare.cli.printing import fail
+
+                fail(f"{name.split()[-1]} was removed: {REPLACEMENTS[name]}", status=2)
+        known, _, rest = super().resolve_command(context, args)
+        return known, parser, rest
+
+
+def _list_unknown_options(parser: Any, args: Sequence[str]) -> list[str]:
+    """Return the keys, in the table of removed names, of options that a command does not have."""
+    known = {flag for parameter in parser.params for flag in (*parameter.opts, *parameter.secondary_opts)}
+    flags = [arg.split("=")[0] for arg in args[1:] if arg.startswith("--")]
+    return [key for flag in flags if flag not in known for key in (f"{args[0]} {flag}", flag)]
+
 
 app = typer.Typer(
     cls=Commands,
@@ -35,12 +110,16 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
 )
+for panel, commands in PANELS.items():
+    for name, (_, summary) in commands.items():
+        app.command(name, rich_help_panel=panel, short_help=summary)(lambda: None)  # its line in the help
 
 
 def _print_version(requested: bool) -> None:
     if requested:
+        import nlp_gait
+
         print(nlp_gait.__version__)
         raise typer.Exit
 
@@ -54,38 +133,8 @@ def take_common_options(
     """Options without a command."""
 
 
-# Commands whose names are taken or not allowed in Python.
-NAMES = {
-    list_problems: "list",
-    import_results: "import",
-}
-# One line each, so that the help fits one screen.
-SUMMARIES = {
-    "list": "List problems, algorithms and robots, or describe one.",
-    "evaluate": "Judge candidates by the exact functions.",
-    "solve": "Solve a problem by IPOPT or SLSQP.",
-    "plan": "Plan a whole walk from standing to standing.",
-    "compare": "Compare searches and IPOPT.",
-    "import": "Add results of other programs to a study.",
-    "report": "Write a study's report again.",
-    "reproduce": "Recompute a paper's tables, figures and claims.",
-    "bench": "Rank an algorithm on GaitBench.",
-    "verify": "Check a study or its archive, or pack it.",
-    "sweep": "Solve a problem over a grid of values.",
-    "prices": "What each limit and each error of the robot costs.",
-    "pareto": "Power against stability or speed.",
-    "certainty": "Is the best known optimum the global one?",
-    "variants": "What changes with motors, motions or options.",
-    "robust": "One gait for all masses and soles within tolerances.",
-    "simulate": "Simulate a gait in MuJoCo.",
-    "export": "Write a gait, an instance or a problem for others.",
-}
-for panel, functions in PANELS.items():
-    for function in functions:
-        name = NAMES.get(function, function.__name__)
-        app.command(name, rich_help_panel=panel, short_help=SUMMARIES[name])(function)
-
-
 def main() -> None:
     """Entry point of the console script."""
+    from compare.cli.command import run_app
+
     run_app(app)

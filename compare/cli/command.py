@@ -1,4 +1,4 @@
-"""Commands: groups of options, and exit by errors.
+"""Commands: groups of options, printed results, and exit by errors.
 
 Options of several commands form a group: a frozen dataclass whose fields are annotated like parameters of a Typer command. A
 command with a parameter of that type has every field as an option, and receives the dataclass.
@@ -12,64 +12,88 @@ import os
 import select
 import sys
 from collections.abc import Callable, Container, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 
-from compare.cli.endings import end_interrupted, fail, say_error
+from compare.cli.printing import Output, fail, print_output, say_error
 from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError
 from nlp_gait.files import protect_inputs
 from nlp_gait.interrupts import raise_interrupts
 
-R = TypeVar("R")
-
 # In the annotation of a parameter that names the folder, or the file, that the command writes.
 OUTPUT, OUTPUT_FILE = "output", "output file"
 SESSION = "session"  # of one that decides how and where a study runs, not what it computes
-FORCE = inspect.Parameter(
-    "force",
-    inspect.Parameter.KEYWORD_ONLY,
-    default=False,
-    annotation=Annotated[bool, typer.Option("--force", help="Replace files that exist.")],
-)
+CONTINUE = "rerun the command to continue"
+
+
+def _add_flag(name: str, flag: str, words: str, *marks: str) -> inspect.Parameter:
+    annotation = Annotated[bool, typer.Option(flag, help=words), *marks]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=annotation)
+
+
+JSON = _add_flag("as_json", "--json", "Print one JSON object.", SESSION)
+FORCE = _add_flag("force", "--force", "Replace files that exist.")
 # Errors of the system if a file cannot grow.
 NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 
-def command(function: Callable[..., R]) -> Callable[..., R]:
-    """Make a function a Typer command: groups become options, expected errors one sentence on stderr and an exit status."""
+def command(function: Callable[..., Output]) -> Callable[..., None]:
+    """Make a function a Typer command: groups become options, and its output is printed; expected errors are one sentence."""
     parameters = inspect.signature(function, eval_str=True).parameters.values()
     groups: dict[str, Any] = {p.name: p.annotation for p in parameters if is_dataclass(p.annotation)}
 
     @functools.wraps(function)
-    def run(**given: Any) -> R:
+    def run(**given: Any) -> None:
+        as_json = given.pop("as_json")
         try:
             with raise_interrupts():
                 protect_inputs(_find_inputs(given, outputs), given.pop("force", False))
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in fields(group)})
-                result = function(**given)
+                output = function(**given)
+                print_output(output, as_json)
                 sys.stdout.flush()  # report a failed write here, not at the interpreter's exit
-            return result
+            for sentence in output.failures:
+                say_error(sentence)
+            if output.interrupted:
+                fail(output.interrupted, status=130)
+            if output.failures:
+                raise typer.Exit(1)
         except (GaitError, SearchError) as error:
             fail(str(error))
         except KeyboardInterrupt as interrupt:
-            end_interrupted(str(interrupt) or "interrupted; all written files are complete")
+            fail(str(interrupt) or "interrupted; all written files are complete", status=130)
         except OSError as error:
             _report_os_error(error)
             raise typer.Exit(1) from None
 
-    options = list(_list_options(function))
+    options = [*_list_options(function), JSON]
     outputs = {option.name for option in options if get_marks(option) & {OUTPUT, OUTPUT_FILE}}
     if any(OUTPUT_FILE in get_marks(option) for option in options):
         options.append(FORCE)
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
     return run
+
+
+@contextmanager
+def report_interrupts(sentence: str = "interrupted; nothing was written") -> Iterator[None]:
+    """Let Ctrl-C inside end the command with this sentence."""
+    try:
+        yield
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt(sentence) from interrupt
+
+
+def describe_stored(folder: Path) -> str:
+    """Return how many results are stored in a folder, and how to continue."""
+    finished = sum(1 for files in ("store/**/*.json", "records/*/*.json") for _ in folder.glob(files))
+    return f"{finished} finished results are stored in {folder}; {CONTINUE}"
 
 
 def _find_inputs(given: Mapping[str, Any], outputs: Container[str]) -> Iterator[Path]:

@@ -1,41 +1,23 @@
 """``nlp-gait compare``."""
 
 import inspect
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems
 from compare.analysis.solver_table import HEADER, describe_unknown, find_failures, format_cells, summarise
 from compare.analysis.tuning import tune_solvers
 from compare.analysis.units import with_unit
 from compare.analysis.verdict import describe_best_known
-from compare.cli.command import OUTPUT, SESSION, command, get_marks
-from compare.cli.endings import end_if_excluded, end_interrupted, fail, report_interrupts, say_error
-from compare.cli.options import (
-    RESULTS,
-    AsJson,
-    Code,
-    Jobs,
-    ProblemOptions,
-    Scheduler,
-    SearchOptions,
-    Tune,
-    name_all,
-    parse_names,
-)
-from compare.cli.printing import (
-    describe_command,
-    print_result,
-    print_table,
-    say,
-    show_progress,
-    stderr,
-    stdout,
-)
+from compare.cli import options
+from compare.cli.command import OUTPUT, SESSION, command, get_marks, report_interrupts
+from compare.cli.printing import Output, Rows, describe_command, say, say_error, show_progress, stderr
+from compare.report import write_report
 from compare.study.import_runs import read_imported_records
 from compare.study.record import RunRecord
 from compare.study.run_study import Study, check_study, run_study
@@ -48,7 +30,7 @@ from compare.study.settings import (
     resolve_user_code,
     write_manifest,
 )
-from compare.study.task import GRADIENT_SOLVERS, IPOPT
+from compare.study.task import GRADIENT_SOLVERS, IPOPT, Handling, ProblemSpec, Stop
 from metaheuristics import list_installed_algorithms
 from nlp_gait.backends.kernel.compiled import available_cores
 from nlp_gait.errors import InputError
@@ -56,9 +38,58 @@ from nlp_gait.files import make_writable_folder
 from nlp_gait.interrupts import Interrupted
 
 DEFAULT_PROBLEMS = ("nao-ssp", "nao-dsp")
-DEFAULT_ALGORITHMS = "pso,ga,aco"
 MOST_RUNS = 12  # of a problem whose runs are printed one by one
+MOST_EXCLUDED = 20  # records named on a terminal
 ALL, ALL_GRADIENT = "all", (IPOPT, "slsqp")
+ALGORITHMS = (
+    "Searches and other solvers, separated by commas, see `nlp-gait list`; `pso` damps its inertia weight by 0.99 as the code "
+    "that the NAO paper cites, because the constant weight that the paper prints, `pso-constant`, does not settle; `all` stands "
+    "for every installed search, IPOPT and SLSQP."
+)
+HANDLING = "Constraints in searches: deb (feasibility rules), epsilon, or penalty=WEIGHT [objective/violation]."
+OUT = "Folder for records, report and figures; finished runs in it are reused."
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchOptions:
+    """Number of runs of search algorithms, constraint handling, and stop criteria."""
+
+    runs: options.Runs = 11
+    seed: options.Seed = 0
+    evaluations: options.Evaluations = 10_000
+    handling: Annotated[str, Option(help=HANDLING)] = "deb"
+    time_limit: Annotated[float | None, Option(help="End a run after this many seconds.")] = None
+    polish: Annotated[bool, Option("--polish", help="IPOPT from each search's result, as another solver.")] = False
+
+    def make_study(self, problems: Sequence[ProblemSpec], algorithms: str, starts: int) -> StudySettings:
+        """Return the study of problems by IPOPT and the named solvers; InputError unless a penalty has a weight."""
+        name, _, weight = self.handling.partition("=")
+        if (name == "penalty") != bool(weight):
+            raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
+        settings = {"weight": options.parse_number("the weight", weight, "--handling")} if weight else {}
+        return StudySettings(
+            problems=tuple(problems),
+            solvers=tuple(
+                SolverSpec(name=solver, polish=self.polish and solver not in GRADIENT_SOLVERS)
+                for solver in list_solver_names(algorithms, starts)
+            ),
+            runs=self.runs,
+            starts=max(starts, 1),
+            handling=Handling(name=name, settings=settings),
+            stop=Stop(evaluations=self.evaluations, time_limit_s=self.time_limit),
+            seed=self.seed,
+        )
+
+
+def list_solver_names(algorithms: str, starts: int) -> list[str]:
+    """Return IPOPT and the named solvers; without starts, only searches."""
+    names = options.parse_names(algorithms)
+    if ALL in names:
+        names = list(dict.fromkeys([*ALL_GRADIENT, *list_installed_algorithms(), *names]))
+        names.remove(ALL)
+    if starts == 0:
+        return [name for name in names if name not in GRADIENT_SOLVERS]
+    return names if IPOPT in names else [IPOPT, *names]
 
 
 @command
@@ -66,32 +97,22 @@ def compare(
     *,
     context: typer.Context,
     problems: Annotated[
-        list[str] | None, typer.Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
+        list[str] | None, Argument(metavar="[PROBLEM]...", help="Default: nao-ssp and nao-dsp.")
     ] = None,
-    algorithms: Annotated[
-        str,
-        typer.Option(
-            help="Searches and other solvers, separated by commas, see `nlp-gait list`; `pso` damps its inertia weight by 0.99 "
-            "as the code that the NAO paper cites, because the constant weight that the paper prints, `pso-constant`, does not "
-            "settle; `all` stands for every installed search, IPOPT and SLSQP."
-        ),
-    ] = DEFAULT_ALGORITHMS,
+    algorithms: Annotated[str, Option(help=ALGORITHMS)] = "pso,ga,aco",
     starts: Annotated[
-        int, typer.Option(min=0, max=100000, help="Starts of IPOPT and other gradient methods; each is a run.")
+        int, Option(min=0, max=100000, help="Starts of IPOPT and other gradient methods; each is a run.")
     ] = 20,
     searches: SearchOptions,
-    options: ProblemOptions,
-    tune: Tune = 0,
-    config: Annotated[Path | None, typer.Option(help="Take the study from this TOML file instead."), SESSION] = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for records, report and figures; finished runs in it are reused."), OUTPUT
-    ] = RESULTS,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out."), SESSION] = False,
-    jobs: Jobs = None,
-    code: Code = None,
-    scheduler: Scheduler = None,
-    as_json: AsJson = False,
-) -> None:
+    changes: options.ProblemOptions,
+    tune: options.Tune = 0,
+    config: Annotated[Path | None, Option(help="Take the study from this TOML file instead."), SESSION] = None,
+    out: Annotated[Path, Option(help=OUT), OUTPUT] = options.RESULTS,
+    resume: Annotated[bool, Option("--resume", help="Continue the study in --out."), SESSION] = False,
+    jobs: options.Jobs = None,
+    code: options.Code = None,
+    scheduler: options.Scheduler = None,
+) -> Output:
     """Compare IPOPT and search algorithms: one record per run, tables, figures and a report.
 
     Every finished run is stored: the same command, or `--resume`, continues an interrupted study. More runs, solvers, problems
@@ -102,11 +123,9 @@ def compare(
     `nlp-gait compare nao-ssp --algorithms pso --starts 0 --runs 1`,
     `nlp-gait compare --config study.toml --out study`, `nlp-gait compare --resume --out study`
     """
-    from compare.report import write_report
-
     if config is not None or resume:
         _reject_study_options(context, "--config" if config is not None else "--resume")
-    name_all(code)
+    options.name_all(code)
     if config is not None:
         settings = read_settings(config)
     elif resume:
@@ -115,9 +134,8 @@ def compare(
             raise InputError(f"{str(out)!r} contains no study to resume (study.json); omit --resume to start one")
         settings = resolve_user_code(known, f"the study in {str(out)!r}")
     else:
-        specs = [options.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
-        solvers = choose_solvers(algorithms, starts, searches)
-        settings = searches.make_study(specs, solvers, max(starts, 1))
+        specs = [changes.make_spec(name) for name in problems or DEFAULT_PROBLEMS]
+        settings = searches.make_study(specs, algorithms, starts)
     if stderr.is_terminal:
         say(f"watch it: nlp-gait report {out} --watch")
     remedy = f"continue with `nlp-gait compare --resume --out {out}`"
@@ -125,16 +143,17 @@ def compare(
     imported = read_imported_records(out, records)
     records += imported.records
     written = write_report(out, records, read_manifest(out), excluded=imported.excluded)
-    runs = [_encode_run(record) for record in records]
-    data = {"problems": summarise_problems(records), "runs": runs} if as_json else {}
-
-    def tables() -> None:
-        print_runs(records)
-        print_summaries(records)
-
-    print_result(as_json, data, written, tables)
-    end_if_excluded(imported.sentences)
-    end_if_none_left(records)
+    failures = find_failures(records)
+    for failure in failures:
+        say_error(failure.sentence)
+    lost = ", ".join(failure.solver for failure in failures if failure.failed == failure.runs)
+    remedy = f"without any result: {lost}; fix the cause, and delete the failed records to run them again"
+    return Output(
+        data={"problems": summarise_problems(records), "runs": [_encode_run(record) for record in records]},
+        parts=[*_tabulate_runs(records), *describe_summaries(records)],
+        written=written,
+        failures=[*list_excluded(imported.sentences), *([remedy] if lost else [])],
+    )
 
 
 def run_in_folder(
@@ -162,19 +181,19 @@ def run_in_folder(
                 on_outdated=say,
             )
         except Interrupted as interrupt:
-            end_interrupted(f"{interrupt.sentence}; finished runs are stored in {out}; {remedy}")
+            sentence = f"{interrupt.sentence}; finished runs are stored in {out}; {remedy}"
+            raise KeyboardInterrupt(sentence) from interrupt
 
 
-def end_if_none_left(records: Sequence[RunRecord]) -> None:
-    """Report failed runs on stderr, and end with status 1 if a solver has no result on some problem."""
-    failures = find_failures(records)
-    for failure in failures:
-        say_error(failure.sentence)
-    without_result = [failure.solver for failure in failures if failure.failed == failure.runs]
-    if without_result:
-        fail(
-            f"without any result: {', '.join(without_result)}; fix the cause, and delete the failed records to run them again"
-        )
+def list_excluded(excluded: Sequence[str]) -> list[str]:
+    """Return sentences about records that are no evidence, and what to do; none if there are none."""
+    if not excluded:
+        return []
+    count = f"{len(excluded)} record{'s were' if len(excluded) > 1 else ' was'} excluded"
+    if len(excluded) > MOST_EXCLUDED:
+        count += f" ({len(excluded) - MOST_EXCLUDED} more are in the report)"
+    named = [f"excluded {sentence}" for sentence in excluded[:MOST_EXCLUDED]]
+    return [*named, f"{count}; delete what is named, and rerun the study to compute it again"]
 
 
 def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
@@ -182,42 +201,27 @@ def summarise_problems(records: Sequence[RunRecord]) -> dict[str, Any]:
     return {c.problem: [asdict(summary) for summary in summarise(c)] for c in compare_problems(records)}
 
 
+ENCODED = "problem solver run seed claimed_objective claimed_violation failed_evaluations status x verdict".split()
+
+
 def _encode_run(record: RunRecord) -> dict[str, Any]:
     plain = record.to_json()
-    same = (
-        "problem",
-        "solver",
-        "run",
-        "seed",
-        "claimed_objective",
-        "claimed_violation",
-        "failed_evaluations",
-        "status",
-    )
-    return {
-        **{key: plain[key] for key in (*same, "x", "verdict")},
-        "evaluations": plain["evaluations"]["f"],
-        "time_s": plain["time_s"]["solve"],
-    }
+    costs = {"evaluations": plain["evaluations"]["f"], "time_s": plain["time_s"]["solve"]}
+    return {**{key: plain[key] for key in ENCODED}, **costs}
 
 
-def print_runs(records: Sequence[RunRecord]) -> None:
-    """Print a table of the runs of each problem that has few of them, as judged by the exact functions."""
+def _tabulate_runs(records: Sequence[RunRecord]) -> Iterator[Rows]:
+    """Yield a table of the runs of each problem that has few of them, as judged by the exact functions."""
     for comparison in compare_problems(records):
-        if len(comparison.records) <= MOST_RUNS:
-            rows = [
-                (
-                    record.solver,
-                    str(record.run),
-                    str(record.seed),
-                    with_unit(record.verdict.objective, comparison.objective.unit),
-                    f"{record.verdict.violation:.3g}",
-                    record.status,
-                )
-                for record in comparison.records
-            ]
-            header = ("solver", "run", "seed", comparison.objective.name, "violation", "status")
-            print_table(f"{comparison.problem}: runs", header, rows)
+        if len(comparison.records) > MOST_RUNS:
+            continue
+        rows = []
+        for run in comparison.records:
+            objective = with_unit(run.verdict.objective, comparison.objective.unit)
+            violation = f"{run.verdict.violation:.3g}"
+            rows.append((run.solver, str(run.run), str(run.seed), objective, violation, run.status))
+        header = ("solver", "run", "seed", comparison.objective.name, "violation", "status")
+        yield Rows(f"{comparison.problem}: runs", header, rows)
 
 
 # Columns that are printed, in reading order; the report has all.
@@ -225,33 +229,18 @@ READ_FIRST = ("solver", "feasible", "median gap", "median", "evaluations", "time
 HOW_TO_READ = "From left to right: feasible runs, gap of the median to the best known, costs."
 
 
-def print_summaries(records: Sequence[RunRecord], title: str = "") -> None:
-    """Print the table of solvers for each problem, titled by the problem unless a title is given."""
+def describe_summaries(records: Sequence[RunRecord]) -> Iterator[str | Rows]:
+    """Yield the table of solvers for each problem."""
     for comparison in compare_problems(records):
         cells = [dict(zip(HEADER, format_cells(s, comparison), strict=True)) for s in summarise(comparison)]
         rows = [[row[name] for name in READ_FIRST] for row in cells]
-        print_table(title or f"{comparison.problem}: judged by the exact functions", READ_FIRST, rows)
-        failures = find_failures(comparison.records)
+        yield Rows(f"{comparison.problem}: judged by the exact functions", READ_FIRST, rows)
+        failures = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in find_failures(comparison.records)]
         if failures:
-            cells_of = [(f.solver, f"{f.failed}/{f.runs}", f.reason) for f in failures]
-            print_table("Failed runs", ("solver", "failed", "reason of the first"), cells_of)
-        for sentence in describe_unknown(comparison):
-            stdout.print(f"{comparison.problem}, {sentence}", soft_wrap=True)
-        stdout.print(f"{comparison.problem}, best known: {describe_best_known(comparison)}", soft_wrap=True)
-    stdout.print(HOW_TO_READ)
-
-
-def choose_solvers(algorithms: str, starts: int, searches: SearchOptions) -> list[SolverSpec]:
-    """Return IPOPT and the named solvers; without starts, only searches."""
-    names = parse_names(algorithms)
-    if ALL in names:
-        named = [name for name in names if name != ALL]
-        names = [*dict.fromkeys([*ALL_GRADIENT, *list_installed_algorithms(), *named])]
-    if starts == 0:
-        names = [name for name in names if name not in GRADIENT_SOLVERS]
-    elif IPOPT not in names:
-        names.insert(0, IPOPT)
-    return [SolverSpec(name=name, polish=searches.polish and name not in GRADIENT_SOLVERS) for name in names]
+            yield Rows("Failed runs", ("solver", "failed", "reason of the first"), failures)
+        for sentence in (*describe_unknown(comparison), f"best known: {describe_best_known(comparison)}"):
+            yield f"{comparison.problem}, {sentence}"
+    yield HOW_TO_READ
 
 
 def _reject_study_options(context: typer.Context, flag: str) -> None:

@@ -3,15 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-from compare.cli.command import OUTPUT_FILE, command
-from compare.cli.endings import report_interrupts
-from compare.cli.options import AsJson, Code, ProblemOptions, name_all
+from compare.cli.command import OUTPUT_FILE, command, report_interrupts
+from compare.cli.options import Code, Limits, ProblemOptions, Values, name_all
 from compare.cli.outputs import check_output_file
-from compare.cli.printing import print_result
+from compare.cli.printing import Output
 from compare.study.references import find_reference
 from nlp_gait import gaitbench
 from nlp_gait.backends.identity import identify_problem
@@ -19,52 +18,33 @@ from nlp_gait.errors import InputError, unknown
 from nlp_gait.export.formats import FORMATS, PERIOD_MS, write_as
 from nlp_gait.export.nl_file import export_nl
 from nlp_gait.export.solver import export_solver
-from nlp_gait.formulation import GaitProblem, Result
+from nlp_gait.formulation import Result
 from nlp_gait.formulation.result import load_result
 from nlp_gait.gaitbench.c_export import export_objective
 from nlp_gait.simulation.video import check_frames, check_video_path, write_video
 
 FRAMES_PER_S = 12.5
-
-
-class GaitKind(NamedTuple):
-    """A kind of file for a gait: its usual ending, and the function that writes it, with the time between rows [ms]."""
-
-    ending: str
-    write: Callable[[Path, Result, int], None]
+SOURCE = (
+    "A gait from `solve --out` or `plan --out`; for objective, solver and nl a problem or an instance of GaitBench."
+)
+KIND = (
+    "Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif or html. Of a problem: objective (C++), solver "
+    "(NLP with derivatives in C++) or nl (for AMPL's solvers)."
+)
+OUT = "File, by default next to the result; for objective, solver and nl a folder."
 
 
 @command
 def export(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="RESULT.json|PROBLEM",
-            help="A gait from `solve --out` or `plan --out`; for objective, solver and nl a problem or an instance of GaitBench.",
-        ),
-    ],
+    source: Annotated[str, Argument(metavar="RESULT.json|PROBLEM", help=SOURCE)],
     *,
-    to: Annotated[
-        str,
-        typer.Option(
-            metavar="KIND",
-            help="Of a gait: webots, csv, json, mjcf, mujoco-keyframes, naoqi, ros; gif or html. Of a problem: objective "
-            "(C++), solver (NLP with derivatives in C++) or nl (for AMPL's solvers).",
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="File, by default next to the result; for objective, solver and nl a folder."),
-        OUTPUT_FILE,
-    ] = None,
-    period_ms: Annotated[int, typer.Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
-    values: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="For solver and nl: option, parameter or bound; repeatable."),
-    ] = None,
+    to: Annotated[str, Option(metavar="KIND", help=KIND)],
+    out: Annotated[Path | None, Option(help=OUT), OUTPUT_FILE] = None,
+    period_ms: Annotated[int, Option(min=1, max=86400000, help="Time between rows [ms].")] = PERIOD_MS,
+    values: Values = None,
+    limits: Limits = None,
     code: Code = None,
-    as_json: AsJson = False,
-) -> None:
+) -> Output:
     """Write a gait for other tools or as a film, or a problem for other solvers.
 
     C++ needs only libc and libm, and has a C header, a build script, an example in C, and for `objective` callers for MATLAB,
@@ -77,20 +57,19 @@ def export(
     if to not in (*GAITS, *PROBLEMS):
         raise unknown("kind", to, [*GAITS, *PROBLEMS])
     name_all(code)
-    changes = ProblemOptions(values=values)
+    changes = ProblemOptions(values=values, limits=limits)
     if to in PROBLEMS:
         if out is None:
             raise InputError(f"--to {to} writes several files; name their folder by --out DIR")
-        written: Sequence[Path] = PROBLEMS[to](source, changes, out)
-    else:
-        if changes != ProblemOptions():
-            raise InputError(f"--to {to} writes a stored gait with its own options and values; leave out --set")
-        result, path = load_result(Path(source)), Path(source)
-        target = check_output_file(out or path.with_name(path.stem + GAITS[to].ending))
-        with report_interrupts():
-            GAITS[to].write(target, result, period_ms)
-        written = [target]
-    print_result(as_json, {"source": source, "kind": to}, written, lambda: None)
+        return Output(data={"source": source, "kind": to}, written=PROBLEMS[to](source, changes, out))
+    if changes != ProblemOptions():
+        raise InputError(f"--to {to} writes a stored gait with its own options and values; leave out --set and --limit")
+    ending, write = GAITS[to]
+    result, path = load_result(Path(source)), Path(source)
+    target = check_output_file(out or path.with_name(path.stem + ending))
+    with report_interrupts():
+        write(target, result, period_ms)
+    return Output(data={"source": source, "kind": to}, written=[target])
 
 
 def _write_page(path: Path, result: Result, period_ms: int) -> None:
@@ -113,27 +92,24 @@ def _write_film(path: Path, result: Result, period_ms: int) -> None:
 
 def _write_objective(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
     if changes != ProblemOptions():
-        raise InputError("--to objective writes an instance as it is; leave out --set")
+        raise InputError("--to objective writes an instance as it is; leave out --set and --limit")
     return export_objective(gaitbench.load(source), folder)
 
 
 def _write_solver(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
-    return export_solver(_load_problem(source, changes), folder)
+    return export_solver(changes.make_spec(source).load(), folder)
 
 
 def _write_nl(source: str, changes: ProblemOptions, folder: Path) -> list[Path]:
-    problem = _load_problem(source, changes)
+    problem = changes.make_spec(source).load()
     return export_nl(problem, folder, find_reference(identify_problem(problem)).to_json())
 
 
-def _load_problem(source: str, changes: ProblemOptions) -> GaitProblem:
-    return changes.make_spec(source).load()
-
-
-GAITS: Mapping[str, GaitKind] = {
-    **{name: GaitKind(ending, partial(write_as, name)) for name, ending in FORMATS.items()},
-    "gif": GaitKind(".gif", _write_film),
-    "html": GaitKind(".html", _write_page),
+# Kinds of files for a gait: usual ending, and the function that writes it, with the time between rows [ms].
+GAITS: Mapping[str, tuple[str, Callable[[Path, Result, int], None]]] = {
+    **{name: (ending, partial(write_as, name)) for name, ending in FORMATS.items()},
+    "gif": (".gif", _write_film),
+    "html": (".html", _write_page),
 }
 PROBLEMS: Mapping[str, Callable[[str, ProblemOptions, Path], Sequence[Path]]] = {
     "objective": _write_objective,

@@ -6,69 +6,54 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from compare.cli.command import OUTPUT, SESSION
-from compare.study.settings import SolverSpec, StudySettings
-from compare.study.task import Handling, ProblemSpec, Stop
+from compare.study.task import ProblemSpec
 from nlp_gait.errors import InputError, describe_type, unknown
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.result import load_result
 from nlp_gait.user_code import allow_code, is_reference
 
-# Default folder of results.
-RESULTS = Path("results")
-# Options of several commands.
-Seed = Annotated[int, typer.Option(min=0, help="Same seed, same result; run k uses seed + k.")]
-Jobs = Annotated[int | None, typer.Option(min=1, max=4096, help="Worker processes (default: all processors)."), SESSION]
+RESULTS = Path("results")  # default folder
+Starts = Annotated[
+    int, Option(min=1, max=100000, help="Random starts within the bounds, where nothing better is known.")
+]
+Runs = Annotated[int, Option(min=1, max=100000, help="Runs of each search algorithm.")]
+Seed = Annotated[int, Option(min=0, help="Same seed, same result; run k uses seed + k.")]
+Evaluations = Annotated[int, Option(min=1, max=10**12, help="Budget of one search run.")]
+Jobs = Annotated[int | None, Option(min=1, max=4096, help="Worker processes (default: all processors)."), SESSION]
 Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead."),
-    SESSION,
+    str | None, Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead."), SESSION
 ]
-Tune = Annotated[
-    int,
-    typer.Option(
-        metavar="N",
-        min=0,
-        max=1000,
-        help="Tune the settings of each search by N trials on training instances first, with Optuna, and show "
-        "NAME-tuned beside NAME.",
-    ),
-]
-Evaluations = Annotated[int, typer.Option(min=1, max=10**12, help="Budget of one search run.")]
-OutFolder = Annotated[Path, typer.Option(help="Folder for report, tables, figures, data and stored results."), OUTPUT]
-AsCsv = Annotated[bool, typer.Option("--csv", help="Write all runs and all judged points as CSV files too.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object."), SESSION]
-Code = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="FILE.py:NAME",
-        help="Your code that the file refers to; it runs only if named here; repeatable.",
-    ),
-    SESSION,
-]
-ProblemName = Annotated[
-    str,
-    typer.Argument(
-        metavar="PROBLEM",
-        help="For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or "
-        "gb2:ssp:3; or your own, FILE.py:NAME.",
-    ),
-]
+TUNE = "Tune the settings of each search by N trials on training instances first, with Optuna; show NAME-tuned beside NAME."
+Tune = Annotated[int, Option(metavar="N", min=0, max=1000, help=TUNE)]
+OutFolder = Annotated[Path, Option(help="Folder for report, tables, figures, data and stored results."), OUTPUT]
+CODE = "Your code that the file refers to; it runs only if named here; repeatable."
+Code = Annotated[list[str] | None, Option(metavar="FILE.py:NAME", help=CODE), SESSION]
+PROBLEM = "For example nao-ssp, see `nlp-gait list`; an instance of GaitBench, ssp-v5 or gb2:ssp:3; or your own, FILE.py:NAME."
+ProblemName = Annotated[str, Argument(metavar="PROBLEM", help=PROBLEM)]
+ROBOT = (
+    "Of NAO and humanoid problems: nao-v5 (default), nao-v6, nao-v4, a robot file (.json, .urdf, .xml of MuJoCo), or "
+    "PACKAGE:NAME of an installed package."
+)
+Robot = Annotated[str | None, Option(help=ROBOT)]
+VALUES = (
+    "Option or parameter, see `nlp-gait list PROBLEM`; a variable, which is then fixed; or a bound, NAME.lower=VALUE; "
+    "repeatable."
+)
+Values = Annotated[list[str] | None, Option("--set", metavar="NAME=VALUE", help=VALUES)]
+LIMIT = "Add a limit to every phase: FrictionCone, FootClearance, or your own, FILE.py:NAME; repeatable."
+Limits = Annotated[list[str] | None, Option("--limit", metavar="NAME", help=LIMIT)]
+GAIT = "From `solve --out` or `plan --out`, a study's record, or written by hand."
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoredGait:
     """A gait in a file, and the user code that it needs."""
 
-    result: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RESULT.json", help="From `solve --out` or `plan --out`, a study's record, or written by hand."
-        ),
-    ]
+    result: Annotated[Path, Argument(metavar="RESULT.json", help=GAIT)]
     code: Code = None
 
     def load(self) -> Result:
@@ -81,29 +66,9 @@ class StoredGait:
 class ProblemOptions:
     """Robot, options and values of a problem."""
 
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            help="Of NAO and humanoid problems: nao-v5 (default), nao-v6, nao-v4, a robot file "
-            "(.json, .urdf, .xml of MuJoCo), or PACKAGE:NAME of an installed package."
-        ),
-    ] = None
-    values: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Option or parameter, see `nlp-gait list PROBLEM`; a variable, which is then fixed; or a bound, "
-            "NAME.lower=VALUE; repeatable.",
-        ),
-    ] = None
-    limit: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Add a limit to every phase: FrictionCone, FootClearance, or your own, FILE.py:NAME; repeatable.",
-        ),
-    ] = None
+    robot: Robot = None
+    values: Values = None
+    limits: Limits = None
 
     def make_spec(self, name: str) -> ProblemSpec:
         """Return the problem of that name with these values; raises UnknownNameError, and InputError for bad values."""
@@ -112,8 +77,10 @@ class ProblemOptions:
         options = parse_options(spec.address, [(key, text) for key, text in given.items() if key in known])
         if self.robot is not None:
             options["robot"] = self.robot
-        if self.limit:
-            options |= parse_options(spec.address, [("limits", ",".join(self.limit))])
+        if self.limits:
+            if "limits" not in known:
+                raise InputError(f"{name} takes no limits; leave out --limit")
+            options |= parse_options(spec.address, [("limits", ",".join(self.limits))])
         spec = spec.with_options(**options)
         problem = spec.load()
         numbers = {key: parse_number(key, text, "--set") for key, text in given.items() if key not in known}
@@ -142,7 +109,7 @@ class AnyProblem(ProblemOptions):
 
     name: Annotated[
         str | None,
-        typer.Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out where a file names it."),
+        Argument(metavar="[PROBLEM]", help="For example nao-ssp; may be left out where a file names it."),
     ] = None
 
     def spec(self) -> ProblemSpec:
@@ -157,43 +124,6 @@ class NaoPhase(NamedProblem):
     """A problem, by default nao-ssp."""
 
     name: ProblemName = "nao-ssp"
-
-
-@dataclass(frozen=True, kw_only=True)
-class SearchOptions:
-    """Number of runs of search algorithms, constraint handling, and stop criteria."""
-
-    runs: Annotated[int, typer.Option(min=1, max=100000, help="Runs of each search algorithm.")] = 11
-    seed: Seed = 0
-    evaluations: Evaluations = 10_000
-    handling: Annotated[
-        str,
-        typer.Option(
-            help="Constraints in searches: deb (feasibility rules), epsilon, or penalty=WEIGHT [objective/violation]."
-        ),
-    ] = "deb"
-    time_limit: Annotated[float | None, typer.Option(help="End a run after this many seconds.")] = None
-    polish: Annotated[bool, typer.Option("--polish", help="IPOPT from each search's result, as another solver.")] = (
-        False
-    )
-
-    def make_study(
-        self, problems: Sequence[ProblemSpec], solvers: Sequence[SolverSpec], starts: int = 20
-    ) -> StudySettings:
-        """Return the study of problems by solvers; InputError unless a penalty has a weight."""
-        name, _, weight = self.handling.partition("=")
-        if (name == "penalty") != bool(weight):
-            raise InputError("--handling penalty=WEIGHT has a weight, others none; no weight suits every problem")
-        settings = {"weight": parse_number("the weight", weight, "--handling")} if weight else {}
-        return StudySettings(
-            problems=tuple(problems),
-            solvers=tuple(solvers),
-            runs=self.runs,
-            starts=starts,
-            handling=Handling(name=name, settings=settings),
-            stop=Stop(evaluations=self.evaluations, time_limit_s=self.time_limit),
-            seed=self.seed,
-        )
 
 
 def name_all(code: Sequence[str] | None) -> None:
@@ -211,9 +141,9 @@ def parse_names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-def parse_x(text: str) -> list[float]:
+def parse_numbers(name: str, text: str, flag: str) -> list[float]:
     """Return comma-separated numbers; raises as ``parse_number``."""
-    return [parse_number("x", part, "--x") for part in text.split(",")]
+    return [parse_number(name, part, flag) for part in text.split(",")]
 
 
 def parse_number(name: str, text: str, flag: str) -> float:

@@ -1,4 +1,4 @@
-"""Output of commands: tables, results, written files, progress."""
+"""What commands print: results, written files, progress, and the sentences with which they end."""
 
 import json
 import shlex
@@ -7,12 +7,13 @@ import time
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
+import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -21,7 +22,27 @@ from nlp_gait.files import replace_nan
 T = TypeVar("T")
 
 LONGEST_CELL = 24  # characters of a word in a table that are not wrapped
+LONGEST_SENTENCE = 2000  # characters of an error message, in which a value can be a whole file
 LOG_PERIOD_S = 30.0  # between lines of progress in a log
+
+
+class Rows(NamedTuple):
+    """A table of texts."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """What a command hands out."""
+
+    data: Mapping[str, Any]  #: for --json
+    parts: Sequence[str | Rows] = ()  #: sentences and tables for people
+    written: Iterable[Path] = ()
+    failures: Sequence[str] = ()  #: sentences by which the command ends with status 1
+    interrupted: str = ""  #: the sentence after Ctrl-C, by which it ends with status 130
 
 
 class PlainConsole(Console):
@@ -53,14 +74,37 @@ def say(sentence: str) -> None:
     stderr.print(sentence, soft_wrap=True)
 
 
+def say_error(message: str) -> None:
+    """Print the sentence of an error on stderr."""
+    text = " ".join(message.split())
+    text = text if len(text) <= LONGEST_SENTENCE else f"{text[:LONGEST_SENTENCE]} ..."
+    say(f"nlp-gait: {text}")
+
+
+def fail(message: str, status: int = 1) -> NoReturn:
+    """End with a status and one sentence."""
+    say_error(message)
+    raise typer.Exit(status)
+
+
 def describe_command() -> str:
     """Return the command line of this process."""
     return shlex.join(["nlp-gait", *sys.argv[1:]])
 
 
-def print_json(data: Any) -> None:
-    """Print a JSON object on stdout; numbers that are not finite are null, as not every reader accepts NaN."""
-    sys.stdout.write(json.dumps(replace_nan(data), indent=1, allow_nan=False) + "\n")
+def print_output(output: Output, as_json: bool) -> None:
+    """Print results and written files: as one JSON object, or as sentences, tables and a line per file."""
+    if as_json:  # numbers that are not finite are null, as not every reader accepts NaN
+        data = replace_nan({**output.data, "files": [str(path) for path in output.written]})
+        sys.stdout.write(json.dumps(data, indent=1, allow_nan=False) + "\n")
+        return
+    for part in output.parts:
+        if isinstance(part, str):
+            stdout.print(part)
+        else:
+            print_table(*part)
+    for path in output.written:
+        stdout.print(f"wrote {path}", soft_wrap=True)
 
 
 def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -87,24 +131,9 @@ def print_table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]
             stdout.print(f"  {name}: {text}", soft_wrap=False)
 
 
-def print_rows(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> None:
-    """Print a table on stdout with a row per item; columns map headings to functions of the item."""
-    print_table(title, list(columns), [[cell(item) for cell in columns.values()] for item in items])
-
-
-def print_result(as_json: bool, data: Mapping[str, Any], written: Iterable[Path], tables: Callable[[], object]) -> None:
-    """Print results and written files: as one JSON object, or as tables and a line per file."""
-    if as_json:
-        print_json({**data, "files": [str(path) for path in written]})
-        return
-    tables()
-    print_written(*written)
-
-
-def print_written(*paths: Path) -> None:
-    """Print a line for each written file."""
-    for path in paths:
-        stdout.print(f"wrote {path}", soft_wrap=True)
+def tabulate(title: str, items: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Rows:
+    """Return a table with a row per item; columns map headings to functions of the item."""
+    return Rows(title, list(columns), [[cell(item) for cell in columns.values()] for item in items])
 
 
 @contextmanager
@@ -113,6 +142,15 @@ def show_progress(description: str, total: int | None) -> Iterator[Callable[...,
     if not stderr.is_terminal:
         yield _ProgressLog(description, total)
         return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -139,6 +177,4 @@ class _ProgressLog:
         if now - self.reported >= LOG_PERIOD_S:
             self.reported = now
             of = "" if self.total is None else f" of {self.total}"
-            stderr.print(
-                f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {note}", soft_wrap=True
-            )
+            say(f"{self.description}: {self.done}{of} after {now - self.started:.0f} s; {note}")

@@ -1,70 +1,69 @@
 """``nlp-gait report`` and ``nlp-gait reproduce``."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from compare.analysis.comparison import compare_problems, label_editions
 from compare.analysis.record_statistics import Weighting
+from compare.analysis.simulated_gaits import (
+    GAIT_HEADER,
+    describe_drive,
+    group_by_problem,
+    make_engine_rows,
+    measure_agreement,
+    select_best_gaits,
+)
 from compare.analysis.solver_table import describe_unknown
-from compare.cli.command import OUTPUT, command
-from compare.cli.endings import end_if_excluded, report_interrupts
-from compare.cli.options import AsCsv, AsJson, Code, Scheduler, name_all, parse_number
-from compare.cli.printing import describe_command, print_result, print_table, print_written, say, show_progress, stdout
+from compare.cli.command import OUTPUT, command, describe_stored, report_interrupts
+from compare.cli.compare import list_excluded
+from compare.cli.options import Code, Scheduler, name_all, parse_numbers
+from compare.cli.printing import Output, Rows, describe_command, say, show_progress
 from compare.logs import write_ioh
 from compare.papers import REPRODUCTIONS, load_reproduction
+from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
 from compare.study.evidence import read_evidence
 from compare.study.record import RunRecord
 from compare.study.settings import read_manifest
+from compare.study.simulations import SimulatedGait, simulate_records
 from nlp_gait.decoding import read_dataclass
 from nlp_gait.errors import InputError
-
-if TYPE_CHECKING:
-    from compare.study.simulations import SimulatedGait
-
+from nlp_gait.simulation.drive import Drive
 
 ENGINE_TABLE = (
     "Model and engine: mean power over a phase, or energy of ten steps per planned metre of a cycle; ranks of model and "
     "engine; fate: a cycle walks that share of the planned distance."
 )
+WEIGHTS = "Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2)."
+CSV = "Write all runs and all judged points as CSV files too."
+LATEX = "Also write a table of each problem for papers (LaTeX, package booktabs)."
+PDF = "Also write figures for papers, one column wide, and their captions in LaTeX."
+LOGS = "Also write the runs as logs for iohinspector, into the folder logs."
+WATCH = "Rewrite the report while the study runs; the open page reloads itself."
+OUT = "Folder for the report, its tables and figures; results stored in it are used again."
+QUICK = "The least work that fills every table and figure, instead of the paper's."
+EFFORT = "JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."
 
 
 @command
 def report(
     *,
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
-    weights: Annotated[
-        str | None,
-        typer.Option(
-            metavar="GRADIENT,HESSIAN",
-            help="Evaluations counted for a first derivative and a Hessian (default: n + 1, (n + 1)(n + 2)/2).",
-        ),
-    ] = None,
+    folder: Annotated[Path, Argument(metavar="DIR", help="Folder of a study: the --out of `compare`.")],
+    weights: Annotated[str | None, Option(metavar="GRADIENT,HESSIAN", help=WEIGHTS)] = None,
     engine: Annotated[
-        bool, typer.Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored.")
+        bool, Option("--engine", help="Simulate every solver's best gait in MuJoCo (extra sim), unless stored.")
     ] = False,
-    latex: Annotated[
-        bool, typer.Option("--latex", help="Also write a table of each problem for papers (LaTeX, package booktabs).")
-    ] = False,
-    pdf: Annotated[
-        bool, typer.Option("--pdf", help="Also write figures for papers, one column wide, and their captions in LaTeX.")
-    ] = False,
-    logs: Annotated[
-        bool, typer.Option("--logs", help="Also write the runs as logs for iohinspector, into the folder logs.")
-    ] = False,
+    latex: Annotated[bool, Option("--latex", help=LATEX)] = False,
+    pdf: Annotated[bool, Option("--pdf", help=PDF)] = False,
+    logs: Annotated[bool, Option("--logs", help=LOGS)] = False,
     code: Code = None,
-    as_csv: AsCsv = False,
-    as_json: AsJson = False,
-    watch: Annotated[
-        bool, typer.Option("--watch", help="Rewrite the report while the study runs; the open page reloads itself.")
-    ] = False,
-) -> None:
+    csv: Annotated[bool, Option("--csv", help=CSV)] = False,
+    watch: Annotated[bool, Option("--watch", help=WATCH)] = False,
+) -> Output:
     """Rewrite a study's report from all records of its folder, without running a solver.
 
     It includes solvers that a later call omitted; runs of earlier definitions have names that say how they differ. Every point is
@@ -77,8 +76,6 @@ def report(
     Examples: `nlp-gait report results`, `nlp-gait report results --weights 5,25`,
     `nlp-gait report results --engine`
     """
-    from compare.report import FurtherFiles, rebuild_report, watch_report, write_report
-
     weighting = _parse_weights(weights)
     name_all(code)
     if watch:
@@ -86,8 +83,8 @@ def report(
         watch_report(folder, lambda: rebuild_report(folder, weighting))
     evidence, manifest = read_evidence(folder), read_manifest(folder)
     records = label_editions(evidence.records)
-    simulated = simulate_best(folder, records) if engine else []
-    further = FurtherFiles(csv=as_csv, latex=latex, pdf=pdf)
+    simulated = _simulate_best(folder, records) if engine else []
+    further = FurtherFiles(csv=csv, latex=latex, pdf=pdf)
     written = write_report(folder, records, manifest, weighting, excluded=evidence.excluded, further=further)
     if logs:
         comparisons = compare_problems(records)
@@ -95,15 +92,22 @@ def report(
             say(f"not in the logs: {sentence}")
         write_ioh(comparisons, folder / "logs")
         written.append(folder / "logs")
-    data = {**encode_simulations(simulated), "excluded": evidence.sentences}
-    print_result(as_json, data, written, lambda: print_simulations(simulated))
-    end_if_excluded(evidence.sentences)
+    gaits = {
+        problem: {"gaits": [asdict(gait) for gait in own], "agreement": asdict(measure_agreement(own))}
+        for problem, own in group_by_problem(simulated).items()
+    }
+    return Output(
+        data={**({"engine": gaits} if gaits else {}), "excluded": evidence.sentences},
+        parts=[*_describe_simulations(simulated)],
+        written=written,
+        failures=list_excluded(evidence.sentences),
+    )
 
 
 def _parse_weights(text: str | None) -> Weighting:
     if text is None:
         return Weighting()
-    values = [parse_number("a weight", part, "--weights") for part in text.split(",")]
+    values = parse_numbers("a weight", text, "--weights")
     if len(values) != 2 or not all(math.isfinite(value) and value >= 0.0 for value in values):
         raise InputError(f"--weights takes two finite numbers >= 0, GRADIENT,HESSIAN, got {text!r}")
     return Weighting(gradient=values[0], jacobian=values[0], hessian=values[1])
@@ -111,21 +115,12 @@ def _parse_weights(text: str | None) -> Weighting:
 
 @command
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
-    out: Annotated[
-        Path,
-        typer.Option(help="Folder for the report, its tables and figures; results stored in it are used again."),
-        OUTPUT,
-    ],
-    quick: Annotated[
-        bool, typer.Option("--quick", help="The least work that fills every table and figure, instead of the paper's.")
-    ] = False,
-    effort: Annotated[
-        Path | None,
-        typer.Option(help="JSON file with other settings, as `settings` of `summary.json`; the rest are the paper's."),
-    ] = None,
+    paper: Annotated[str, Argument(metavar="PAPER", help=", ".join(REPRODUCTIONS))],
+    out: Annotated[Path, Option(help=OUT), OUTPUT],
+    quick: Annotated[bool, Option("--quick", help=QUICK)] = False,
+    effort: Annotated[Path | None, Option(help=EFFORT)] = None,
     scheduler: Scheduler = None,
-) -> None:
+) -> Output:
     """Recompute a paper's tables and figures next to the printed ones, and check its claims.
 
     `claims.csv` has every claim with its verdict, `differences.csv` everything that is not as printed with its effect.
@@ -139,17 +134,18 @@ def reproduce(
     chosen = reproduction.quick if quick else reproduction.full
     if effort:
         chosen = read_dataclass(type(reproduction.full), effort, "effort", error=InputError)
-    with report_interrupts(folder=out), show_progress(paper, chosen.steps) as advance:
-        reproduction.reproduce(out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler)
-    print_written(out / "report.md")
+    try:
+        with show_progress(paper, chosen.steps) as advance:
+            reproduction.reproduce(
+                out, chosen, advance, command=describe_command(), on_outdated=say, scheduler=scheduler
+            )
+    except KeyboardInterrupt:
+        return Output(data={}, interrupted=f"interrupted; {describe_stored(out)}")
+    return Output(data={"paper": paper}, written=[out / "report.md"])
 
 
-def simulate_best(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
+def _simulate_best(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedGait]:
     """Simulate every solver's best gait, unless stored; raises InputError if none of the problems can be simulated."""
-    from compare.analysis.simulated_gaits import select_best_gaits
-    from compare.study.simulations import simulate_records
-    from nlp_gait.simulation.drive import Drive
-
     gaits = select_best_gaits(compare_problems(records))
     remedy = f"continue with `nlp-gait report --engine {folder}`"
     with (
@@ -163,24 +159,10 @@ def simulate_best(folder: Path, records: Sequence[RunRecord]) -> list[SimulatedG
     return simulated
 
 
-def encode_simulations(simulated: Sequence[SimulatedGait]) -> dict[str, Any]:
-    """Return simulated gaits by problem, and their agreement with the model, as plain data; empty without any."""
-    from compare.analysis.simulated_gaits import group_by_problem, measure_agreement
-
-    found = {
-        problem: {"gaits": [asdict(gait) for gait in own], "agreement": asdict(measure_agreement(own))}
-        for problem, own in group_by_problem(simulated).items()
-    }
-    return {"engine": found} if found else {}
-
-
-def print_simulations(simulated: Sequence[SimulatedGait]) -> None:
-    """Print a table per problem, and the agreement of engine and model."""
-    from compare.analysis import simulated_gaits
-
-    for problem, own in simulated_gaits.group_by_problem(simulated).items():
-        title = f"{problem} simulated: {simulated_gaits.describe_drive(own[0].drive)}"
-        print_table(title, simulated_gaits.GAIT_HEADER, simulated_gaits.make_engine_rows(own))
-        stdout.print(simulated_gaits.measure_agreement(own).describe())
+def _describe_simulations(simulated: Sequence[SimulatedGait]) -> Iterator[str | Rows]:
+    """Yield a table per problem, and the agreement of engine and model."""
+    for problem, own in group_by_problem(simulated).items():
+        yield Rows(f"{problem} simulated: {describe_drive(own[0].drive)}", GAIT_HEADER, make_engine_rows(own))
+        yield measure_agreement(own).describe()
     if simulated:
-        stdout.print(ENGINE_TABLE)
+        yield ENGINE_TABLE

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
-import typer
-
-from compare.cli import NAMES, PANELS, app
+from compare.cli import PANELS, load_command
 from docs.pages.markdown import code, literal, page, table, toctree, write_all
 
 KINDS = {int: "INTEGER", float: "NUMBER", str: "TEXT", Path: "PATH"}  # of options without a name for their value
@@ -19,19 +16,17 @@ EXAMPLES = re.compile(r"^Examples?: (.*)\Z", re.DOTALL | re.MULTILINE)
 
 def write(folder: Path) -> None:
     """Write an index and a page for each command."""
-    group: Any = typer.main.get_command(app)
-    names = {panel: [NAMES.get(f, f.__name__) for f in functions] for panel, functions in PANELS.items()}
-    functions = {NAMES.get(f, f.__name__): f for functions in PANELS.values() for f in functions}
-    pages = {f"{name}.md": _page(name, group.commands[name], function) for name, function in functions.items()}
+    names = [name for commands in PANELS.values() for name in commands]
+    pages = {f"{name}.md": _page(name, load_command(name)) for name in names}
     blocks = [
         "# Command line",
         "`nlp-gait COMMAND`. Results go to stdout, progress and errors to stderr. Exit status: 0 done, 1 not done (one sentence "
         "says why), 2 wrong usage, 130 interrupted. `nlp-gait COMMAND --help` prints what stands here.",
     ]
-    for panel, listed in names.items():
-        rows = [(f"[`{name}`]({name}.md)", literal(_first_sentence(group.commands[name]))) for name in listed]
+    for panel, commands in PANELS.items():
+        rows = [(f"[`{name}`]({name}.md)", literal(_first_sentence(load_command(name)))) for name in commands]
         blocks += [f"## {panel}", table(("command", "description"), rows)]
-    blocks.append(toctree(name for listed in names.values() for name in listed))
+    blocks.append(toctree(names))
     write_all(folder / "commands", {"index.md": page(*blocks), **pages})
 
 
@@ -39,12 +34,12 @@ def _first_sentence(command: Any) -> str:
     return inspect.cleandoc(command.help or "").split("\n")[0]
 
 
-def _page(name: str, command: Any, function: Callable[..., Any]) -> str:
+def _page(name: str, command: Any) -> str:
     words = inspect.cleandoc(command.help or "")
     found = EXAMPLES.search(words)
     examples = [] if found is None else re.findall(r"`([^`]+)`", found[1])
     prose = words if found is None else words[: found.start()]
-    parameters = inspect.signature(function).parameters
+    parameters = inspect.signature(command.callback).parameters
     kinds = {name: _kind(parameter.annotation) for name, parameter in parameters.items()}
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option"]

@@ -83,9 +83,15 @@ class WalkSettings:
     """How a walk is planned, wherever it leads."""
 
     intervals: int = 10  #: of each phase
+    limits: str = ""  #: added to every phase: names separated by commas, see ``nlp_gait.limits``
     values: Mapping[str, float] = field(default_factory=dict)  #: parameters and bounds of the problem, by name
     starts: int = 3  #: most start points, until one converges
     progress: Progress = ignore_progress  #: receives a line about each start
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Those that are options of the problem."""
+        return {"intervals": self.intervals, "limits": self.limits}
 
 
 def plan_walk(
@@ -112,7 +118,7 @@ def plan_walk(
     _check_positive(speed_m_s=speed_m_s, distance_m=distance_m)
     walk = find_walk(robot)
     count = 10 if steps is None else check_count("steps", steps, at_least=HALF_STEPS)
-    problem = load(walk, robot=robot, steps=count, intervals=settings.intervals, slope_deg=slope_deg)
+    problem = load(walk, robot=robot, steps=count, slope_deg=slope_deg, **settings.options)
     if steps is None and distance_m is not None:
         natural = problem.by_name(problem.start_point(np.random.default_rng(0)))[STEP]
         count = max(HALF_STEPS, round(distance_m / natural) + 1)
@@ -136,7 +142,7 @@ def plan_climb(
     if sizes is None or int(sizes[3]) < 1:
         raise InputError(f"stairs must be RISExRUN:N with rise and run in metres, such as 0.03x0.24:3, got {stairs!r}")
     flight = {"stair_rise_m": float(sizes[1]), "stair_run_m": float(sizes[2])}
-    problem = load("humanoid-walk", robot=robot, steps=int(sizes[3]) + 1, intervals=settings.intervals, **flight)
+    problem = load("humanoid-walk", robot=robot, steps=int(sizes[3]) + 1, **flight, **settings.options)
     problem = _fix_speed(problem.with_values(**settings.values), speed_m_s)
     return _solve(problem, _load_cycle(problem, None), settings)
 
@@ -187,7 +193,7 @@ def plan_route(
             f"robot {robot!r} does not turn: NAO has one motor for both hip yaw-pitch joints, so that no foot turns alone; "
             "turns are planned for legs whose hip joints turn one by one"
         )
-    problem = load(walk, robot=robot, steps=len(places), intervals=settings.intervals, footholds=text)
+    problem = load(walk, robot=robot, steps=len(places), footholds=text, **settings.options)
     problem = problem.with_values(**{**list_speeds(speeds_m_s, len(places)), **settings.values})
     swings = list_swings(places, body.feet_y)
     step_m = sum(landed.x for _, landed in swings) / max(len(swings) - 1, 1)

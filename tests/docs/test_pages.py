@@ -8,9 +8,8 @@ import re
 from pathlib import Path
 
 import pytest
-import typer
 
-from compare.cli import NAMES, PANELS, app
+from compare.cli import PANELS, load_command
 from compare.study.task import list_solvers
 from docs.check import faults_of
 from docs.pages import algorithms, api, commands, problems
@@ -63,12 +62,10 @@ def test_what_an_example_imports_is_in_the_reference(name: str) -> None:
 
 def test_a_page_for_each_command_with_every_option(tmp_path: Path) -> None:
     commands.write(tmp_path)
-    group = typer.main.get_command(app)
-    for function in (function for functions in PANELS.values() for function in functions):
-        name = NAMES.get(function, function.__name__)
+    for name in (name for listed in PANELS.values() for name in listed):
         page = (tmp_path / "commands" / f"{name}.md").read_text(encoding="utf-8")
         assert page.startswith(f"# nlp-gait {name}\n")
-        for parameter in group.commands[name].params:
+        for parameter in load_command(name).params:
             flags = parameter.opts if parameter.param_type_name == "option" else [parameter.metavar.strip("[].")]
             assert all(flag in page for flag in flags), (name, flags)
     compare = (tmp_path / "commands" / "compare.md").read_text(encoding="utf-8")

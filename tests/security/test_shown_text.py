@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from compare.analysis.comparison import compare_problems
-from compare.cli import endings, printing
+from compare.cli import printing
 from compare.cli.printing import PlainConsole, escape_controls
 from compare.drawing.figures import inline_svg, make_figure, render_svg, use_style
 from compare.report.document import Figure, iterate_leaves
@@ -142,10 +142,10 @@ def test_tables_and_errors_show_them_too(monkeypatch: pytest.MonkeyPatch) -> Non
     out = io.StringIO()
     console: Console = PlainConsole(file=out, markup=False, highlight=False, width=200)
     monkeypatch.setattr(printing, "stdout", console)
-    monkeypatch.setattr(endings, "stderr", console)
+    monkeypatch.setattr(printing, "stderr", console)
     printing.print_table("[red]title\x1b[31m", ("a[/]", "b\x07"), [("\x1b[2J", "[blue]")])
-    with pytest.raises(endings.typer.Exit):
-        endings.fail("no file 'a\x1b[31m\nb'")
+    with pytest.raises(printing.typer.Exit):
+        printing.fail("no file 'a\x1b[31m\nb'")
     text = out.getvalue()
     assert "\x1b" not in text and "\x07" not in text
     for part in (r"[red]title\x1b[31m", "a[/]", r"\x1b[2J", "[blue]"):

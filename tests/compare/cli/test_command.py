@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from compare.cli import app
+from compare.cli import app, load_command
 from compare.cli.command import command
 from nlp_gait.errors import InputError
 
@@ -77,8 +77,8 @@ def test_a_group_refuses_as_a_command_does(arguments: list[str], status: int, wo
 
 @pytest.mark.parametrize("name", OF_A_PROBLEM)
 def test_every_command_that_builds_any_problem_takes_the_same_options(name: str) -> None:
-    options = {parameter.opts[0]: parameter for parameter in typer.main.get_command(app).commands[name].params}  # type: ignore[attr-defined]
-    known = {parameter.opts[0]: parameter for parameter in typer.main.get_command(app).commands["solve"].params}  # type: ignore[attr-defined]
+    options = {parameter.opts[0]: parameter for parameter in load_command(name).params}
+    known = {parameter.opts[0]: parameter for parameter in load_command("solve").params}
     assert [options[option].help for option in SHARED] == [known[option].help for option in SHARED]
 
 

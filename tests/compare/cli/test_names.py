@@ -1,13 +1,11 @@
 """Names of commands and options, and what is said of removed ones."""
 
 import pytest
-from typer.main import get_command
 
-from compare.cli import app
-from compare.cli.old_names import REPLACEMENTS
+from compare.cli import PANELS, REPLACEMENTS, load_command
 from tests.compare.cli.calls import one_sentence
 
-COMMANDS = get_command(app).commands
+COMMANDS = {name: load_command(name) for commands in PANELS.values() for name in commands}
 
 
 def test_each_option_has_a_text():

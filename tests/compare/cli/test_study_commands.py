@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.cli.compare import choose_solvers
-from compare.cli.options import SearchOptions
+from compare.cli.compare import list_solver_names
 from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 
 pytestmark = pytest.mark.usefixtures("undrawn_pages")
@@ -93,6 +92,6 @@ def test_a_search_is_polished(tmp_path: Path) -> None:
 
 
 def test_all_are_the_installed_searches_and_both_gradient_methods(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules[choose_solvers.__module__], "list_installed_algorithms", lambda: ("pso", "de"))
-    names = [solver.name for solver in choose_solvers("all,ga", 5, SearchOptions(evaluations=500))]
+    monkeypatch.setattr(sys.modules[list_solver_names.__module__], "list_installed_algorithms", lambda: ("pso", "de"))
+    names = list_solver_names("all,ga", 5)
     assert names == ["ipopt", "slsqp", "pso", "de", "ga"]

@@ -1,0 +1,301 @@
+"""Commands that answer a question about a problem: how certain its optimum is, and how it changes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from typer import Option
+
+from compare.cli import options
+from compare.cli.command import CONTINUE, command, describe_stored
+from compare.cli.printing import Output, Rows, describe_command, say, show_progress
+from compare.questions.capabilities import Capabilities
+from compare.questions.certainty import Certainty, search_point
+from compare.questions.pareto.pareto import Pareto, parse_searches
+from compare.questions.prices import Prices
+from compare.questions.question import Answer, Question, Work
+from compare.questions.robust import Robust
+from compare.questions.sweep import Sweep, parse_axis
+from compare.questions.variants import MOTORS, PROBLEM, Variant, Variants, list_trajectories
+from compare.report.document import Table, iterate_leaves
+from compare.report.writing import add_session
+from compare.study.store import Store
+from nlp_gait.backends.identity import identify_problem
+from nlp_gait.errors import InputError, OutputError
+from nlp_gait.files import make_writable_folder
+from nlp_gait.formulation import GaitProblem
+from nlp_gait.gaits.biped.cycle import SPEED
+from nlp_gait.interrupts import defer_interrupts
+from nlp_gait.proofs.certificate import check_certificate, load_certified_problem, read_certificate, repeat_proof
+
+FRONT_SEARCHES = ["NSGA2=10000,100000", "CMOPSO=10000,100000"]
+CYCLES = ("nao-cycle", "humanoid-cycle")  # whose speed is a parameter if the objective is the power
+LONG_SEARCH = "Budget of one long CMA-ES with restarts; 0 for none."
+PROOF = "Of the proof [s], for at most four variables and NAO's phases; 0 for none."
+CHECK = "Certificate to check instead: look for a better point, then repeat paths of its proof."
+COMPLETE = "With --check: also repeat the whole proof; rerun to continue."
+OVER = "Real motors, feature by feature; richer and richer motions with free joints at the end; or values of an option."
+VARIANT = "A variant by name, next to the problem itself; `problem` is another problem's name; repeatable."
+SEARCHES = "NSGA2 or CMOPSO; repeatable. 'none' for no search."
+CAPABILITIES = "Of a walking cycle instead: its highest speed, longest step, highest lift."
+ENGINE = "Simulate steps of each walking cycle in MuJoCo (extra sim)."
+
+
+@command
+def certainty(
+    *,
+    starts: Annotated[int, Option(min=1, max=1000000, help="Random starts of IPOPT.")] = 10_000,
+    evaluations: Annotated[int, Option(min=0, max=1000000000000, help=LONG_SEARCH)] = 1_000_000,
+    time_limit: Annotated[float, Option(min=0.0, help=PROOF)] = 1800.0,
+    seed: options.Seed = 0,
+    problem: options.AnyProblem,
+    check: Annotated[Path | None, Option(help=CHECK)] = None,
+    complete: Annotated[bool, Option("--complete", help=COMPLETE)] = False,
+    code: options.Code = None,
+    out: options.OutFolder = Path("certainty"),
+) -> Output:
+    """Gather evidence that the best optimum is the global one: many starts, a long search, and a proof for few variables.
+
+    Examples: `nlp-gait certainty walk12 --set lambda=1`, `nlp-gait certainty nao-ssp --starts 1000 --evaluations 0`,
+    `nlp-gait certainty --check certainty/walk12-certificate.json`
+    """
+    if check is not None:
+        if problem != options.AnyProblem():
+            raise InputError("--check takes the problem and its options from the certificate; leave them out")
+        options.name_all(code)
+        return _check(check, seed, out if complete else None)
+    if complete:
+        raise InputError("--complete repeats the proof of a certificate; name its file by --check FILE")
+    question = Certainty(
+        problem=problem.spec().load(), starts=starts, evaluations=evaluations, time_limit_s=time_limit, seed=seed
+    )
+    return answer_question(question, out)
+
+
+def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
+    file = read_certificate(path)
+    proof, points = file.certificate, {"a search": search_point(load_certified_problem(file), seed)}
+    found, repeated = check_certificate(file, points=points, seed=seed), None
+    if repeat_in is not None:
+        make_writable_folder(repeat_in)
+        with show_progress("boxes", None) as advance:
+            repeated = repeat_proof(file, progress=advance, checkpoint=repeat_in / f".{path.stem}.open")
+    parts = [
+        f"{file.problem['name']}: bound {proof.bound:.9g}, incumbent {proof.objective:.9g}. No better point was found; the best "
+        f"one is of {found.source}, {found.best:.9g}. {found.paths} paths of up to {found.deepest} halvings end; "
+        f"{found.pieces:,} boxes dropped on them are proven to contain nothing better; they suggest about {found.boxes:,.0f} "
+        f"boxes in total (within a factor of ten), the certificate has {proof.boxes:,}"
+        + ("" if found.same_prover else "; it was made by another version of the prover")
+    ]
+    if repeated is not None:
+        parts.append(
+            f"The whole proof was repeated: {repeated.boxes:,} boxes, {repeated.cpu_s:.0f} s of the processor; no feasible "
+            f"point is better than {repeated.bound:.9g}"
+        )
+    return Output(
+        data={"schema": 1, **asdict(found), "repeated": None if repeated is None else asdict(repeated)}, parts=parts
+    )
+
+
+@command
+def variants(
+    *,
+    over: Annotated[str | None, Option(metavar="motors|trajectory|OPTION=V1,V2,...", help=OVER)] = None,
+    variant: Annotated[list[str] | None, Option(metavar="NAME:OPTION=VALUE,...", help=VARIANT)] = None,
+    starts: options.Starts = 10,
+    seed: options.Seed = 0,
+    problem: options.NaoPhase,
+    out: options.OutFolder = options.RESULTS,
+) -> Output:
+    """Solve variants of a problem, each from the richest earlier one that it contains, and show what changes.
+
+    Free joints take minutes each. Rerun the command to continue after an interruption.
+
+    Examples: `nlp-gait variants nao-ssp --over motors`, `nlp-gait variants nao-dsp --over trajectory --starts 2`,
+    `nlp-gait variants nao-ssp --variant "smooth:objective=jerk" --variant "quick motors:motors=limits,rotor"`
+    """
+    base = problem.load()
+    return answer_question(
+        Variants(problem=base, variants=_list_variants(base, over, variant), starts=starts, seed=seed), out
+    )
+
+
+def _list_variants(problem: GaitProblem, over: str | None, named: Sequence[str] | None) -> list[Variant]:
+    """Return the variants that ``--over`` and ``--variant`` describe."""
+    option, _, values = (over or "").partition("=")
+    if over is None:
+        found = [Variant(name="as given")]
+    elif values:
+        found = [
+            Variant(name=value, options=options.parse_options(problem.address, [(option, value)]))
+            for value in options.parse_names(values)
+        ]
+    elif option in ("motors", "trajectory"):
+        found = [*(MOTORS if option == "motors" else list_trajectories(problem))]
+    else:
+        raise InputError(f"--over takes motors, trajectory or OPTION=VALUE,VALUE,..., got {over!r}")
+    for text in named or ():
+        name, _, rest = text.partition(":")
+        pairs: list[str] = []
+        for piece in rest.split(","):  # a value may contain commas
+            pairs = [*pairs, piece] if "=" in piece else [*pairs[:-1], f"{pairs[-1]},{piece}" if pairs else piece]
+        given = dict(options.parse_pairs(pairs, "--variant NAME:"))
+        other = given.pop(PROBLEM, "")
+        changed = options.parse_options(other or problem.address, given.items())
+        found.append(Variant(name=name.strip(), options=changed, problem=other))
+    if len(found) < 2:
+        raise InputError(
+            "name at least two variants by --over or --variant; the problem itself is one of those of --variant"
+        )
+    return found
+
+
+@command
+def pareto(
+    *,
+    against: Annotated[str, Option(help="dbm_y_mean or dbm_x_mean [m], or speed [m/s].")] = "dbm_y_mean",
+    points: Annotated[int, Option(min=5, max=10000, help="Points of the front.")] = 40,
+    starts: Annotated[int, Option(min=1, max=100000, help="Random starts at every third point.")] = 5,
+    search: Annotated[list[str] | None, Option(metavar="NAME=BUDGET,BUDGET", show_default=False, help=SEARCHES)] = None,
+    runs: options.Runs = 11,
+    seed: options.Seed = 0,
+    problem: options.NamedProblem,
+    out: options.OutFolder = Path("pareto"),
+) -> Output:
+    """Power against stability or speed: the true front by IPOPT, its knees, and how near NSGA-II and CMOPSO come to it.
+
+    Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --against speed`
+    """
+    searches, effort = parse_searches(search or FRONT_SEARCHES), {"points": points, "starts": starts, "runs": runs}
+    return answer_question(Pareto(problem=problem.load(), against=against, searches=searches, seed=seed, **effort), out)
+
+
+@command
+def prices(
+    *,
+    starts: options.Starts = 10,
+    seed: options.Seed = 0,
+    checks: Annotated[int, Option(min=0, help="Quantities of the robot that are verified by solving again.")] = 3,
+    problem: options.NamedProblem,
+    out: options.OutFolder = options.RESULTS,
+) -> Output:
+    """Compute what each limit costs the optimum, and which error of masses, lengths or soles would change it most.
+
+    Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
+    """
+    return answer_question(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks), out)
+
+
+@command
+def robust(
+    *,
+    mass: Annotated[float, Option(min=0.0, max=50.0, help="Tolerance of every mass, up and down [%].")] = 5.0,
+    sole: Annotated[float, Option(min=0.0, max=20.0, help="Tolerance of the soles' position in x and y [mm].")] = 2.0,
+    starts: options.Starts = 10,
+    seed: options.Seed = 0,
+    problem: options.NaoPhase,
+    out: options.OutFolder = options.RESULTS,
+) -> Output:
+    """Find the least power of a gait that keeps its limits for all masses and soles within their tolerances.
+
+    One motion for all robots of a box, whose worst corners are found one after the other. Both gaits are written for each corner,
+    for `nlp-gait simulate`. Example: `nlp-gait robust nao-ssp`
+    """
+    effort = {"starts": starts, "seed": seed}
+    return answer_question(Robust(problem=problem.load(), mass=mass, sole=sole, **effort), out)
+
+
+@command
+def sweep(
+    *,
+    over: Annotated[
+        list[str] | None, Option(metavar="NAME=LOW:HIGH:COUNT", help="Axis; repeatable. Or NAME=V1,V2,...")
+    ] = None,
+    capabilities: Annotated[bool, Option("--capabilities", help=CAPABILITIES)] = False,
+    algorithm: Annotated[str, Option(help="ipopt, or a search algorithm.")] = "ipopt",
+    starts: options.Starts = 5,
+    evaluations: options.Evaluations = 10_000,
+    seed: options.Seed = 0,
+    engine: Annotated[bool, Option("--engine", help=ENGINE)] = False,
+    steps: Annotated[int, Option(min=1, max=1000, help="With --engine: number of steps.")] = 10,
+    problem: options.NamedProblem,
+    out: options.OutFolder = options.RESULTS,
+) -> Output:
+    """Solve a problem over a grid of parameter values or fixed variables, each point from its neighbour.
+
+    Rerun the command to continue after an interruption.
+
+    With speeds as an axis the objective of a walking cycle is its power. Simulations are open loop.
+
+    With `--capabilities` each quantity comes with the limits that stop it. Bounds on times and velocities that are this
+    package's, not the robot's, are named, and moved where they stop the robot. The sharpest turn is reported, too.
+
+    Examples: `nlp-gait sweep nao-ssp --over swing_height_m=0.015:0.028:6`,
+    `nlp-gait sweep nao-cycle --over speed_m_s=0.01:0.1:10 --engine`,
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --over speed_m_s=0.02,0.05`,
+    `nlp-gait sweep humanoid-cycle --robot my.urdf --set intervals=5 --capabilities`
+    """
+    if capabilities == bool(over):
+        raise InputError("a sweep takes either --over NAME=LOW:HIGH:COUNT or --capabilities")
+    if capabilities:
+        return answer_question(Capabilities(problem=problem.load(), starts=starts, seed=seed), out)
+    axes = [parse_axis(text) for text in over or ()]
+    if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
+        problem = replace(problem, values=["objective=power", *(problem.values or ())])
+    effort = {"starts": starts, "evaluations": evaluations, "seed": seed, "steps": steps if engine else 0}
+    return answer_question(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort), out)
+
+
+def answer_question(question: Question[Any], out: Path) -> Output:
+    """Answer a question, continuing from the results stored in the folder; also from partial findings after Ctrl-C."""
+    findings, stopped, notes = None, "", 0
+    with show_progress(question.counts, question.total) as advance:
+
+        def progress(note: str) -> None:
+            nonlocal notes
+            notes += 1
+            advance(note)
+
+        try:
+            store = Store(out, say)
+            for partial in question.find(Work(store=store, progress=progress)):
+                findings = partial
+        except KeyboardInterrupt as interrupt:
+            done = "" if question.total is None else f" after {notes} of {question.total} {question.counts}"
+            stopped = str(interrupt) or f"interrupted{done}"
+    if findings is None:
+        return Output(data={}, interrupted=f"{stopped}; {describe_stored(out)}")
+    if store.summary:
+        say(store.summary)
+    answer, failures = question.add_best_known(findings), question.failures(findings)
+    output = write_answer(answer, out, stopped, [identify_problem(question.problem)])
+    return replace(output, failures=[*output.failures, *(["; ".join(failures)] if failures else [])])
+
+
+def write_answer(answer: Answer, out: Path, stopped: str = "", problems: Sequence[Mapping[str, Any]] = ()) -> Output:
+    """Write an answer, citing the sources of problems; one that cannot be written is handed out nevertheless.
+
+    The output has sentences and tables, without those for other programs.
+    """
+    written, failures = list[Path](), list[str]()
+    with defer_interrupts() as pressed:
+        try:
+            written = add_session(answer, describe_command(), problems).write(out)
+        except OutputError as error:
+            failures.append(str(error))
+    if pressed() and not stopped:
+        stopped = "interrupted at the end"
+    parts: list[str | Rows] = [answer.title, *answer.verdict]
+    for part in iterate_leaves(answer.parts):
+        if isinstance(part, str):
+            parts.append(part)
+        elif isinstance(part, Table) and not part.name:
+            parts.append(Rows(part.caption, tuple(part.columns), [[cell.text for cell in row] for row in part.cells]))
+    return Output(
+        data=answer.data,
+        parts=parts,
+        written=written,
+        failures=failures,
+        interrupted=f"{stopped}; the results are in {out}; {CONTINUE}" if stopped else "",
+    )

@@ -1,1 +1,0 @@
-"""Commands that ask a question past the papers."""
