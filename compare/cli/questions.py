@@ -70,7 +70,7 @@ def certainty(
     question = Certainty(
         problem=problem.spec().load(), starts=starts, evaluations=evaluations, time_limit_s=time_limit, seed=seed
     )
-    return answer_question(question, out)
+    return run_question(question, out)
 
 
 def _check(path: Path, seed: int, repeat_in: Path | None) -> Output:
@@ -116,7 +116,7 @@ def variants(
     `nlp-gait variants nao-ssp --variant "smooth:objective=jerk" --variant "quick motors:motors=limits,rotor"`
     """
     base = problem.load()
-    return answer_question(
+    return run_question(
         Variants(problem=base, variants=_list_variants(base, over, variant), starts=starts, seed=seed), out
     )
 
@@ -168,7 +168,7 @@ def pareto(
     Examples: `nlp-gait pareto nao-ssp --search NSGA2=10000`, `nlp-gait pareto nao-ssp --against speed`
     """
     searches, effort = parse_searches(search or FRONT_SEARCHES), {"points": points, "starts": starts, "runs": runs}
-    return answer_question(Pareto(problem=problem.load(), against=against, searches=searches, seed=seed, **effort), out)
+    return run_question(Pareto(problem=problem.load(), against=against, searches=searches, seed=seed, **effort), out)
 
 
 @command
@@ -184,7 +184,7 @@ def prices(
 
     Derivatives of optimum and x* by the first-order conditions, verified by solving again. Example: `nlp-gait prices nao-ssp`
     """
-    return answer_question(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks), out)
+    return run_question(Prices(problem=problem.load(), starts=starts, seed=seed, checks=checks), out)
 
 
 @command
@@ -203,7 +203,7 @@ def robust(
     for `nlp-gait simulate`. Example: `nlp-gait robust nao-ssp`
     """
     effort = {"starts": starts, "seed": seed}
-    return answer_question(Robust(problem=problem.load(), mass=mass, sole=sole, **effort), out)
+    return run_question(Robust(problem=problem.load(), mass=mass, sole=sole, **effort), out)
 
 
 @command
@@ -239,15 +239,15 @@ def sweep(
     if capabilities == bool(over):
         raise InputError("a sweep takes either --over NAME=LOW:HIGH:COUNT or --capabilities")
     if capabilities:
-        return answer_question(Capabilities(problem=problem.load(), starts=starts, seed=seed), out)
+        return run_question(Capabilities(problem=problem.load(), starts=starts, seed=seed), out)
     axes = [parse_axis(text) for text in over or ()]
     if problem.name in CYCLES and any(axis.name == SPEED for axis in axes):
         problem = replace(problem, values=["objective=power", *(problem.values or ())])
     effort = {"starts": starts, "evaluations": evaluations, "seed": seed, "steps": steps if engine else 0}
-    return answer_question(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort), out)
+    return run_question(Sweep(problem=problem.load(), axes=axes, algorithm=algorithm, **effort), out)
 
 
-def answer_question(question: Question[Any], out: Path) -> Output:
+def run_question(question: Question[Any], out: Path) -> Output:
     """Answer a question, continuing from the results stored in the folder; also from partial findings after Ctrl-C."""
     findings, stopped, notes = None, "", 0
     with show_progress(question.counts, question.total) as advance:

@@ -165,7 +165,7 @@ def test_the_commands_and_a_forged_report(folder: Path, tmp_path: Path, undrawn_
     bad = call(app, ["verify", str(tmp_path / "forged.zip")])
     assert bad.exit_code == 1 and "report.md: DOES NOT HOLD: line" in bad.stdout, bad.output
     refused = call(app, ["verify", str(tmp_path / "forged.zip"), "--rerun", "most"])
-    assert refused.exit_code == 1 and "--rerun takes a share" in refused.stderr
+    assert refused.exit_code == 1 and "--rerun: the share must be a number" in refused.stderr
 
 
 @pytest.mark.slow
