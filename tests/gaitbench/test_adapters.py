@@ -54,18 +54,6 @@ def test_pymoo(instance: gaitbench.Instance, X: Array, rows: bool) -> None:
     assert result.F[0] >= instance.best_known and result.CV[0] == 0.0
 
 
-def test_pymoo_finds_the_same_with_one_row_as_with_all(instance: gaitbench.Instance) -> None:
-    package("pymoo")
-    from pymoo.algorithms.soo.nonconvex.ga import GA
-    from pymoo.optimize import minimize
-
-    ends = [
-        minimize(instance.to("pymoo", rows=rows), GA(pop_size=20), ("n_gen", 10), seed=1, verbose=False).X
-        for rows in (False, True)
-    ]
-    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
-
-
 @pytest.mark.slow
 def test_pygmo(instance: gaitbench.Instance, X: Array) -> None:
     """Objective, rows and gradients; a copy in an archipelago's thread and a gradient solver work on it."""

@@ -20,8 +20,7 @@ from nlp_gait.symbolic.balance import zmp_of_wrench
 from nlp_gait.symbolic.dynamics import newton_euler
 from tests.evaluation import evaluated
 from tests.properties.mirror import JOINT_SIGNS, mirrored, partner
-from tests.robots.custom import Record, nao
-from tests.robots.files import written
+from tests.robots.custom import Record, nao, written
 
 NAMES = ("nao-ssp", "nao-dsp")
 of_both_phases = pytest.mark.parametrize("name", NAMES)

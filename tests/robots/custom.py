@@ -6,17 +6,44 @@ import copy
 import json
 from collections.abc import Mapping
 from importlib import resources
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from nlp_gait.formulation import Array
+from nlp_gait.robots import Robot
 
 Record = dict[str, Any]
 
 THIGH, TIBIA, HIP_OFFSET, HEAVIER = 0.12, 0.11, 0.06, 1.2
+
+
+def written(folder: Path, raw: object) -> str:
+    """Path of a robot file with this content: text as it is, anything else as JSON."""
+    path = folder / "robot.json"
+    path.write_text(raw if isinstance(raw, str) else json.dumps(raw), encoding="utf-8")
+    return str(path)
+
+
+def assert_same(one: Robot, other: Robot, tolerance: float = 1e-12) -> None:
+    """Compare links and joints; by default to the rounding of rotations on lengths below 1 m and masses of about 1 kg."""
+    assert (one.root, set(one.links), set(one.joints)) == (other.root, set(other.links), set(other.joints))
+    for name, link in one.links.items():
+        assert link.mass_kg == pytest.approx(other.links[name].mass_kg, rel=tolerance)
+        for field in ("com_m", "inertia_matrix"):
+            expected = getattr(other.links[name], field)
+            np.testing.assert_allclose(getattr(link, field), expected, rtol=0, atol=tolerance, err_msg=name)
+    for name, joint in one.joints.items():
+        twin = other.joints[name]
+        assert (joint.parent, joint.child, joint.torque_limit_Nm) == (twin.parent, twin.child, twin.torque_limit_Nm)
+        for field in ("limits_rad", "origin_m", "axis"):
+            np.testing.assert_allclose(
+                getattr(joint, field), getattr(twin, field), rtol=0, atol=tolerance, err_msg=name
+            )
 
 
 def nao() -> Record:

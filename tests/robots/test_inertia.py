@@ -11,8 +11,7 @@ import pytest
 from nlp_gait.errors import RobotDataError
 from nlp_gait.robots import Link, list_robots, load_robot
 from nlp_gait.robots.tree import check_inertias, compute_joint_ratio, shift_to_com
-from tests.robots.custom import about_joints, humanoid, nao, six
-from tests.robots.files import written
+from tests.robots.custom import about_joints, humanoid, nao, six, written
 
 # Sums of products of numbers with six digits.
 TOLERANCE = 1e-15

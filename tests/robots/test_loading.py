@@ -12,7 +12,7 @@ import pytest
 
 from nlp_gait.errors import RobotDataError, UnknownNameError
 from nlp_gait.robots import list_robots, load_robot
-from tests.robots.files import written
+from tests.robots.custom import written
 
 
 def link(mass: Any = 1.0, inertia: Any = (1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)) -> dict[str, Any]:

@@ -22,8 +22,7 @@ from nlp_gait.gaits.nao.joints import LegGeometry, measure_leg
 from nlp_gait.robots import load_robot
 from tests.evaluation import evaluated
 from tests.pinocchio_oracle import floating_model, stand
-from tests.robots.custom import HEAVIER, HIP_OFFSET, THIGH, TIBIA, Record, as_urdf, humanoid, nao, partner
-from tests.robots.files import written
+from tests.robots.custom import HEAVIER, HIP_OFFSET, THIGH, TIBIA, Record, as_urdf, humanoid, nao, partner, written
 
 # Two double-precision algorithms on torques of some Nm.
 TORQUE_TOLERANCE_NM = 1e-10
