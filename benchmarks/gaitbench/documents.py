@@ -1,4 +1,4 @@
-"""Write the catalogue and the table of instances in the documentation.
+"""Write the catalogue of instances in the documentation.
 
 ``python -m benchmarks.gaitbench.documents``
 """
@@ -8,56 +8,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from compare.bench.baseline import list_baselines
 from nlp_gait import gaitbench
-from nlp_gait.files import write_json, write_text
+from nlp_gait.files import write_json
 
 DOCS = Path(gaitbench.__file__).parents[2] / "docs"
 SUITE = "GaitBench 1"
-MARKS = {
-    "instances": ("<!-- instances -->", "<!-- end of instances -->"),
-    "shipped": ("<!-- shipped -->", "<!-- end -->"),
-}
 
 
 def main() -> None:
-    """Write the catalogue and the page."""
+    """Write the catalogue."""
     write_json(DOCS / "gaitbench.json", make_catalogue())
-    page = DOCS / "gaitbench.md"
-    text = page.read_text(encoding="utf-8")
-    for content, (begin, end) in zip((format_instances(), describe_shipped()), MARKS.values(), strict=True):
-        head, _, rest = text.partition(begin)
-        text = f"{head}{begin}\n{content}\n{end}{rest.partition(end)[2]}"
-    write_text(page, text)
-
-
-def format_instances() -> str:
-    """Return a table with a row for each instance."""
-    rows = [
-        "| id | what | n | inequalities | feasible | cost | best known | evidence |",
-        "|---|---|--:|--:|--:|--:|--:|---|",
-    ]
-    for id in gaitbench.list_instances():
-        instance = gaitbench.load(id)
-        share, small = instance.facts.feasible_share, instance.definition.small
-        rows.append(
-            f"| `{id}`{' *' if small else ''} | {instance.definition.what} | {len(instance.names)} | "
-            f"{len(instance.row_names)} | {100 * share:.2g} % | {instance.facts.evaluation_us:.2g} us | "
-            f"{instance.best_known:.6g} | {instance.evidence} |"
-        )
-    return "\n".join([*rows, "", "An asterisk marks those of the subset `small`."])
-
-
-def describe_shipped() -> str:
-    """Return a sentence on the instances whose records are shipped."""
-    there, everything = list_baselines(), gaitbench.list_instances()
-    if set(there) >= set(everything):
-        return "Runs on all instances are shipped."
-    return (
-        f"Shipped so far are runs on {len(there)} of the {len(everything)} instances: "
-        + ", ".join(f"`{id}`" for id in everything if id in there)
-        + "."
-    )
 
 
 def make_catalogue() -> dict[str, Any]:

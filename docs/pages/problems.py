@@ -42,6 +42,13 @@ SIZES_INTRODUCTION = """## Sizes of the NLPs
 What NLP solvers receive with default options: scaled variables and those of lifted operations, the lower triangle of the Hessian;
 measured by `python -m docs.nlp_sizes`. `nlp-gait export PROBLEM --to nl --out DIR` writes one as an `.nl` file,
 [for solver developers](../../gaitbench.md#nlps-for-solver-developers)."""
+CATALOGUE = Path(__file__).parents[1] / "gaitbench.json"
+INSTANCES = """## Instances of GaitBench
+
+An asterisk marks those of the subset `small`. *Feasible* is the share of 100,000 uniform points, *cost* the processor time of
+one evaluation in a batch, on one core with AVX-512. *Evidence* says why the best known may be the optimum: a proof by branch and
+bound, the random starts of IPOPT that reach it within a millionth, and long runs of CMA-ES. "Best known" alone means that one
+start found it."""
 PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 
 
@@ -58,7 +65,15 @@ def write(folder: Path) -> None:
     pages = {f"{name}.md": problem_page(problem, measured.get(name), folder) for name, problem in problems.items()}
     header = ("problem", "what", "variables", "best known", "feasible points", "IPOPT near", "searches near")
     rows = [_overview(problem, measured.get(name)) for name, problem in problems.items()]
-    pages["index.md"] = page(INTRODUCTION, table(header, rows), SIZES_INTRODUCTION, nlp_sizes(), toctree(problems))
+    pages["index.md"] = page(
+        INTRODUCTION,
+        table(header, rows),
+        SIZES_INTRODUCTION,
+        nlp_sizes(),
+        INSTANCES,
+        list_instances(),
+        toctree(problems),
+    )
     write_all(folder, pages)
 
 
@@ -75,6 +90,27 @@ def nlp_sizes() -> str:
         "of the Hessian",
     )
     return table(header, [(f"`{name}`", *(f"{measured[name][key]:,}" for key in KEYS)) for name in names()])
+
+
+def list_instances() -> str:
+    """Return the table of GaitBench's instances."""
+    header = ("id", "what", "n", "inequalities", "feasible", "cost", "best known", "evidence")
+    return table(
+        header,
+        (
+            (
+                code(entry["id"]) + " \\*" * ("small" in entry["subsets"]),
+                literal(entry["name"].partition(": ")[2]),
+                str(entry["variables"]["dimension"]),
+                str(entry["constraints"]["inequalities"]),
+                f"{100 * entry['feasible_share']:.2g} %",
+                f"{entry['evaluation_us']:.2g} us",
+                f"{entry['best_known']['objective']:.6g}",
+                literal(entry["best_known"]["evidence"]),
+            )
+            for entry in json.loads(CATALOGUE.read_text(encoding="utf-8"))["problems"]
+        ),
+    )
 
 
 def _overview(problem: GaitProblem, found: Difficulty | None) -> tuple[str, ...]:
