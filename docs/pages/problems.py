@@ -20,6 +20,7 @@ from nlp_gait.formulation import GaitProblem, list_problems, load
 from nlp_gait.formulation.registry import find_maker
 from nlp_gait.formulation.solution import ConstraintValue
 from nlp_gait.gaitbench.facts import DEFINITIONS, load_facts
+from nlp_gait.proofs.certificate import load_certificates
 from nlp_gait.providers import PROBLEMS
 from nlp_gait.symbolic.nonsmooth import Exact
 
@@ -49,6 +50,10 @@ An asterisk marks those of the subset `small`. *Feasible* is the share of 100,00
 one evaluation in a batch, on one core with AVX-512. *Evidence* says why the best known may be the optimum: a proof by branch and
 bound, the random starts of IPOPT that reach it within a millionth, and long runs of CMA-ES. "Best known" alone means that one
 start found it."""
+CERTIFICATES = """## Certificates
+
+Bounds that are [proven](../../guarantees.md) by branch and bound over all variables, with the boxes that the proof took
+and its time on one core."""
 PICTURE = "Best known gait: six poses at equidistant times, later ones darker (left blue, right orange), with power and margin."
 
 
@@ -109,6 +114,19 @@ def list_instances() -> str:
                 literal(entry["best_known"]["evidence"]),
             )
             for entry in json.loads(CATALOGUE.read_text(encoding="utf-8"))["problems"]
+        ),
+    )
+
+
+def list_certificates() -> str:
+    """Return the table of the shipped certificates."""
+    header = ("certificate", "best known", "proven bound", "boxes", "s of one core")
+    proofs = {name: file.certificate for name, file in load_certificates().items()}
+    return table(
+        header,
+        (
+            (code(name), f"{proof.objective:.7g}", f"{proof.bound:.7g}", f"{proof.boxes:,}", f"{proof.cpu_s:.0f}")
+            for name, proof in proofs.items()
         ),
     )
 
