@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from benchmarks.engine.agreement import STEPS, format_energies, simulate_walk
 from benchmarks.engine.gaits import PAPER, optimal_cycles, optimum, phase_gaits
 from benchmarks.engine.markdown import cells, header
-from nlp_gait.simulation import measurements, mjcf
+from nlp_gait.simulation import measurements, mjcf, simulate
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import measure
 from nlp_gait.simulation.plan import make_plan
@@ -28,12 +28,12 @@ VARIANTS = {
 def engine_step(step_s: float) -> Iterator[None]:
     """Another time step for all that simulates."""
     before = mjcf.TIME_STEP
-    for module in (mjcf, measurements):
+    for module in (mjcf, measurements, simulate):
         module.TIME_STEP = step_s
     try:
         yield
     finally:
-        for module in (mjcf, measurements):
+        for module in (mjcf, measurements, simulate):
             module.TIME_STEP = before
 
 

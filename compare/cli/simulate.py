@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +23,6 @@ from nlp_gait.simulation.video import Frame, check_frames, check_video_path, wri
 if TYPE_CHECKING:
     from nlp_gait.simulation.drive import Drive
     from nlp_gait.simulation.measurements import Measurements, Walk
-    from nlp_gait.simulation.replay import Recording
     from nlp_gait.simulation.simulate import Conditions, Robustness
 
 DRIVE = (
@@ -123,13 +121,14 @@ def simulate(
         delay_s = 0.02
     """
     from compare.drawing.robot_figures import plot_simulation
+    from compare.report.interactive import animate_simulation
     from nlp_gait.export.formats import write_npz
     from nlp_gait.simulation.engine import load_mujoco
     from nlp_gait.simulation.measurements import measure, measure_walk
     from nlp_gait.simulation.mjcf import make_plan_model
     from nlp_gait.simulation.plan import make_plan
-    from nlp_gait.simulation.replay import FRAMES_PER_S, record_states
-    from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, simulate_plan
+    from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton
+    from nlp_gait.simulation.simulate import SETTLE_TIME, measure_robustness, prepare, simulate_plan
 
     load_mujoco(pictures=video is not None)
     film = None if video is None else check_output_file(check_video_path(video))
@@ -139,17 +138,14 @@ def simulate(
     plan = make_plan(result, steps)
     if film is not None:
         check_frames(plan.duration_s + SETTLE_TIME, FRAMES_PER_S)
-    play, written = partial(simulate_plan, plan, conditions, drive, sole), list[Path]()
-    if film is None and target is None:
-        trace = play()
-    else:
-        recording = record_states(plan, play)
-        trace = recording.simulation
-        if target is not None:
-            _write_page(recording, target, sole, result.problem.title)
-        if film is not None:
-            _write_film(recording, film, FRAMES_PER_S)
-        written += [path for path in (target, film) if path is not None]
+    trace = simulate_plan(plan, conditions, drive, sole)
+    written = [path for path in (target, film) if path is not None]
+    model, _ = prepare(plan, conditions, drive, sole)
+    if target is not None:
+        power = np.abs(trace.torque * trace.qd).sum(axis=1)[list_frames(trace)]
+        animate_simulation(make_skeleton(plan, trace, model, sole, result.problem.title), power).write(target)
+    if film is not None:
+        write_video(film, _show_pictures(draw_pictures(plan, trace, model), len(list_frames(trace))), FRAMES_PER_S)
     walk = None if plan.steps is None else measure_walk(plan, trace, drive, plan.steps)
     report = measure(plan, trace, drive) if walk is None else walk.measurements
     data = {"schema": 1, **asdict(report)}
@@ -177,25 +173,11 @@ def simulate(
     return Output(data=data, parts=[*parts, *_describe_survival(survival)], written=written)
 
 
-def _write_page(recording: Recording, target: Path, sole: str, title: str) -> None:
-    from compare.report.interactive import animate_simulation
-    from nlp_gait.simulation.replay import make_skeleton
-
-    trace = recording.simulation
-    power = np.abs(trace.torque * trace.qd).sum(axis=1)[recording.steps]
-    animate_simulation(make_skeleton(recording, sole, title), power).write(target)
-
-
-def _write_film(recording: Recording, target: Path, frames_per_s: float) -> None:
-    from nlp_gait.simulation.replay import draw_pictures
-
-    def show_pictures() -> Iterator[Frame]:
-        with show_progress("frames", len(recording.states)) as advance:
-            for picture in draw_pictures(recording):
-                yield picture
-                advance("")
-
-    write_video(target, show_pictures(), frames_per_s)
+def _show_pictures(pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
+    with show_progress("frames", count) as advance:
+        for picture in pictures:
+            yield picture
+            advance("")
 
 
 def _describe(report: Measurements) -> Iterator[str | Rows]:

@@ -2,9 +2,8 @@
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -25,49 +24,23 @@ from nlp_gait.simulation.video import Frame
 FRAMES_PER_S = 25.0
 SIZE = (960, 540)  # of pictures [pixels]
 PRESSURE_WINDOW_S = 0.02  # over which the centre of pressure is averaged
-ROUNDING = 1e-9  # [s]
 AZIMUTH, ELEVATION = 125.0, -12.0  # of the camera [degrees]
 SEEN = 1.5  # height that the camera shows, in heights of the robot
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Recording:
-    """A simulation with the engine's coordinates at the times of pictures."""
-
-    plan: Plan
-    simulation: Simulation
-    model: Any  #: of the engine
-    steps: np.ndarray[tuple[int], np.dtype[np.intp]]  #: (F,) numbers of the engine's steps
-    states: Array  #: (F, Q) coordinates
+Indices = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 
-def record_states(plan: Plan, simulate: Callable[..., Simulation]) -> Recording:
-    """Record ``FRAMES_PER_S`` states for each second of a simulation; ``simulate`` has the argument ``on_step``."""
-    models: list[Any] = []
-    states: list[Array] = []
-    steps: list[int] = []
-    count = 0
-
-    def keep(model: Any, data: Any) -> None:
-        nonlocal count
-        if count * TIME_STEP >= len(steps) / FRAMES_PER_S - ROUNDING:
-            models[:] = [model]
-            states.append(data.qpos.copy())
-            steps.append(count)
-        count += 1
-
-    simulation = simulate(on_step=keep)
-    return Recording(
-        plan=plan, simulation=simulation, model=models[0], steps=np.array(steps, dtype=np.intp), states=np.array(states)
-    )
+def list_frames(simulation: Simulation) -> Indices:
+    """Return the numbers (F,) of the engine's steps that are shown, ``FRAMES_PER_S`` each second."""
+    return np.arange(0, len(simulation.t), round(1.0 / (FRAMES_PER_S * TIME_STEP)))
 
 
-def make_skeleton(recording: Recording, sole: str, title: str) -> Skeleton:
-    """Return the simulated robot as a drawing, with its centre of mass and the measured centre of pressure."""
-    engine, plan, model, steps = load_mujoco(), recording.plan, recording.model, recording.steps
+def make_skeleton(plan: Plan, simulation: Simulation, model: Any, sole: str, title: str) -> Skeleton:
+    """Return the simulated robot, by the engine's model, with its centre of mass and the measured centre of pressure."""
+    engine, steps = load_mujoco(), list_frames(simulation)
     data = engine.MjData(model)
     places, turns, com = [], [], []
-    for state in recording.states:
+    for state in simulation.states[steps]:
         data.qpos[:] = state
         engine.mj_kinematics(model, data)
         engine.mj_comPos(model, data)
@@ -76,7 +49,7 @@ def make_skeleton(recording: Recording, sole: str, title: str) -> Skeleton:
         com.append(data.subtree_com[model.body(plan.robot.root).id].copy())
     x, rotation = np.array(places), np.array(turns)
     sides, limbs, soles = find_sides(plan.robot), list[Limb](), list[Sole]()
-    loaded = recording.simulation.loads[steps] > LEAST_LOAD
+    loaded = simulation.loads[steps] > LEAST_LOAD
     for link, shapes in make_plan_shapes(plan, sole).items():
         body, side = model.body(link).id, sides.get(link, TRUNK)
         for shape in shapes:
@@ -89,10 +62,10 @@ def make_skeleton(recording: Recording, sole: str, title: str) -> Skeleton:
                 limbs.append(Limb(side=side, points=points))
             else:
                 soles.append(Sole(side=side, corners=points, supports=loaded[:, SIDES.index(side)]))
-    pressure = _hold_last(average_pressure(recording.simulation, PRESSURE_WINDOW_S)[steps])
+    pressure = _hold_last(average_pressure(simulation, PRESSURE_WINDOW_S)[steps])
     everything = np.concatenate([limb.points for limb in limbs], axis=1)[..., 0]
     return Skeleton(
-        t=recording.simulation.t[steps],
+        t=simulation.t[steps],
         limbs=tuple(limbs),
         soles=tuple(soles),
         ground=_outline_ground(plan.ground, float(everything.min()), float(everything.max())),
@@ -120,9 +93,9 @@ def _outline_ground(treads: tuple[Tread, ...], first: float, last: float) -> Arr
     return np.array(corners)
 
 
-def draw_pictures(recording: Recording) -> Iterator[Frame]:
-    """Yield pictures of a recording; raises OutputError if there is no OpenGL to draw with."""
-    engine, model, (width, height) = load_mujoco(pictures=True), recording.model, SIZE
+def draw_pictures(plan: Plan, simulation: Simulation, model: Any) -> Iterator[Frame]:
+    """Yield pictures of a simulation, by the engine's model; raises OutputError if there is no OpenGL to draw with."""
+    engine, (width, height) = load_mujoco(pictures=True), SIZE
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
     try:
         with warnings.catch_warnings():
@@ -133,10 +106,10 @@ def draw_pictures(recording: Recording) -> Iterator[Frame]:
         raise OutputError(
             f"a video needs OpenGL ({reason}); set MUJOCO_GL=egl or osmesa if installed, or write a page by --page FILE.html"
         ) from error
-    data, camera, torso = engine.MjData(model), engine.MjvCamera(), model.body(recording.plan.robot.root).id
+    data, camera, torso = engine.MjData(model), engine.MjvCamera(), model.body(plan.robot.root).id
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
     with closing(renderer):
-        for k, state in enumerate(recording.states):
+        for k, state in enumerate(simulation.states[list_frames(simulation)]):
             with delay_interrupts():  # an interrupt inside the graphics driver would break it
                 data.qpos[:] = state
                 engine.mj_forward(model, data)

@@ -27,8 +27,6 @@ COLUMNS = {
 }
 LEAST_LOAD = 1.0  # [N]; below this total load there is no centre of pressure
 
-OnStep = Callable[[Any, Any], None]  # called with the engine's model and data before every step
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Push:
@@ -80,6 +78,7 @@ class Simulation:
     """Measurements at every step of the engine; the first axis is time, axes are those of the floor."""
 
     t: Array  #: (T,) [s]
+    states: Array  #: (T, Q) the engine's coordinates: place [m] and attitude of the root, angles of the joints [rad]
     q: Array  #: (T, J) joint angles, columns as in the plan [rad]
     qd: Array  #: (T, J) [rad/s]
     torque: Array  #: (T, J) of the drives [Nm]
@@ -104,8 +103,6 @@ def simulate_plan(
     conditions: Conditions | None = None,
     drive: Drive | None = None,
     sole: str = "rectangle",
-    *,
-    on_step: OnStep | None = None,
 ) -> Simulation:
     """Simulate a gait from its planned state until it has settled or fallen, deterministically; raises MissingExtraError."""
     engine = load_mujoco()
@@ -128,20 +125,19 @@ def simulate_plan(
         data.ctrl[addresses.actuators] = command
         if push is not None:
             data.xfrc_applied[addresses.torso, :2] = push.force(t - pushed_s)
-        if on_step is not None:
-            on_step(model, data)
-        q, qd = data.qpos[addresses.angles], data.qvel[addresses.rates]
+        state, qd = data.qpos.copy(), data.qvel[addresses.rates]
         engine.mj_step(model, data)  # leaves positions, forces and contacts of the instant at which it began
         torso, axes = data.xpos[addresses.torso].copy(), data.xmat[addresses.torso]
         upright, heading = float(axes[2::3] @ axis), math.atan2(axes[3], axes[0])
         feet, torque = data.site_xpos[addresses.soles], data.actuator_force[addresses.actuators]
-        rows.append((q, qd, torque, torso, upright, heading, feet, *_measure_pressure(data, addresses)))
+        rows.append((state, qd, torque, torso, upright, heading, feet, *_measure_pressure(data, addresses)))
         diverged = not np.isfinite(data.qvel).all()
         if diverged or upright < math.cos(FALLEN_TILT) or torso[2] < least_height:
             fell_at_s = t
             break
     columns = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
-    measured = dict(zip(("q", "qd", "torque", *COLUMNS), columns, strict=True))
+    measured = dict(zip(("states", "qd", "torque", *COLUMNS), columns, strict=True))
+    measured["q"] = measured["states"][:, addresses.angles]
     measured["tilt"] = np.arccos(np.clip(measured["tilt"], -1.0, 1.0))  # the rows have its cosine
     n = len(rows)
     return Simulation(t=times[:n], set_points=commands[:n], **measured, fell_at_s=fell_at_s)

@@ -1,6 +1,4 @@
-"""Recorded simulations: states at the times of pictures, and the robot as a skeleton."""
-
-from functools import partial
+"""Simulations to look at: states at the times of pictures, and the robot as a skeleton."""
 
 import numpy as np
 import pytest
@@ -9,31 +7,34 @@ from nlp_gait.errors import OutputError
 
 pytest.importorskip("mujoco")
 
+from nlp_gait.simulation.drive import Drive  # noqa: E402
 from nlp_gait.simulation.engine import load_mujoco  # noqa: E402
 from nlp_gait.simulation.plan import make_plan  # noqa: E402
-from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, make_skeleton, record_states  # noqa: E402
-from nlp_gait.simulation.simulate import simulate_plan  # noqa: E402
+from nlp_gait.simulation.replay import FRAMES_PER_S, draw_pictures, list_frames, make_skeleton  # noqa: E402
+from nlp_gait.simulation.simulate import Conditions, prepare, simulate_plan  # noqa: E402
 
 
 @pytest.fixture(scope="module")
-def recording(gait):
+def simulated(gait):
     plan = make_plan(gait("dsp optimum"))
-    return record_states(plan, partial(simulate_plan, plan))
+    model, _ = prepare(plan, Conditions(), Drive(), "rectangle")
+    return plan, simulate_plan(plan), model
 
 
 @pytest.mark.slow
-def test_states_are_those_at_the_times_of_pictures(recording):
-    times = recording.simulation.t[recording.steps]
-    np.testing.assert_allclose(times, np.arange(len(times)) / FRAMES_PER_S, atol=5e-4)
-    assert len(times) == round((recording.plan.duration_s + 1.0) * FRAMES_PER_S)  # a second of settling
-    assert recording.states.shape == (len(times), recording.model.nq)
-    np.testing.assert_allclose(recording.states[:, :3], recording.simulation.torso[recording.steps], atol=1e-12)
+def test_frames_are_equally_long_and_states_those_of_the_torso(simulated):
+    plan, trace, model = simulated
+    frames = list_frames(trace)
+    np.testing.assert_allclose(trace.t[frames], np.arange(len(frames)) / FRAMES_PER_S, atol=5e-4)
+    assert len(frames) == round((plan.duration_s + 1.0) * FRAMES_PER_S)  # a second of settling
+    assert trace.states.shape == (len(trace.t), model.nq)
+    np.testing.assert_allclose(trace.states[:, :3], trace.torso, atol=1e-12)
 
 
 @pytest.mark.slow
-def test_the_skeleton_is_where_the_engine_has_the_robot(recording):
-    skeleton = make_skeleton(recording, "rectangle", "a title")
-    feet = recording.simulation.feet[recording.steps]  # soles under the ankles
+def test_the_skeleton_is_where_the_engine_has_the_robot(simulated):
+    skeleton = make_skeleton(*simulated, "rectangle", "a title")
+    feet = simulated[1].feet[list_frames(simulated[1])]  # soles under the ankles
     for i, side in enumerate(("left", "right")):
         (sole,) = (part for part in skeleton.soles if part.side == side)
         middle = sole.corners.mean(axis=1)
@@ -48,10 +49,10 @@ def test_the_skeleton_is_where_the_engine_has_the_robot(recording):
 
 
 @pytest.mark.slow
-def test_without_opengl_the_error_names_the_page(recording, monkeypatch):
+def test_without_opengl_the_error_names_the_page(simulated, monkeypatch):
     def refuse(*_):
         raise RuntimeError("no context")
 
     monkeypatch.setattr(load_mujoco(), "Renderer", refuse)
     with pytest.raises(OutputError, match=r"a video needs OpenGL \(no context\).* or write a page by --page FILE.html"):
-        next(draw_pictures(recording))
+        next(draw_pictures(*simulated))
