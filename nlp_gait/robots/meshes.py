@@ -71,16 +71,28 @@ def make_pose(place: Sequence[float] | Array, roll_pitch_yaw: Sequence[float] = 
     return pose
 
 
-def list_box_points(half: Array) -> Array:
-    """Return the corners (8, 3) of a box with half its size (3,)."""
-    return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+def list_shape_points(kind: str, size: Sequence[float] | Array, pose: Array) -> Array:
+    """Return points (N, 3) of a shape at a pose (4, 4): corners, edges, or the lowest points of round shapes; none of others.
+
+    ``size``: half the sizes of a box, the radius of a sphere, radius and half the length of a cylinder or capsule along z.
+    """
+    if kind == "sphere":
+        return np.array([pose[:3, 3] - [0.0, 0.0, size[0]]])
+    if kind == "capsule":
+        return move_points(np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]), pose) - [0.0, 0.0, size[0]]
+    if kind == "box":
+        corners = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+        return move_points(np.array(corners) * np.asarray(size), pose)
+    if kind == "cylinder":
+        turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
+        rim = size[0] * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
+        return move_points(np.concatenate([rim + [0.0, 0.0, end * size[1]] for end in (-1, 1)]), pose)
+    return np.zeros((0, 3))
 
 
-def list_cylinder_points(radius: float, half_length: float) -> Array:
-    """Return points (48, 3) of both edges of a cylinder along z."""
-    turns = np.linspace(0.0, 2.0 * math.pi, RIM, endpoint=False)
-    rim = radius * np.stack([np.cos(turns), np.sin(turns), np.zeros(RIM)], axis=1)
-    return np.concatenate([rim + [0.0, 0.0, end * half_length] for end in (-1, 1)])
+def move_points(points: Array, pose: Array) -> Array:
+    """Return points (N, 3) that are given in a frame at a pose (4, 4)."""
+    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
 
 
 def read_mesh_points(path: Path) -> Array:
@@ -151,7 +163,7 @@ def _read_collada(data: bytes) -> Array:
                 total += len(points)
                 if total > MOST_POINTS:
                     raise ValueError(f"its instances have more than {MOST_POINTS} points; simplify it")
-                placed.append(points @ pose[:3, :3].T + pose[:3, 3])
+                placed.append(move_points(points, pose))
             elif part.tag == "node":
                 visit(part, pose, level + 1)
 

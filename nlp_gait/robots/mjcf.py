@@ -15,7 +15,7 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import read_in_child
-from nlp_gait.robots.meshes import FootShapes, list_box_points, list_cylinder_points
+from nlp_gait.robots.meshes import FootShapes, list_shape_points, move_points
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
 from nlp_gait.robots.welding import LinkFrame, RobotParts, join_frames, list_carriers
@@ -191,26 +191,14 @@ def _find_torque_limit(model: Any, joint: int) -> float:
 
 
 def _list_shape_points(model: Any, geom: int, pose: Array) -> Array:
-    """Return points (N, 3) of a shape at a pose (4, 4): corners, edges, or the lowest points of round shapes."""
-    kinds = import_module("mujoco").mjtGeom
-    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    if kind == int(kinds.mjGEOM_MESH):
+    kind = import_module("mujoco").mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    if kind == "mesh":
         mesh = int(model.geom_dataid[geom])
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        points = np.array(model.mesh_vert[first : first + count], dtype=float)
-    elif kind == int(kinds.mjGEOM_BOX):
-        points = list_box_points(size)
-    elif kind == int(kinds.mjGEOM_SPHERE):
-        return np.array([pose[:3, 3] - [0.0, 0.0, size[0]]])
-    elif kind == int(kinds.mjGEOM_CAPSULE):
-        ends = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]) @ pose[:3, :3].T + pose[:3, 3]
-        return np.asarray(ends - [0.0, 0.0, size[0]])
-    elif kind == int(kinds.mjGEOM_CYLINDER):
-        points = list_cylinder_points(size[0], size[1])
+        points = move_points(np.array(model.mesh_vert[first : first + count], dtype=float), pose)
     else:
-        return np.zeros((0, 3))
-    placed = np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
-    return placed if are_plausible(placed) else np.zeros((0, 3))
+        points = list_shape_points(kind, model.geom_size[geom], pose)
+    return points if are_plausible(points) else np.zeros((0, 3))
 
 
 def _make_pose(place: Array, quaternion: Array) -> Array:

@@ -14,9 +14,9 @@ from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.meshes import (
     FootShapes,
     find_mesh,
-    list_box_points,
-    list_cylinder_points,
+    list_shape_points,
     make_pose,
+    move_points,
     parse_xml,
     read_mesh_points,
 )
@@ -110,20 +110,18 @@ def _read_foot_shapes(
 
 def _list_shape_points(shape: Any, pose: Array, path: Path) -> Array | None:
     """Return points (N, 3) of a shape at a pose (4, 4); None for a mesh that does not exist."""
+    size: list[float] = []
     if shape.tag == "mesh":
         mesh = find_mesh(shape.get("filename", ""), path)
-        if mesh is None:
-            return None
-        points = read_mesh_points(mesh) * _read_numbers(shape, "scale", 3, "1 1 1")
-    elif shape.tag == "box":
-        points = list_box_points(np.array(_read_numbers(shape, "size", 3)) / 2)
+        scale = _read_numbers(shape, "scale", 3, "1 1 1")
+        return None if mesh is None else move_points(read_mesh_points(mesh) * scale, pose)
+    if shape.tag == "box":
+        size = [width / 2 for width in _read_numbers(shape, "size", 3)]
     elif shape.tag == "sphere":
-        return np.array([pose[:3, 3] - [0.0, 0.0, _read_number(shape, "radius")]])
+        size = [_read_number(shape, "radius")]
     elif shape.tag in ("cylinder", "capsule"):
-        points = list_cylinder_points(_read_number(shape, "radius"), _read_number(shape, "length") / 2)
-    else:
-        return np.zeros((0, 3))
-    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])
+        size = [_read_number(shape, "radius"), _read_number(shape, "length") / 2]
+    return list_shape_points("cylinder" if shape.tag == "capsule" else shape.tag, size, pose)
 
 
 def _read_xml(path: str) -> Any:
