@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 from compare.analysis.units import choose_natural_step, join_words, with_unit
-from compare.questions.question import Answer, Question, Work, make_record_table, make_table
+from compare.questions.question import Answer, Question, Work, make_record_table
 from nlp_gait.backends.plan_walk import find_walk
 from nlp_gait.backends.solve import solve
 from nlp_gait.backends.solvers.solver import Solver
@@ -56,7 +56,7 @@ class Capability:
 
     @property
     def within(self) -> Round | None:
-        """Within all bounds."""
+        """The round within all bounds."""
         return self.rounds[0] if self.rounds else None
 
     @property
@@ -98,20 +98,13 @@ class Capabilities(Question[tuple[Capability, ...]]):
             raise InputError(
                 f"{self.problem.name}: no feasible cycle was found from {self.starts} starts; {cheapest.status}"
             )
-        found: tuple[Capability, ...] = ()
+        capabilities: tuple[Capability, ...] = ()
         for goal in GOALS:
-            found = (*found, raise_quantity(self.problem, goal, cheapest.x, solver, work))
-            yield found
+            capabilities += (raise_quantity(self.problem, goal, cheapest.x, solver, work),)
+            yield capabilities
 
     def report(self, findings: tuple[Capability, ...]) -> Answer:
         stem = f"{self.problem.name}-capabilities"
-        columns = {
-            "quantity": lambda c: c.words,
-            "within our bounds": lambda c: with_unit(c.within and c.within.value, c.unit, ".4g"),
-            "stopped by": lambda c: describe_stops(c.within),
-            "our bounds moved": lambda c: with_unit(c.beyond and c.beyond.value, c.unit, ".4g"),
-            "then stopped by": lambda c: describe_stops(c.beyond),
-        }
         stops = [
             {"quantity": c.quantity, "round": k, "value": item.value, **asdict(stop)}
             for c in findings
@@ -124,7 +117,6 @@ class Capabilities(Question[tuple[Capability, ...]]):
             title=f"What {robot.name if robot is not None else self.problem.name} can do",
             verdict=(*(describe_capability(c) for c in findings), *describe_sharpest_turn(self.problem)),
             parts=[
-                make_table("Greatest values of a walking cycle, and the limits that stop it", findings, columns),
                 "Each value is the maximum of a walking cycle under all limits of the problem; limits are listed by what a "
                 "natural step of each would gain. Bounds on times, velocities, step and lift are ours: NAO's in proportion, "
                 "with least times and greatest velocities from the joints that swing the robot's legs. Where they stop the "
@@ -169,8 +161,8 @@ def maximise(problem: GaitProblem, goal: Capability) -> GaitProblem:
     """Return the problem that maximises a quantity under the same constraints."""
 
     def change(assembly: Assembly, point: Point, ops: Nonsmooth) -> Assembly:
-        own = assembly.indexes.get(goal.quantity)
-        return replace(assembly, objective=point[goal.quantity] if own is None else own)
+        index = assembly.indexes.get(goal.quantity)
+        return replace(assembly, objective=point[goal.quantity] if index is None else index)
 
     objective = Objective(name=goal.quantity, unit=goal.unit, sense="maximise")
     return problem.derive(name=f"{problem.name}-{goal.quantity}", objective=objective, change=change)
@@ -178,24 +170,27 @@ def maximise(problem: GaitProblem, goal: Capability) -> GaitProblem:
 
 def list_stops(solution: Solution) -> tuple[StoppingLimit, ...]:
     """Return the limits that stop a maximum, the one whose natural step gains most first."""
-    stops = [_make_stop(active) for active in solution.active_constraints]
+    stops = [
+        StoppingLimit(
+            name=limit.name,
+            side=limit.side,
+            bound=limit.bound,
+            unit=limit.unit,
+            gain=limit.price * choose_natural_step(limit.unit, limit.bound).size,
+            ours=_is_ours(limit),
+        )
+        for limit in solution.active_constraints
+    ]
     effective = (stop for stop in stops if abs(stop.gain) > FREE * abs(solution.objective))
     return tuple(sorted(effective, key=lambda stop: -abs(stop.gain)))
 
 
-def _make_stop(active: ActiveConstraint) -> StoppingLimit:
-    variable = active.name.removeprefix("bounds[").removesuffix("]") if active.name.startswith("bounds[") else ""
-    is_goal = any(variable == goal.quantity for goal in GOALS)
-    return StoppingLimit(
-        name=active.name,
-        side=active.side,
-        bound=active.bound,
-        unit=active.unit,
-        gain=active.price * choose_natural_step(active.unit, active.bound).size,
-        ours=bool(variable)
-        and active.bound != 0.0
-        and (active.unit in TIMED_UNITS or is_goal and active.side == "upper"),  # others are clearances
-    )
+def _is_ours(limit: ActiveConstraint) -> bool:
+    """Return whether a limit is a bound of ours on a time, a velocity or a goal; other bounds are clearances."""
+    if not limit.name.startswith("bounds[") or limit.bound == 0.0:
+        return False
+    is_goal = any(limit.name == f"bounds[{goal.quantity}]" for goal in GOALS)
+    return limit.unit in TIMED_UNITS or (is_goal and limit.side == "upper")
 
 
 def move_bound(stop: StoppingLimit) -> tuple[str, float]:
@@ -218,25 +213,23 @@ def describe_sharpest_turn(problem: GaitProblem) -> list[str]:
     ]
 
 
-def describe_stops(found: Round | None) -> str:
+def describe_stops(end: Round | None) -> str:
     """Return the most effective limits in words, without the samples of their rows."""
-    if found is None:
+    if end is None:
         return "-"
-    names = dict.fromkeys(
-        f"{stop.name.partition(',')[0].rstrip(']')}{']' * ('[' in stop.name)}" for stop in found.stops
-    )
+    names = dict.fromkeys(f"{s.name.partition(',')[0].rstrip(']')}{']' * ('[' in s.name)}" for s in end.stops)
     return join_words(list(names)[:SHOWN]) or "no limit with a price"
 
 
-def describe_capability(found: Capability) -> str:
+def describe_capability(capability: Capability) -> str:
     """Return a capability in a sentence."""
-    if found.within is None:
-        return f"{found.words}: {found.end}"
-    value = with_unit(found.within.value, found.unit, ".4g")
-    sentence = f"{found.words}: {value}, stopped by {describe_stops(found.within)}"
-    if found.beyond is None:
+    within, beyond, unit = capability.within, capability.beyond, capability.unit
+    if within is None:
+        return f"{capability.words}: {capability.end}"
+    value = with_unit(within.value, unit, ".4g")
+    sentence = f"{capability.words}: {value}, stopped by {describe_stops(within)}"
+    if beyond is None:
         return f"{sentence}."
-    ours = join_words(sorted({name.rpartition(".")[0] for name in found.beyond.moved}))
-    further = with_unit(found.beyond.value, found.unit, ".4g")
-    stops = describe_stops(found.beyond)
-    return f"{sentence}; bounds of ours among them. With wider ones ({ours}): {further}, stopped by {stops}."
+    ours = join_words(sorted({name.rpartition(".")[0] for name in beyond.moved}))
+    further = f"{with_unit(beyond.value, unit, '.4g')}, stopped by {describe_stops(beyond)}"
+    return f"{sentence}; bounds of ours among them. With wider ones ({ours}): {further}."

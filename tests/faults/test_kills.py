@@ -23,7 +23,7 @@ from metaheuristics import ParticleSwarm
 from metaheuristics.interface import Search, Start
 from nlp_gait.backends.kernel import library_cache
 from tests.compare.cli.calls import nlp_gait
-from tests.compare.questions.test_resuming import without_times
+from tests.compare.questions.test_contract import without_times
 from tests.faults.processes import ROOT, fake_compiler, start
 
 pytestmark = pytest.mark.slow

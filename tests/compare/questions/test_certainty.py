@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from casadi import MX
 
 import nlp_gait
 from compare.questions.certainty import Certainty
-from compare.questions.local_optima import LocalOptimum, StartEnd, cluster_ends, estimate_unseen, run_stored_starts
-from compare.questions.question import Work, find
+from compare.questions.local_optima import LocalOptimum, StartEnd, cluster_ends, estimate_unseen
+from compare.questions.question import find
 from compare.study.references import find_reference
-from compare.study.store import Store
 from nlp_gait.backends.identity import identify_problem
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Constraint
 from nlp_gait.proofs.branch_and_bound import certify
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from tests.backends.toys import row, toy
-
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 
 def two_valleys(x: MX, y: MX, limit: MX, ops: Nonsmooth) -> tuple[MX, tuple[Constraint, ...]]:
@@ -83,22 +78,6 @@ def test_estimates_by_hand() -> None:
     assert estimate_unseen([LocalOptimum(objective=1.0, count=1, share=1.0, x=(0.0,))]).expected_optima is None
 
 
-def test_interrupted_starts_continue_to_the_same_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("compare.questions.local_optima.BATCH", 4)
-    problem = toy(two_valleys)
-    whole = run_stored_starts(problem, Work(store=Store(tmp_path / "whole")), starts=8)
-
-    def interrupt(note: str) -> None:
-        if note == "4 starts":
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_stored_starts(problem, Work(store=Store(tmp_path / "cut"), progress=interrupt), starts=8)
-    store = Store(tmp_path / "cut")
-    assert run_stored_starts(problem, Work(store=store), starts=8) == whole
-    assert store.summary == "1 of 2 results were stored by an earlier run"
-
-
 def test_gaps_are_measured_from_the_shipped_value_and_not_from_the_best_start() -> None:
     problem = nlp_gait.load("walk12").with_values(**{"lambda": 1.0})
     known = find_reference(identify_problem(problem))
@@ -121,14 +100,12 @@ def test_a_proof_begins_at_the_shipped_point_if_it_is_better() -> None:
     )
 
 
-def test_evidence_is_proven_or_supported(tmp_path: Path) -> None:
+def test_evidence_is_proven_or_supported() -> None:
     problem = toy(two_valleys, limit=-9.0)
     question = Certainty(problem=problem, starts=12, evaluations=2000, time_limit_s=20.0)
-    evidence = find(question, Work(store=Store(tmp_path)))
+    evidence = find(question)
     assert len(evidence.optima) == 2
     assert evidence.optima[0].x[0] < 0.0 < evidence.optima[1].x[0]
     assert evidence.certificate is not None and evidence.certificate.closed
     assert "no feasible x falls below" in evidence.proven
     assert evidence.search is not None and evidence.search.gap == pytest.approx(0.0, abs=1e-6)
-    assert all(path.stat().st_size > 0 for path in question.report(evidence).write(tmp_path))
-    evidence.to_json()

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,12 +10,9 @@ from compare.judge import evaluate
 from compare.questions.pareto.competing import MARGINS, make_competing_objective
 from compare.questions.pareto.front import FrontPoint, find_knees, select_front, solve_front
 from compare.questions.pareto.pareto import Pareto, SearchFront, compute_qualities, parse_searches
-from compare.questions.question import Work, find
-from compare.study.store import Store
+from compare.questions.question import find
 from nlp_gait.errors import InputError, UnknownNameError
 from nlp_gait.formulation import GaitProblem
-
-pytestmark = pytest.mark.usefixtures("coarse_pictures")
 
 X = np.array([0.31, -0.00122, 0.0035, 0.01243, 0.001, 0.02369, -0.02307, 0.015, 4.0])
 # Slopes by multipliers and by differences of neighbouring optima agree to this part.
@@ -115,11 +109,6 @@ def test_quality_of_the_front_itself_is_perfect_and_an_empty_run_counts_as_nothi
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("pareto")
-
-
-@pytest.fixture(scope="module")
 def small() -> GaitProblem:
     """Three free variables, so that a search of some hundred evaluations comes near the front."""
     problem = nlp_gait.load("nao-ssp", intervals=4)
@@ -129,9 +118,8 @@ def small() -> GaitProblem:
     return problem.with_values(**{"single_support_time_s.lower": 3.0})
 
 
-def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProblem, folder: Path) -> None:
-    question = Pareto(problem=small, points=5, starts=1, searches={"NSGA2": (100, 300)}, runs=1)
-    found = find(question, Work(store=Store(folder)))
+def test_a_small_front_is_below_what_searches_find(small: GaitProblem) -> None:
+    found = find(Pareto(problem=small, points=5, starts=1, searches={"NSGA2": (100, 300)}, runs=1))
     values, powers = zip(*((p.value, p.power_W) for p in found.front), strict=True)
     assert list(values) == sorted(values) and list(powers) == sorted(powers)
     assert all(p.violation <= 1e-6 for p in found.front)
@@ -139,12 +127,3 @@ def test_a_small_front_is_below_what_searches_find_and_is_stored(small: GaitProb
     assert found.challenge.infeasible == 0
     assert found.challenge.least_gap > -1e-3
     assert found.qualities[1].hypervolume[1] > 0.8
-    store = Store(folder)
-    again = find(question, Work(store=store))
-    assert store.summary == "3 of 3 results were stored by an earlier run"
-    assert [p.power_W for p in again.front] == list(powers)
-    written = question.report(found).write(folder)
-    with (folder / "nao-ssp-front-dbm_y_mean.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["power_W"]) for row in rows] == list(powers)
-    assert all(path.stat().st_size > 0 for path in written)

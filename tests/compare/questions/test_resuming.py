@@ -1,7 +1,4 @@
-"""Questions that are killed continue when they are rerun: no finished step is repeated, and the answer is the same.
-
-All run by `compare/questions/question.py`; those here store solves, runs of searches, proofs, variants and fronts.
-"""
+"""Steps of questions in the store: runs of solvers with every bit, in forks, stopped, and of a changed robot."""
 
 from __future__ import annotations
 
@@ -10,138 +7,31 @@ import math
 from dataclasses import fields, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pytest
-from typer.testing import CliRunner
 
 import nlp_gait
-from compare.cli import app
-from compare.questions import local_optima
+from compare.questions.question import Work, find
+from compare.questions.sweep import Sweep, parse_axis
 from compare.study.store import Store, encode_outcome, parse_outcome, store_runs
-from nlp_gait.backends.identity import hash_json
 from nlp_gait.backends.solve import run_starts
-from nlp_gait.backends.solvers.ipopt import Ipopt
-from nlp_gait.formulation import Array, GaitProblem
-from nlp_gait.formulation.solution import Best, Evaluations, Guess, Outcome
-from tests.compare.cli.test_question_commands import PARETO
-
-pytestmark = pytest.mark.usefixtures("undrawn_pictures")
-
-RUN = CliRunner()
-TIMES = ("time_s", "cpu_s", "run_time_s", "files")
-NAO = ("nao-ssp", "--set", "intervals=2", "--starts", "1")
-WHOLE = {
-    "sweep": ("sweep", "walk12", "--over", "step_length_m=0.08,0.1", "--starts", "1"),
-    "sweep by a search": (
-        "sweep", "walk12", "--over", "foot_lift_m=0.01:0.03:3", "--algorithm", "random", "--evaluations", "200",
-    ),
-    "variants": ("variants", *NAO, "--variant", "limits:motors=limits"),
-    "certainty": ("certainty", "walk12", "--starts", "4", "--evaluations", "0", "--time-limit", "0"),
-}  # fmt: skip
-# Complete runs of these take long; their beginning is enough, since all load finished solves in the same way.
-BEGUN = {
-    "pareto": (*PARETO, "--search", "none"),
-    "cycles": ("sweep", "nao-cycle", "--over", "speed_m_s=0.02,0.03", "--starts", "1", "--set", "intervals=2"),
-}
-
-
-class Killed(BaseException):
-    """Is not caught anywhere, so that nothing happens after it, as after a kill."""
-
-
-@pytest.fixture(autouse=True)
-def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local_optima, "BATCH", 2)
-
-
-def kill_after(monkeypatch: pytest.MonkeyPatch, steps: int) -> list[str]:
-    """Collect the names of stored results; raise Killed after so many."""
-    stored: list[str] = []
-    save = Store.save
-
-    def counted(self: Store, name: str, inputs: Any, *rest: Any) -> Any:
-        result = save(self, name, inputs, *rest)
-        stored.append(f"{name} {hash_json(inputs)}")
-        if len(stored) == steps:
-            raise Killed
-        return result
-
-    monkeypatch.setattr(Store, "save", counted)
-    return stored
-
-
-def answer(out: Path, *arguments: object) -> tuple[Any, str]:
-    """Return the answer without its times, and the messages."""
-    done = RUN.invoke(app, [*map(str, arguments), "--out", str(out), "--json"])
-    assert done.exit_code == 0, done.output
-    return without_times(json.loads(done.stdout)), done.stderr
-
-
-def without_times(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: without_times(value) for key, value in data.items() if key not in TIMES}
-    return [without_times(item) for item in data] if isinstance(data, list) else data
-
-
-@pytest.mark.parametrize("case", WHOLE)
-def test_a_rerun_continues(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patch:
-        all_steps = kill_after(patch, 0)
-        undisturbed, _ = answer(tmp_path / "undisturbed", *WHOLE[case])
-    killed = tmp_path / "killed"
-    with monkeypatch.context() as patch:
-        before = kill_after(patch, max(1, len(all_steps) // 2))
-        with pytest.raises(Killed):
-            RUN.invoke(app, [*WHOLE[case], "--out", str(killed)])
-    with monkeypatch.context() as patch:
-        after = kill_after(patch, 0)
-        resumed, _ = answer(killed, *WHOLE[case])
-    assert resumed == undisturbed
-    assert not set(before) & set(after) and sorted([*before, *after]) == sorted(
-        all_steps
-    )  # no step is lost or repeated
-
-
-def end_at_start(problem: GaitProblem, x0: Array, *_: object) -> Outcome:
-    """Stand in for a solve."""
-    return Outcome(
-        solver="ipopt", x0=x0, x=x0, claimed=True, status="found", objective=1.0, cost=1.0, violation=0.0, iterations=1,
-        evaluations=Evaluations(f=1), time_s=0.0, guess=Guess(primal=x0, bounds=x0, rows=x0, width=1.0),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("case", BEGUN)
-def test_a_second_call_repeats_no_solve(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if case == "cycles":  # the others need multipliers
-        monkeypatch.setattr(Ipopt, "__init__", lambda *_: None)
-        monkeypatch.setattr(Ipopt, "run", lambda _, *rest: end_at_start(*rest))
-        monkeypatch.setattr(Ipopt, "run_from", lambda _, problem, near, *rest: end_at_start(problem, near.x))
-    calls = []
-    for _ in range(2):
-        with monkeypatch.context() as patch:
-            calls.append(kill_after(patch, 1))
-            with pytest.raises(Killed):
-                RUN.invoke(app, [*BEGUN[case], "--out", str(tmp_path)])
-    first, second = calls
-    assert first[-1].startswith("solve ")
-    assert not set(first) & set(second)
+from nlp_gait.formulation.solution import Best, Outcome
 
 
 def test_results_of_another_robot_are_others(tmp_path: Path) -> None:
     robot = tmp_path / "my.json"
     text = (files("nlp_gait.robots") / "data" / "nao-v5.json").read_text(encoding="utf-8")
     heavy = text.replace('"mass_kg": 1.04956', '"mass_kg": 1.5')
-    answers = []
+    assert heavy != text
+    powers, stored = [], []
     for content in (text, heavy, text):
         robot.write_text(content, encoding="utf-8")
-        sweep = ("sweep", *NAO, "--robot", robot, "--over", "swing_height_m=0.02")
-        answers.append(answer(tmp_path / "out", *sweep))
-    (first, said), (other, other_said), (again, again_said) = answers
-    assert other["points"][0]["objective"] > first["points"][0]["objective"]
-    assert again == first and again_said == "2 of 2 results were stored by an earlier run\n"
-    assert said == other_said == ""
+        problem, store = nlp_gait.load("nao-ssp", robot=str(robot), intervals=2), Store(tmp_path)
+        sweep = Sweep(problem=problem, axes=[parse_axis("swing_height_m=0.02")], starts=1)
+        powers.append(find(sweep, Work(store=store))[0].objective)
+        stored.append(store.summary)
+    assert powers[1] > powers[0] == powers[2]
+    assert stored == ["", "", "2 of 2 results were stored by an earlier run"]
 
 
 def test_steps_of_forked_starts_are_counted(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def test_another_nlp_solver_walks_the_grid_too() -> None:
     assert [p.objective for p in points] == pytest.approx([SWING_W[0.015], SWING_W[0.018]], abs=AGREEMENT_W)
 
 
-def test_grid_of_two_axes_over_a_search(tmp_path: Path) -> None:
+def test_grid_of_two_axes_over_a_search() -> None:
     axes = [Axis(name="hip_height_m", values=(0.3, 0.31)), Axis(name="heat_loss_W_per_Nm2", values=(0.02, 0.03))]
     calls: list[str] = []
     question = Sweep(problem=load("nao-dsp"), axes=axes, algorithm="pso", evaluations=300)
@@ -86,9 +86,6 @@ def test_grid_of_two_axes_over_a_search(tmp_path: Path) -> None:
     assert Sweep(problem=load("nao-dsp"), axes=axes).total == 8
     assert [tuple(p.at.values()) for p in points] == [(0.3, 0.02), (0.3, 0.03), (0.31, 0.02), (0.31, 0.03)]
     assert [p.x["hip_height_m"] for p in points] == [0.3, 0.3, 0.31, 0.31]
-    written = question.report(points).write(tmp_path)
-    assert sorted(path.suffix for path in written) == [".csv", ".html", ".json", ".md", ".png", ".svg"]
-    assert all(path.stat().st_size > 0 for path in written)
 
 
 def test_errors_come_before_the_work() -> None:

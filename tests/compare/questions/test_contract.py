@@ -1,0 +1,158 @@
+"""What every question keeps: files that agree, a rerun that repeats no step, an interrupt that loses none."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import compare.questions
+from compare.questions import local_optima
+from compare.questions.capabilities import Capabilities
+from compare.questions.certainty import Certainty
+from compare.questions.pareto.pareto import Pareto
+from compare.questions.prices import Prices
+from compare.questions.question import Answer, Question, Work, find
+from compare.questions.robust import Robust
+from compare.questions.sweep import Sweep, parse_axis
+from compare.questions.variants import Variant, Variants
+from compare.report.document import Table
+from compare.study.store import Store
+from nlp_gait import load
+from nlp_gait.files import replace_nan
+from nlp_gait.formulation import GaitProblem
+from tests.compare.questions.test_capabilities import make_walk
+
+pytestmark = pytest.mark.usefixtures("undrawn_pictures")
+
+TIMES = ("time_s", "cpu_s", "run_time_s", "files")
+ARM = {"swing_height_m": 0.015, "hip_height_m": 0.31, "hip_vx_start_m_s": 0.0124, "hip_vx_end_m_s": 0.001}
+
+
+def load_small() -> GaitProblem:
+    return load("nao-ssp", intervals=2)
+
+
+def list_sweep(**options: Any) -> Sweep:
+    return Sweep(problem=load("walk12"), starts=1, **options)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A small question, and the name in its answer of the list of the rows of its CSV file; empty without one."""
+
+    make: Callable[[], Question[Any]]
+    rows: str = ""
+
+
+CASES = {
+    "sweep": Case(make=lambda: list_sweep(axes=[parse_axis("step_length_m=0.08,0.1")]), rows="points"),
+    "search": Case(
+        make=lambda: list_sweep(axes=[parse_axis("foot_lift_m=0.01,0.03")], algorithm="random", evaluations=200),
+        rows="points",
+    ),
+    "variants": Case(
+        make=lambda: Variants(
+            problem=load_small(),
+            starts=1,
+            variants=[Variant(name="as given"), Variant(name="limits", options={"motors": "limits"})],
+        ),
+        rows="variants",
+    ),
+    "certainty": Case(make=lambda: Certainty(problem=load("walk12"), starts=4, evaluations=300, time_limit_s=0.0)),
+    "prices": Case(make=lambda: Prices(problem=load("walk12"), starts=2), rows="limits"),
+    "capabilities": Case(make=lambda: Capabilities(problem=make_walk(), starts=1)),
+    "pareto": Case(
+        make=lambda: Pareto(
+            problem=load("nao-ssp", intervals=4).fix(**ARM),
+            points=5,
+            starts=1,
+            searches={"NSGA2": (100,)},
+            runs=1,
+        ),
+        rows="front",
+    ),
+    "robust": Case(make=lambda: Robust(problem=load_small(), mass=0.0, starts=1, samples=1), rows="boxes"),
+}
+each_question = pytest.mark.parametrize("name", CASES)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the stored steps of all questions."""
+    return tmp_path_factory.mktemp("questions")
+
+
+def answer(name: str, store: Store) -> Answer:
+    question = CASES[name].make()
+    return question.add_best_known(find(question, Work(store=store)))
+
+
+def without_times(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_times(value) for key, value in data.items() if key not in TIMES}
+    return [without_times(item) for item in data] if isinstance(data, list) else data
+
+
+def test_every_question_is_here() -> None:
+    names = {path.stem for path in Path(compare.questions.__file__).parent.rglob("*.py") if is_question(path)}
+    assert names == {case.make().name for case in CASES.values()}
+
+
+def is_question(path: Path) -> bool:
+    return "(Question[" in path.read_text(encoding="utf-8")
+
+
+@each_question
+def test_an_interrupted_question_continues_to_the_same_answer(
+    name: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(local_optima, "BATCH", 2)
+    whole = answer(name, Store(folder / name))
+    steps = {path.name for path in (folder / name / "store").iterdir()}
+    assert steps
+
+    class Interrupting(Store):
+        """A store with Ctrl-C after half of the steps."""
+
+        def save(self, *arguments: Any) -> Any:
+            value = super().save(*arguments)
+            if len(list((tmp_path / "store").iterdir())) == max(1, len(steps) // 2):
+                raise KeyboardInterrupt
+            return value
+
+    with pytest.raises(KeyboardInterrupt):
+        answer(name, Interrupting(tmp_path))
+    half = {path: path.stat().st_mtime_ns for path in (tmp_path / "store").iterdir()}
+    assert 0 < len(half) <= len(steps)
+    resumed = answer(name, Store(tmp_path))
+    assert without_times(replace_nan(resumed.data)) == without_times(replace_nan(whole.data))
+    assert {path.name for path in (tmp_path / "store").iterdir()} == steps
+    assert {path: path.stat().st_mtime_ns for path in half} == half  # none is computed again
+
+
+@each_question
+def test_files_agree_with_the_answer(name: str, folder: Path, tmp_path: Path) -> None:
+    result = answer(name, Store(folder / name))
+    written = result.write(tmp_path)
+    assert {path.name for path in written} == {path.name for path in tmp_path.iterdir()}
+    data = json.loads((tmp_path / f"{result.stem}.json").read_text())
+    assert data == json.loads(json.dumps(replace_nan(result.data)))
+    assert "best_known" in data and data["problem"] == CASES[name].make().problem.address
+    page = (tmp_path / f"{result.stem}.md").read_text().replace("\\", "")  # Markdown's escapes
+    assert page.startswith(f"# {result.title}") and all(sentence[:20] in page for sentence in result.verdict)
+    for table in (part for part in result.parts if isinstance(part, Table) and part.name):
+        rows = list(csv.DictReader((tmp_path / f"{table.name}.csv").read_text().splitlines()))
+        assert len(rows) == len(table.rows)
+        for row, item in zip(rows, data[CASES[name].rows] if CASES[name].rows else (), strict=False):
+            for key, text in row.items():
+                value = item.get(key)
+                if isinstance(value, float | int) and not isinstance(value, bool):
+                    assert float(text) == value or math.isinf(float(text))
+    assert all(path.stat().st_size > 0 for path in written if path.suffix not in (".png", ".svg"))
