@@ -75,7 +75,7 @@ def test_the_python_of_the_readme_runs_as_pasted():
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     found: dict[str, object] = {}
     exec(code.replace("starts=20", "starts=1").replace("10_000", "500"), found)  # noqa: S102
-    assert found["power"].shape == (1000,) and found["optimum"].converged
+    assert found["optimum"].converged and found["result"].objective >= found["optimum"].objective
 
 
 def test_a_problem_by_name_a_solution_in_one_line_and_its_x_wherever_one_is_taken():
