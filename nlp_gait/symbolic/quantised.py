@@ -38,10 +38,11 @@ class Contact(NamedTuple):
     height: SX  #: above the ground [m]
     normal: SX  #: (n,) derivative of the height by the coordinates
     tangent: SX  #: (n,) derivative of the forward position by the coordinates
+    drift: SX = SX(2, 1)  #: (2,) velocity at rest, of a base that moves: up from the ground, and forward [m/s]
 
     def velocity(self, rates: SX) -> tuple[SX, SX]:
         """Return the speeds up from the ground and forward, at rates (n,) of the coordinates."""
-        return ca.dot(self.normal, rates), ca.dot(self.tangent, rates)
+        return ca.dot(self.normal, rates) + self.drift[0], ca.dot(self.tangent, rates) + self.drift[1]
 
 
 class Equations(NamedTuple):

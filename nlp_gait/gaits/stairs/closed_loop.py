@@ -21,13 +21,13 @@ from nlp_gait.symbolic.quantised import Contact, Equations, Ground, QuantisedSta
 InverseKinematics = Literal["closed-form", "network"]
 Rates = Literal["exact", "differences"]
 Coordinates = Literal["joint", "printed"]
+Base = Literal["stance-foot", "hip"]
 QUANTUM = 0.01  # dt [s], (eq. 43)
 CONTACTS = ("T", "S", "A", "S'", "T'", "A'")  # points that may touch the ground, all but the base
 N = len(biped.LINKS)
 # Inputs of a quantum besides the state and the tuned values, with sizes: desired angles and rates, time, tread and rise,
-# k_s, k_d and mu, share of gravity, amplitude of the disturbance, the virtual slope and the
-# share of the links' spin in the ZMP, torques besides the controller's. Nothing is ever differentiated with
-# respect to it.
+# k_s, k_d and mu, share of gravity, amplitude of the disturbance, the virtual slope, the share of the links' spin in the ZMP, and
+# place, velocity and acceleration of a hip that is the base. Nothing is ever differentiated with respect to it.
 GIVEN = {
     "aim": 2 * N,
     "time": 1,
@@ -37,7 +37,7 @@ GIVEN = {
     "disturbance": 1,
     "slope": 1,
     "spin": 1,
-    "torque": N,
+    "hip": 6,
 }
 TORSO = biped.LINKS.index("UH")
 # Controlled angles as sums of link angles, in the order of LINKS. Joint angles are between links; the ninth is that of the stance
@@ -77,6 +77,7 @@ class Rollout(NamedTuple):
     state: MX  # (18, m) angles [rad] and rates [rad/s] of the nine links
     torque: MX  # (9, m) torques on the controlled angles [Nm]
     zmp: MX  # (1, m) ahead of the stance ankle, on the virtual slope in double support [m]
+    hip: MX  # (6, m) planned place, velocity and acceleration [m, m/s, m/s^2]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,6 +89,7 @@ class ClosedLoop:
     coordinates: Coordinates = "joint"  # what the controller measures and drives
     kind: StepKind = "next"
     rates: Rates = "exact"  # desired ones: derivatives of the plan, or differences of its angles over a quantum
+    base: Base = "stance-foot"  # pinned to its step; or the hip, on its planned curve, with six contacts
 
     @cached_property
     def joints(self) -> DM:
@@ -96,13 +98,14 @@ class ClosedLoop:
 
     @property
     def base_point(self) -> str:
-        """The stance ankle, or the tip of the stance toe where the foot turns about it."""
-        return "T'" if self.kind == "landing" else "A'"
+        """The hip; or the stance ankle, or the tip of the stance toe where the foot turns about it."""
+        return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
 
-    @property
-    def base_place(self) -> DM:
-        """(2,) ahead of the stance ankle's place and above it [m]."""
-        return DM([biped.load_toe_foot_biped().foot_m * (self.kind == "landing"), 0])
+    def locate_base(self, hip: SX) -> tuple[SX, SX, SX]:
+        """Return place, velocity and acceleration (2,) of the base, from those of the hip (6,) and the stance ankle's place [m]."""
+        if self.base == "hip":
+            return tuple(ca.vertsplit(hip, 2))
+        return SX(DM([biped.load_toe_foot_biped().foot_m * (self.kind == "landing"), 0])), SX(2, 1), SX(2, 1)
 
     def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
         """Return desired angles and rates (18, m + 1) of the links at the ends of quanta, and ``GIVEN``."""
@@ -110,7 +113,8 @@ class ClosedLoop:
         size = ca.vertcat(stair.tread, stair.rise)
         times = np.arange(self.quanta + 1) * QUANTUM
         plan = ca.repmat(ca.vertcat(collect_governing(point), size, point["reach_margin"]), 1, self.quanta + 1)
-        desired = _make_desired(ops, self.kind).map(self.quanta + 1)(DM(times[None, :]), plan)
+        planned = _make_desired(ops, self.kind).map(self.quanta + 1)(DM(times[None, :]), plan)
+        desired, place, speed = ca.vertsplit(planned, [0, 2 * N, 2 * N + 2, 2 * N + 4])
         if self.inverse_kinematics == "network":
             desired = solve_legs_by_network(desired, ONLINE)
         if self.rates == "differences":
@@ -125,7 +129,7 @@ class ClosedLoop:
             ca.repmat(constants, 1, self.quanta),
             0 * on_slope if self.kind == "first" else stair.rise / stair.tread * on_slope,
             ca.repmat(point["spin_in_zmp"], 1, self.quanta),
-            DM(N, self.quanta),
+            ca.vertcat(place[:, :-1], speed[:, 1:], (speed[:, 1:] - speed[:, :-1]) / QUANTUM),
         )
         return desired, given
 
@@ -136,13 +140,13 @@ class ClosedLoop:
         states = ops.rollout(self.step, desired[:, 0], *inputs)
         before = ca.horzcat(desired[:, 0], states[:, :-1])
         torque, zmp = self.outcome.map(self.quanta)(before, states, *inputs)
-        return Rollout(desired[:, 1:], states, torque, zmp)
+        return Rollout(desired[:, 1:], states, torque, zmp, given[-6:, :])
 
     def find_stance_ankle(self, rollout: Rollout) -> MX:
-        """Return its place (2, m) in a rollout [m]."""
-        q = SX.sym("q", N)
-        found = biped.locate_points(q, SX(self.base_place), self.base_point)["A'"]
-        return ca.Function("ankle", [q], [found]).map(self.quanta)(rollout.state[:N, :])
+        """Return its place (2, m) in a rollout [m]; with the hip as base to the way of the hip in a quantum."""
+        q, hip = SX.sym("q", N), SX.sym("hip", 6)
+        ankle = biped.locate_points(q, self.locate_base(hip)[0], self.base_point)["A'"]
+        return ca.Function("ankle", [q, hip], [ankle]).map(self.quanta)(rollout.state[:N, :], rollout.hip)
 
     @cached_property
     def step(self) -> ca.Function:
@@ -156,17 +160,22 @@ class ClosedLoop:
     def _equations(self, state: QuantisedState, parts: Mapping[str, Any]) -> Equations:
         """Return the equations of the acceleration within one quantum."""
         q, v = state
-        found = biped.locate_points(q, SX(self.base_place), self.base_point)
+        place, speed, push = self.locate_base(parts["hip"])
+        found = biped.locate_points(q, place, self.base_point)
         motion = biped.make_dynamics(q, v, q, self.base_point)
         stair = Stair(parts["size"][0], parts["size"][1])
 
         def touch(point: SX) -> Contact:
             height = point[1] - compute_stair_height(point[0], stair, SETBACK, EDGE_WIDTH, self.kind)
-            return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T)
+            return Contact(height, ca.jacobian(point[1], q).T, ca.jacobian(point[0], q).T, speed[::-1])
 
         contacts = [touch(found[name]) for name in CONTACTS if name != self.base_point]
         control, aim, ground = parts["control"], parts["desired"], Ground(*ca.vertsplit(parts["ground"]))
-        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1) + parts["torque"]
+        disturbance = ca.repmat(parts["disturbance"] * ca.sin(2 * parts["time"]), N, 1)
+        if self.base == "hip":  # which accelerates the links
+            centres = biped.locate_centres(found)
+            momentum = sum((biped.get_rod(link).mass_kg * centre for link, centre in centres.items()), SX(2, 1))
+            disturbance -= ca.inv(self.joints).T @ ca.jacobian(momentum, q).T @ push
         return quantised.implicit_quantum(motion, state, control, aim, contacts, ground, disturbance, QUANTUM)
 
     @cached_property
@@ -175,15 +184,16 @@ class ClosedLoop:
         state, inputs, parts = self._symbols()
         following = QuantisedState(SX.sym("q_next", N), SX.sym("v_next", N))
         G = biped.make_dynamics(state.q, state.v, state.q, self.base_point).G
-        torque = quantised.controller_torque(parts["control"], parts["desired"], following, G) + parts["torque"]
+        torque = quantised.controller_torque(parts["control"], parts["desired"], following, G)
 
         acceleration = (following.v - state.v) / QUANTUM
         weight, moment, pull = SX(0), SX(0), SX(0)
-        found = biped.locate_points(state.q, SX(self.base_place), self.base_point)
+        place, _, push = self.locate_base(parts["hip"])
+        found = biped.locate_points(state.q, place, self.base_point)
         for link, middle in biped.locate_centres(found).items():
             mass = biped.get_rod(link).mass_kg
             velocity = ca.jtimes(middle, state.q, state.v)
-            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration)
+            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
             spin = parts["spin"] * acceleration[biped.LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
             weight += mass * (a[1] + biped.GRAVITY)
             pull += mass * a[0]
@@ -213,14 +223,14 @@ class ClosedLoop:
 
 
 def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
-    """Return the function of (time, governing parameters, stair, reach margin) to the desired state (18,)."""
+    """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
     s, passing = SX.sym("s", 4), SX.sym("passing", 4)
     values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
     plan = make_stair_plan(values)
     step = compute_posture(plan, Stair(size[0], size[1]), s, passing / plan.durations, margin, ops, kind)
     given = ca.vertcat(values, size, margin)
     angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
-    pose = ca.Function("pose", [s, passing, given], list(angles))
+    pose = ca.Function("pose", [s, passing, given], [*angles, step.hip.position, step.hip.velocity])
     time = SX.sym("time")
     starts = ca.vertcat(0, ca.cumsum(plan.durations)[:3])
     passed = (time - starts) / plan.durations

@@ -64,13 +64,14 @@ def stairs_track(
     coordinates: closed_loop.Coordinates = "joint",
     step: StepKind = "next",
     rates: closed_loop.Rates = "exact",
+    base: closed_loop.Base = "stance-foot",
     tracking_limit: bool = True,
     duration_s: float = 3.5,
 ) -> GaitProblem:
     """Return the closed loop over one planned step.
 
-    The plan is given by parameters; its torso pitch is a variable. The stance foot is pinned at its ankle, in landing at the tip
-    of its toe; the dynamics are linearly implicit: explicit, as printed, they diverge.
+    The plan is given by parameters; its torso pitch is a variable. The dynamics are linearly implicit: explicit, as printed, they
+    diverge.
 
     Args:
         inverse_kinematics: desired angles of the legs in closed form, or by the paper's network, trained online at every
@@ -81,6 +82,8 @@ def stairs_track(
         step: ``next`` over a flat stance foot; ``landing``, the same with the reverse double support, in which the stance foot
             turns down about the tip of its toe; or ``first`` from standing.
         rates: desired rates of the angles: exact, or as printed by differences over a quantum.
+        base: stance foot, pinned at its ankle (in landing at the tip of its toe), with five contacts; or as printed the hip, on its
+            planned curve, with six.
         tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
         duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
 
@@ -95,6 +98,7 @@ def stairs_track(
         coordinates=coordinates,
         kind=step,
         rates=rates,
+        base=base,
     )
     limits = {"lower": 0.0, "upper": LARGEST_GAIN, "minimum": 0.0, "maximum": 1e6}
     variables = (
@@ -175,7 +179,7 @@ class TrackedStep:
     def compute_signals(self, at: NumericPoint) -> Signals:
         """Return time histories at a point of numbers."""
         loop, found = self.loop, self.roll_out(at, Exact())
-        parts = (*found, loop.find_stance_ankle(found))
+        parts = (*found[:4], loop.find_stance_ankle(found))
         desired, state, torque, zmp, stance_ankle = (np.array(ca.evalf(part)).T for part in parts)
         joints = loop.joints.full().T
         (q, qd), (q_desired, qd_desired) = (np.split(part, 2, axis=1) for part in (state, desired))

@@ -114,6 +114,18 @@ def test_the_first_step_starts_at_rest_on_both_feet() -> None:
     assert violation > 0.0
 
 
+@pytest.mark.slow
+def test_a_held_hip_is_followed_by_soft_legs_without_compensation() -> None:
+    """The paper's base and six contacts: the stance leg carries nothing, and gains like those of Table IV follow."""
+    held, standing = (
+        nlp_gait.load("stairs-track", base=base, duration_s=0.3).with_values(gravity_compensation=0.0)
+        for base in ("hip", "stance-foot")
+    )
+    (_, _, soft), (_, _, fallen) = (values(problem, [43.0, 5.0, 1.59]) for problem in (held, standing))
+    assert soft["largest_error_rad"] < 0.5 * fallen["largest_error_rad"]
+    assert soft["peak_torque_Nm"] < 0.5 * fallen["peak_torque_Nm"]
+
+
 def test_the_printed_zmp_has_no_spin_and_one_slope(problem: GaitProblem) -> None:
     """The virtual slope moves the ZMP only where the robot accelerates forward, and only in single support."""
     x = np.array([100.0, 100.0, 1.45])
