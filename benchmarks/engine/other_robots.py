@@ -9,8 +9,8 @@ import numpy as np
 import nlp_gait
 from benchmarks.engine.markdown import cells, header
 from benchmarks.engine.sensitivity import engine_step
-from compare.papers.stairs.stairs_paper import TABLE_3 as STAIRS_TABLE_3
-from compare.papers.stairs.stairs_paper import TABLE_4 as STAIRS_TABLE_4
+from compare.papers.stairs.printed import TABLE_3 as STAIRS_TABLE_3
+from compare.papers.stairs.printed import TABLE_4 as STAIRS_TABLE_4
 from nlp_gait.formulation import GaitProblem, Result
 from nlp_gait.simulation.drive import Drive
 from nlp_gait.simulation.measurements import Measurements, measure

@@ -5,17 +5,18 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+from compare.papers.paper import Paper
 from nlp_gait.errors import unknown
 
 # Modules with a REPRODUCTION, by name of the paper.
 REPRODUCTIONS = {
     "nao": "compare.papers.nao.nao",
     "walk12": "compare.papers.walk12.walk12",
-    "stairs": "compare.papers.stairs.stairs_reproduction",
+    "stairs": "compare.papers.stairs.stairs",
 }
 
 
-def load_reproduction(paper: str) -> Any:  # until all are `Paper`
+def load_reproduction(paper: str) -> Paper[Any, Any]:
     """Return the reproduction of a paper.
 
     Raises:
@@ -23,4 +24,5 @@ def load_reproduction(paper: str) -> Any:  # until all are `Paper`
     """
     if paper not in REPRODUCTIONS:
         raise unknown("reproduction", paper, REPRODUCTIONS)
-    return import_module(REPRODUCTIONS[paper]).REPRODUCTION
+    reproduction: Paper[Any, Any] = import_module(REPRODUCTIONS[paper]).REPRODUCTION
+    return reproduction

@@ -118,23 +118,6 @@ def choose_best(records: Iterable[RunRecord]) -> RunRecord:
     return min(records, key=rank)
 
 
-def list_infeasible(runs: Iterable[RunRecord], *, dense: bool = False) -> list[str]:
-    """Return for each run that is infeasible, on the dense grid too if wanted, its problem and worst violation."""
-    wrong = [run for run in runs if not run.verdict.feasible or (dense and run.verdict.dense_feasible is False)]
-    return [f"{run.problem}: {', '.join(run.verdict.violated[:1])}" for run in wrong]
-
-
-def list_objectives(records: Iterable[RunRecord]) -> list[float]:
-    """Return the exact objective at the end of each run, in the problem's sense."""
-    return [record.verdict.objective for record in records]
-
-
 def get_point(record: RunRecord) -> list[float]:
     """Return x in the problem's order."""
     return list(record.x.values())
-
-
-def compute_range(values: Iterable[float]) -> tuple[float, float]:
-    """Return the least and the greatest value."""
-    known = list(map(float, values))
-    return min(known), max(known)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,8 @@ from matplotlib.image import imsave
 from nlp_gait.formulation import Array
 
 
-def save_coarsely(figure: Figure, stem: Path, drawn: Collection[str] = ()) -> tuple[Path, Path]:
-    """Write a picture of few pixels and an empty drawing; if ``drawn`` names any, others are not drawn."""
-    if drawn and stem.name not in drawn:
-        return save_undrawn(figure, stem)
+def save_coarsely(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    """Write a picture of few pixels and an empty drawing."""
     figure.set_layout_engine("none")
     figure.set_dpi(20)
     canvas = FigureCanvasAgg(figure)

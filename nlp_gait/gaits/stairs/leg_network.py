@@ -4,10 +4,7 @@ Source:
     Bhardwaj et al., section VI, Algorithm 1 and eqs. (27)-(30).
 """
 
-import time
 from dataclasses import dataclass
-from functools import cache
-from typing import Literal, NamedTuple, get_args
 
 import casadi as ca
 import numpy as np
@@ -48,28 +45,17 @@ def compute_network_error(weights: SX, target: SX, thigh: float, shank: float) -
     return angles, ca.sumsqr(compute_leg_vector(angles, thigh, shank) - target)  # (eq. 29)
 
 
-Rule = Literal["gradient", "adam"]
-# Decay rates of Adam's two moments and its guard against division by zero (Kingma, Ba 2015).
-ADAM_DECAY, ADAM_GUARD = (0.9, 0.999), 1e-8
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkSettings:
-    """Hyperparameters of the network (Table II, but for the learning rule).
-
-    With the printed rule, plain gradient steps of 1e-4, a pose in twenty converges within the printed 5,000 iterations.
-    """
+    """Hyperparameters of the network, by default those of Table II, with which a pose in sixteen converges."""
 
     hidden: int = 10  # nodes of the hidden layer
-    rule: Rule = "adam"  # plain gradient steps as in (30), or Adam
-    rate: float = 0.01  # learning rate
+    rate: float = 1e-4  # of the gradient steps (30)
     iterations: int = 5000  # most steps for one pose
     tolerance_m2: float = 1e-6  # squared distance of the ankle at which the training of a pose ends [m^2]
     seed: int = 0  # of the first weights
 
     def __post_init__(self) -> None:
-        if self.rule not in get_args(Rule):
-            raise InputError(f"rule must be one of {', '.join(get_args(Rule))}, got {self.rule!r}")
         if self.hidden < 1 or self.iterations < 1:
             raise InputError(f"hidden and iterations must be at least 1, got {self.hidden}, {self.iterations}")
         if not (self.rate > 0.0 and self.tolerance_m2 > 0.0):
@@ -85,35 +71,9 @@ class NetworkSettings:
 
 # Gradient steps at a rate with which every pose of the three planned steps converges within 40 of them; the printed 5,000 at
 # the printed rate (Table II) take a minute for each rollout, as all of them are evaluated.
-ONLINE = NetworkSettings(rule="gradient", rate=0.3, iterations=100)
-PRINTED = NetworkSettings(rule="gradient", rate=1e-4)
+ONLINE = NetworkSettings(rate=0.3, iterations=100)
+PRINTED = NetworkSettings()
 LEGS = (("HK", "KA"), ("HK'", "K'A'"))
-
-
-class NetworkPath(NamedTuple):
-    """Result for m poses."""
-
-    angles: Array  # (m, 2) absolute angles of thigh and shank, clockwise from the forward axis [rad]
-    error_m2: Array  # (m,) squared distance of the ankle from its target [m^2]
-    iterations: Array  # (m,) steps taken
-    time_s: Array  # (m,) wall time
-
-
-def train_angles(hip_to_ankle: Array, thigh: float, shank: float, settings: NetworkSettings) -> NetworkPath:
-    """Return leg angles along a path (m, 2) from hip to ankle [m] (Algorithm 1); each pose starts from the last one's weights."""
-    training = _make_training_function(settings.hidden, thigh, shank)
-    weights = settings.first_weights
-    step = _Adam(settings.rate) if settings.rule == "adam" else lambda gradient: settings.rate * gradient
-    rows = []
-    for target in hip_to_ankle:
-        started = time.perf_counter()
-        for iteration in range(settings.iterations + 1):
-            angles, error, gradient = training(weights, target)
-            if float(error) <= settings.tolerance_m2 or iteration == settings.iterations:
-                break
-            weights = weights - step(np.array(gradient).ravel())  # (eq. 30)
-        rows.append((np.array(angles).ravel(), float(error), iteration, time.perf_counter() - started))
-    return NetworkPath(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def solve_legs_by_network(desired: MX, settings: NetworkSettings) -> MX:
@@ -133,53 +93,31 @@ def solve_legs_by_network(desired: MX, settings: NetworkSettings) -> MX:
         follow = ca.Function("follow", [q, v], [reached, ca.jtimes(reached, q, v)]).map(columns)
         rates = ca.Function("rates", [q, velocity], [compute_leg_rates(q, velocity, *lengths)]).map(columns)
         targets, velocities = follow(ca.vertcat(*(rows[i] for i in at[:2])), ca.vertcat(*(rows[i] for i in at[2:])))
-        angles = _make_training_path(settings, *lengths, columns)(DM(settings.first_weights), targets)
+        angles, _, _ = make_training_path(settings, *lengths, columns)(DM(settings.first_weights), targets)
         for i, row in zip(at, ca.vertsplit(ca.vertcat(angles, rates(angles, velocities))), strict=True):
             rows[i] = row
     return ca.vertcat(*rows)
 
 
-def _make_training_path(settings: NetworkSettings, thigh: float, shank: float, poses: int) -> ca.Function:
+def make_training_path(settings: NetworkSettings, thigh: float, shank: float, poses: int) -> ca.Function:
     """Return the function (weights (4 h,), targets (2, m)) to the angles (2, m) [rad] of a leg along a path of m poses.
 
-    Each pose starts from the weights of the last one and is trained by gradient steps until the ankle is near (Algorithm 1).
+    Its other outputs are the ankle's squared distance from its target (1, m) and the number of steps taken (1, m). Each pose
+    starts from the weights of the last one and is trained by gradient steps until the ankle is near (Algorithm 1).
     """
-    weights, target = SX.sym("weights", 4 * settings.hidden), SX.sym("target", 2)
+    count = 4 * settings.hidden
+    weights, target, taken = SX.sym("weights", count), SX.sym("target", 2), SX.sym("taken")
     angles, error = compute_network_error(weights, target, thigh, shank)
-    trained = weights - settings.rate * (error > settings.tolerance_m2) * ca.gradient(error, weights)  # (eq. 30)
-    step = ca.Function("step", [weights, target], [ca.cse(trained)])
-    answer = ca.Function("answer", [weights, target], [angles])
+    far = error > settings.tolerance_m2
+    trained = weights - settings.rate * far * ca.gradient(error, weights)  # (eq. 30)
+    step = ca.Function("step", [ca.vertcat(weights, taken), target], [ca.cse(ca.vertcat(trained, taken + far))])
+    answer = ca.Function("answer", [weights, target], [angles, error])
 
-    w, aim = MX.sym("w", 4 * settings.hidden), MX.sym("aim", 2)
-    learned = step.fold(settings.iterations)(w, ca.repmat(aim, 1, settings.iterations))
-    pose = ca.Function("pose", [w, aim], [learned, answer(learned, aim)])
-    first, targets = MX.sym("first", 4 * settings.hidden), MX.sym("targets", 2, poses)
-    _, found = pose.mapaccum(poses)(first, targets)
+    first, aim = MX.sym("first", count), MX.sym("aim", 2)
+    end = step.fold(settings.iterations)(ca.vertcat(first, 0), ca.repmat(aim, 1, settings.iterations))
+    learned, steps = ca.vertsplit(end, [0, count, count + 1])
+    pose = ca.Function("pose", [first, aim], [learned, *answer(learned, aim), steps])
+    targets = MX.sym("targets", 2, poses)
+    _, *outputs = pose.mapaccum(poses)(first, targets)
     # Trained for given poses: nothing is ever differentiated with respect to them.
-    return ca.Function("path", [first, targets], [found], {"is_diff_in": [False, False]})
-
-
-@cache
-def _make_training_function(nodes: int, thigh: float, shank: float) -> ca.Function:
-    """(weights, target) to the angles, the error and its gradient by the weights."""
-    weights, target = SX.sym("weights", 4 * nodes), SX.sym("target", 2)
-    angles, error = compute_network_error(weights, target, thigh, shank)
-    return ca.Function("training", [weights, target], ca.cse([angles, error, ca.gradient(error, weights)]))
-
-
-class _Adam:
-    """Step by moments of the gradient."""
-
-    def __init__(self, rate: float) -> None:
-        self._rate = rate
-        self._steps = 0
-        self._first: Array | float = 0.0
-        self._second: Array | float = 0.0
-
-    def __call__(self, gradient: Array) -> Array:
-        self._steps += 1
-        a, b = ADAM_DECAY
-        self._first = a * self._first + (1 - a) * gradient
-        self._second = b * self._second + (1 - b) * gradient**2
-        first, second = self._first / (1 - a**self._steps), self._second / (1 - b**self._steps)
-        return self._rate * first / (np.sqrt(second) + ADAM_GUARD)
+    return ca.Function("path", [first, targets], outputs, {"is_diff_in": [False, False]})

@@ -82,8 +82,8 @@ def stairs_track(
         step: ``next`` over a flat stance foot; ``landing``, the same with the reverse double support, in which the stance foot
             turns down about the tip of its toe; or ``first`` from standing.
         rates: desired rates of the angles: exact, or as printed by differences over a quantum.
-        base: stance foot, pinned at its ankle (in landing at the tip of its toe), with five contacts; or as printed the hip, on its
-            planned curve, with six.
+        base: stance foot, pinned at its ankle (in landing at the tip of its toe), with five contacts; or as printed the hip, on
+            its planned curve, with six.
         tracking_limit: whether errors of the controlled angles are limited, which the paper does not do.
         duration_s: of the rollout, in whole quanta of 0.01 s, at most 60 s.
 

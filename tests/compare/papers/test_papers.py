@@ -8,19 +8,18 @@ from pathlib import Path
 import pytest
 
 from compare.papers import REPRODUCTIONS, load_reproduction
-from compare.papers.paper import Paper
 from compare.papers.rules import Ruling
 from docs.pages.papers import RECORDS, paper_page
-
-PAPERS = tuple(name for name in REPRODUCTIONS if isinstance(load_reproduction(name), Paper))
-
+from nlp_gait.errors import OutputError
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", PAPERS)
+@pytest.mark.parametrize("name", REPRODUCTIONS)
 def test_a_quick_run_confirms_the_record(name: str, tmp_path: Path) -> None:
     paper = load_reproduction(name)
     recorded = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))["verdicts"]
-    quick = paper.reproduce(tmp_path, paper.quick, lambda line: None, jobs=1)["verdicts"]
+    progress = list[str]()
+    quick = paper.reproduce(tmp_path, paper.quick, progress.append, jobs=1)["verdicts"]
+    assert len(progress) == paper.quick.steps
     assert quick.keys() == recorded.keys() == paper.book.claims.keys()
     for id, row in quick.items():
         words = {*row.values()} if id in paper.book.on_runs else row
@@ -31,7 +30,7 @@ def test_a_quick_run_confirms_the_record(name: str, tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("name", PAPERS)
+@pytest.mark.parametrize("name", REPRODUCTIONS)
 def test_the_page_begins_with_at_most_ten_lines(name: str) -> None:
     record = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
     first = record["parts"][0]
@@ -39,8 +38,16 @@ def test_the_page_begins_with_at_most_ten_lines(name: str) -> None:
     assert first["rows"][0][0] in paper_page(name)
 
 
-@pytest.mark.parametrize("name", PAPERS)
+@pytest.mark.parametrize("name", REPRODUCTIONS)
 def test_every_recorded_claim_is_decided(name: str) -> None:
     record = json.loads((RECORDS / f"{name}.json").read_text(encoding="utf-8"))
     assert {*Ruling} >= {word for row in record["verdicts"].values() for word in row.values()}
     assert not any(word == Ruling.NOT_RUN for row in record["verdicts"].values() for word in row.values())
+
+
+@pytest.mark.parametrize("name", REPRODUCTIONS)
+def test_a_folder_that_cannot_be_written_to_fails_before_the_work(name: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    paper = load_reproduction(name)
+    with pytest.raises(OutputError):
+        paper.reproduce(tmp_path / "file", paper.quick, print)

@@ -7,34 +7,9 @@ from pathlib import Path
 import pytest
 
 from compare.drawing.figures import make_figure
-from compare.papers.reproduction import fill_template
 from compare.report.document import Document, Figure, Prose, Section, Table
 from compare.report.writing import write_document, write_parts
 
-TEXT = """
-# A title
-
-Found {count} *gaits* {low:.2f}.
-
-{powers}
-| solver | power [W] | {third} |
-| | .2f | |
-
-## A heading of {count}
-
-| a | b |
-|---|---|
-| 1 | 2 |
-
-### Below it
-
-![Nothing, {low:.1f} times.](empty.png)
-
-## The end
-
-- one
-- two
-"""
 POWERS = Table(
     columns={"solver": "", "power [W]": ".2f", "feasible": ""},
     rows=[["ga|<b>", 1 / 3, True], ["pso", None, False]],
@@ -43,29 +18,13 @@ POWERS = Table(
 
 
 def made() -> Document:
-    return fill_template(
-        TEXT,
-        values={"count": 3, "low": 0.125, "third": "feasible"},
-        tables={"powers": POWERS.rows},
-        figures={"empty": make_figure(1.0, 1.0)},
+    figure = Figure(name="empty", caption="Nothing, 0.1 times.", drawing=make_figure(1.0, 1.0))
+    heading = Section(
+        title="A heading of 3",
+        parts=[Prose("| a | b |\n|---|---|\n| 1 | 2 |"), Section(title="Below it", parts=[figure])],
     )
-
-
-def test_a_text_with_places_becomes_a_document() -> None:
-    document = made()
-    assert document.title == "A title"
-    first, table, heading, end = document.parts
-    assert first == Prose("Found 3 *gaits* 0.12.") and table == POWERS
-    assert isinstance(heading, Section) and heading.title == "A heading of 3"
-    below = heading.parts[1]
-    assert isinstance(below, Section) and isinstance(below.parts[0], Figure)
-    assert (below.parts[0].name, below.parts[0].caption) == ("empty", "Nothing, 0.1 times.")
-    assert isinstance(end, Section) and end.parts == [Prose("- one\n- two")]
-
-
-def test_a_value_that_is_not_there_is_an_error() -> None:
-    with pytest.raises(KeyError, match="power"):
-        fill_template("# Title\n\n{power:.2f}", values={}, tables={}, figures={})
+    end = Section(title="The end", parts=[Prose("- one\n- two")])
+    return Document(title="A title", parts=[Prose("Found 3 *gaits* 0.12."), POWERS, heading, end])
 
 
 def test_pages_are_rounded_for_people_and_files_are_not(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import nlp_gait
 from compare.judge import evaluate
-from compare.papers.stairs.stairs_paper import TABLE_3, TABLE_4
+from compare.papers.stairs.printed import TABLE_3, TABLE_4
 from metaheuristics import ParticleSwarm, minimize
 from nlp_gait.backends.exact import build_exact_model
 from nlp_gait.formulation import GaitProblem

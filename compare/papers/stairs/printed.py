@@ -1,0 +1,215 @@
+"""What the stairs paper prints, and how far its equations and our plans are from it: deterministic computations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from compare.judge import evaluate
+from compare.papers.paper import read_table
+from compare.study.task import ProblemSpec
+from nlp_gait.formulation import Array, Result, Signals
+from nlp_gait.formulation.display import LEFT, RIGHT
+from nlp_gait.gaits.stairs.closed_loop import QUANTUM, ClosedLoop, N, measure_joints
+from nlp_gait.gaits.stairs.leg_network import LEGS, NetworkSettings, compute_leg_vector, make_training_path
+from nlp_gait.gaits.stairs.planar_biped import GRAVITY, get_rod, load_toe_foot_biped
+from nlp_gait.gaits.stairs.stair import SETBACK
+from nlp_gait.symbolic.nonsmooth import Exact
+
+DENSITY = 5  # samples of a measured plan, as a multiple of the problem's own
+LANDED, RISEN = (
+    50.0,
+    90.0,
+)  # a climb lands within this share of a tread, and the hip rises by this share of the rise [%]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A column of Table IV; cost and energy have no unit in the paper."""
+
+    stair_length_m: float  # of a double step
+    rise_run_ratio: float
+    acceleration: float  # largest, printed in m/s^2, of joint angles [rad/s^2]
+    jerk: float  # largest, printed in m/s^3 [rad/s^3]
+    torso_pitch_rad: float  # q5
+    kp: float  # K_p
+    kd: float  # K_d
+    cost: float  # of (53)
+    energy: float  # total consumption
+    peak_torque_Nm: float
+
+    @property
+    def step_m(self) -> tuple[float, float]:
+        """Tread and rise of one step."""
+        return self.stair_length_m / 2, self.stair_length_m / 2 * self.rise_run_ratio
+
+    @property
+    def stair(self) -> dict[str, float]:
+        """Parameters of a problem."""
+        return {"stair_length_m": self.stair_length_m, "rise_run_ratio": self.rise_run_ratio}
+
+
+TABLE_3 = {row["parameter"]: float(row["value"]) for row in read_table("stairs", "table_3")}
+TABLE_4 = {
+    int(row.pop("case")): Case(**{name: float(value) for name, value in row.items()})
+    for row in read_table("stairs", "table_4")
+}
+
+
+def measure_equations(case: Case) -> dict[str, float]:
+    """Return by how much the printed equations miss in a case, with the values of Table III."""
+    robot, (tread, rise) = load_toe_foot_biped(), case.step_m
+    names = ("t1_s", "t2_s", "t_bc_s", "sole_angle_rad", "toe_angle_rad", "catch_angle_rad")
+    t1, t2, t_bc, sole, toe, catch = (TABLE_3[name] for name in names)
+    lift = np.array([robot.toe_m * (1 - math.cos(toe)), robot.toe_m * math.sin(toe)])  # (eqs. 1, 2) at t2
+    distance = 2 * tread - lift[0]
+    first = _find_cycloid_angle(rise, math.pi * rise - distance)  # (eq. 7)
+
+    def cycloid(angle: float) -> Array:  # (eqs. 5, 6), ends at 2 tread
+        x = 2 * tread + rise * (angle - math.sin(angle) - math.pi)
+        return np.array([x, lift[1] + rise * (1 - math.cos(angle))])
+
+    second = lift + [0.0, rise * (1 - math.cos(first))]
+    points = np.stack([lift, second, cycloid(first + catch), cycloid(first + 2 * catch)])
+    s = np.linspace(0.0, 1.0, 1001)[:, None]
+    weights = np.hstack([(1 - s) ** 3, (1 - s) ** 2 * s, (1 - s) * s**2, s**3])
+    sixth, seventh = (
+        [angle * (offset + 12 * u - 9 * u**2 + 2 * u**3) for u in (t1 / (t2 - t1), t2 / (t2 - t1))]
+        for angle, offset in ((sole, -4), (toe, -5))
+    )
+    return {
+        "sole_jump_deg": math.degrees(sixth[0] - sole),  # (eq. 3) at t1
+        "sole_end_deg": math.degrees(sixth[1]),  # at t2, where the sole should be level
+        "toe_end_deg": math.degrees(seventh[1]),  # (eq. 4) at t2, where it should be theta_b
+        "bridge_mm": 1e3
+        * float(np.linalg.norm((weights - weights * [1, 3, 3, 1]) @ points, axis=1).max()),  # (10), (11)
+        "lift_off_m_s": 3 * float(np.linalg.norm(points[1] - points[0])) / (t_bc - t2),
+        "landing_m_s": 2 * rise * math.sqrt(GRAVITY / rise),
+        "arc_m": tread / math.sin(2 * math.atan2(rise, tread)),  # (eq. 25)
+    }
+
+
+def measure_slide(tread: float, rise: float) -> float:
+    """Return how deep the printed ankle is inside the first step of a flat stair at its edge, by (8), (9) [mm]."""
+    if math.pi * rise >= 2 * tread:
+        return 0.0
+    angle = _find_cycloid_angle(rise, tread - SETBACK - (2 * tread - math.pi * rise))  # at the edge
+    lift = load_toe_foot_biped().toe_m * math.sin(TABLE_3["toe_angle_rad"])
+    return 1e3 * max(rise - lift - rise * (1 - math.cos(angle)), 0.0)
+
+
+def _find_cycloid_angle(radius: float, x: float) -> float:
+    angles = np.linspace(0.0, math.pi, 100_001)
+    return float(np.interp(x, radius * (angles - np.sin(angles)), angles))
+
+
+def move(spec: ProblemSpec, x: Mapping[str, float]) -> tuple[Signals, dict[str, Array]]:
+    """Return the motion of a plan, and by leg its hip, knee, ankle, sole and toe in the sagittal plane (T, 5, 2) [m]."""
+    problem = spec.load().dense(DENSITY)
+    if problem is None or problem.display.skeleton is None:
+        raise TypeError("the planner has samples and a skeleton")
+    signals = problem.signals(problem.check_x(x))
+    skeleton = problem.display.skeleton(signals, {p.name: problem.value(p.name) for p in problem.parameters})
+    return signals, {limb.side: limb.points[:, :, [0, 2]] for limb in skeleton.limbs if limb.side in (LEFT, RIGHT)}
+
+
+def measure_depths(case: Case, legs: Mapping[str, Array], lifted: Array) -> tuple[float, float]:
+    """Return how deep the swing foot, once ``lifted`` (T,), and the shanks are inside the steps [mm]; negative above."""
+    tread, rise = case.step_m
+    x, z = np.moveaxis(legs[RIGHT][lifted, 2:5], -1, 0)
+    ground = rise * (1.0 * (x >= -SETBACK) + (x >= tread - SETBACK) - 1.0)
+    shank = -math.inf
+    for leg in legs.values():
+        (x0, z0), (x1, z1) = (leg[:, i].T for i in (2, 1))  # ankle and knee
+        for edge_x, edge_z in ((tread - SETBACK, rise), (-SETBACK, 0.0)):
+            share = (edge_x - x0) / np.where(np.abs(x1 - x0) > 1e-9, x1 - x0, np.inf)
+            below = edge_z - (z0 + share * (z1 - z0))
+            shank = max(shank, float(np.max(np.where((share > 0) & (share < 1), below, -np.inf))))
+    return round(1e3 * float((ground - z).max()), 1) + 0.0, round(1e3 * shank, 1)
+
+
+def compute_desired_angles(spec: ProblemSpec, torso_pitch_rad: float, quanta: int = 350) -> Array:
+    """Return the angles of all links (m + 1, 9) that a tracked step follows, every 0.01 s [rad]."""
+    point = spec.load().at([1.0, 1.0, torso_pitch_rad])
+    return np.array(ca.evalf(ClosedLoop(quanta=quanta).inputs(point, Exact())[0])).T[:, :N]
+
+
+def measure_peaks(spec: ProblemSpec, torso_pitch_rad: float) -> tuple[float, float]:
+    """Return the largest acceleration [rad/s^2] and jerk [rad/s^3] of the printed joint angles, by differences over 0.01 s."""
+    angles = compute_desired_angles(spec, torso_pitch_rad) @ measure_joints("printed").full().T
+    second, third = (float(np.abs(np.diff(angles, n, axis=0)).max()) / QUANTUM**n for n in (2, 3))
+    return second, third
+
+
+def train_network(
+    spec: ProblemSpec, torso_pitch_rad: float, rates: Sequence[tuple[float, float]], poses: int
+) -> list[dict[str, Any]]:
+    """Return how the network learns the first poses of the swing leg at rates, each with the units of length in a metre."""
+    angles = compute_desired_angles(spec, torso_pitch_rad)[:poses, :2]
+    lengths = [get_rod(link).length_m for link in LEGS[0]]
+    legs = np.hstack([np.array(ca.evalf(compute_leg_vector(ca.SX(ca.DM(row)), *lengths))) for row in angles])
+    rows = []
+    for rate, unit in rates:
+        settings = NetworkSettings(rate=rate)
+        train = make_training_path(settings, unit * lengths[0], unit * lengths[1], poses)
+        reached, errors, steps = (np.array(part) for part in train(settings.first_weights, unit * legs))
+        off = np.abs((reached.T - angles + np.pi) % (2 * np.pi) - np.pi)
+        converged = errors[0] <= settings.tolerance_m2
+        numbers: dict[str, float | None] = {
+            "converged_%": 100 * float(converged.mean()),
+            "later_converged_%": 100 * float(converged[1:].mean()),
+        }
+        numbers |= {"first_steps": float(steps[0, 0]), "later_steps": float(np.median(steps[0, 1:]))}
+        numbers["largest_error_rad"] = float(off.max()) if np.isfinite(off).all() else None
+        rows.append(numbers)
+    return rows
+
+
+def simulate_climb(spec: ProblemSpec, x: Mapping[str, float]) -> dict[str, float | None]:
+    """Return what the engine makes of a plan: landing error as share of the tread, rise of the hip as share of the rise [%].
+
+    Also the slip of the stance foot [m], the time of a fall [s], None without one, and the energy of the drives [J]; nothing
+    without MuJoCo.
+    """
+    if find_spec("mujoco") is None:
+        return {}
+    from nlp_gait.simulation.drive import Drive
+    from nlp_gait.simulation.measurements import measure
+    from nlp_gait.simulation.plan import make_plan
+    from nlp_gait.simulation.simulate import simulate_plan
+
+    problem = spec.load()
+    tread = problem.value("stair_length_m") / 2
+    plan = make_plan(Result(problem=problem, x=problem.check_x(x)))
+    simulation = simulate_plan(plan)
+    measured = measure(plan, simulation, Drive())
+    risen = float(simulation.torso[-1, 2] - simulation.torso[0, 2])
+    return {
+        "landing_%": 100 * measured.landings["right"].error_m / tread,
+        "risen_%": 100 * risen / (tread * problem.value("rise_run_ratio")),
+        "slip_m": measured.slip_m,
+        "fell_at_s": measured.fell_at_s,
+        "energy_J": measured.measured.mechanical_W * plan.duration_s,
+    }
+
+
+def describe_climb(climb: Mapping[str, float | None]) -> str:
+    """Return the result of a simulation in words: a climb lands on its step and rises by it."""
+    if not climb:
+        return "not simulated: MuJoCo is not installed"
+    if climb["fell_at_s"] is not None:
+        return f"falls at {climb['fell_at_s']:.1f} s"
+    landing, risen = climb["landing_%"] or 0.0, climb["risen_%"] or 0.0
+    words = "climbs" if landing < LANDED and risen > RISEN else "stays up, but does not climb"
+    return f"{words}: lands {landing:.0f} % of a tread off, the hip rises by {risen:.0f} % of the rise"
+
+
+def follow_printed_gains(spec: ProblemSpec, case: Case) -> float:
+    """Return the largest error of a tracked step with the gains and the torso pitch of Table IV [rad]."""
+    return float(evaluate(spec.load(), [case.kp, case.kd, case.torso_pitch_rad]).indexes["largest_error_rad"])

@@ -1,0 +1,50 @@
+"""The stairs paper's equations as printed, computed by hand; what the engine makes of a plan, in words."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from compare.papers.stairs import stairs
+from compare.papers.stairs.printed import TABLE_4, describe_climb, measure_equations, measure_slide
+
+
+def test_misses_of_the_printed_equations() -> None:
+    misses = measure_equations(TABLE_4[2])
+    u = 0.5 / 0.9
+    assert misses["sole_jump_deg"] == pytest.approx(30 * (-4 + 12 * u - 9 * u**2 + 2 * u**3) - 30, abs=1e-3)
+    u = 1.4 / 0.9
+    assert misses["toe_end_deg"] == pytest.approx(30 * (-5 + 12 * u - 9 * u**2 + 2 * u**3), abs=1e-3)
+    assert misses["landing_m_s"] == pytest.approx(2 * math.sqrt(9.81 * 0.1778))
+    # Circle through both ends of the hip's path, level at the first: (0, R), so X^2 + (Z - R)^2 = R^2.
+    assert misses["arc_m"] == pytest.approx((0.254**2 + 0.1778**2) / (2 * 0.1778))
+    assert misses["bridge_mm"] > 0.0 and misses["lift_off_m_s"] > 0.0
+
+
+def test_the_printed_path_slides_into_the_edge_of_flat_stairs_only() -> None:
+    # Along the floor, 25 mm high, to 0.6 - 0.1 pi = 0.286 m, past the edge at 0.24 m of a step of 0.1 m.
+    assert measure_slide(0.30, 0.10) == pytest.approx(100.0 - 25.0, abs=1e-3)
+    assert measure_slide(0.254, 0.1778) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("landing", "risen", "fell_at_s", "words"),
+    [
+        (5.0, 99.0, None, "climbs: lands 5 % of a tread off, the hip rises by 99 % of the rise"),
+        (60.0, 99.0, None, "stays up, but does not climb"),
+        (5.0, 20.0, None, "stays up, but does not climb"),
+        (5.0, 99.0, 1.25, "falls at 1.2 s"),
+    ],
+)
+def test_a_climb_lands_on_its_step_and_rises_by_it(
+    landing: float, risen: float, fell_at_s: float | None, words: str
+) -> None:
+    climb = {"landing_%": landing, "risen_%": risen, "fell_at_s": fell_at_s}
+    assert describe_climb(climb).startswith(words)
+    assert describe_climb({}).startswith("not simulated")
+
+
+def test_leads_are_those_of_cases_1_and_3_over_case_2() -> None:
+    assert stairs.list_leads([12.0, 10.0, 9.0]) == pytest.approx([20.0, -10.0])
+    assert stairs.list_jerk_terms(None)[:2] == pytest.approx([22.15, 14.77], abs=0.01)
