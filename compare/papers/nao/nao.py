@@ -237,20 +237,17 @@ def _list_margins(found: NaoResults, phase: str, indexes: Sequence[str] = MARGIN
 @BOOK.claim("margins-ssp-digits", phase="ssp")
 @BOOK.claim("margins-dsp", phase="dsp")
 def measure_margins(found: NaoResults, phase: str) -> list[float]:
-    """Return all margins of the printed solutions [mm]."""
     return _list_margins(found, phase)
 
 
 @BOOK.claim("least-margins-dsp")
 def measure_least_margins(found: NaoResults) -> list[float]:
-    """Return the least margins of double support [mm]."""
     return _list_margins(found, "dsp", MARGINS[:2])
 
 
 @BOOK.claim("pso-optimal-ssp", phase="ssp")
 @BOOK.claim("pso-optimal-dsp", phase="dsp")
 def measure_excess(found: NaoResults, phase: str) -> float | None:
-    """Return how far PSO's printed solution is above IPOPT's optimum [%]."""
     return found.excess[phase, "PSO"] if found.optimum(phase)["feasible"] else None
 
 
@@ -259,13 +256,11 @@ def measure_excess(found: NaoResults, phase: str) -> float | None:
 @BOOK.claim("torque-level-ssp", phase="ssp", index="torque_change_Nm")
 @BOOK.claim("torque-level-dsp", phase="dsp", index="torque_change_Nm")
 def measure_levels(found: NaoResults, phase: str, index: str) -> list[float]:
-    """Return a figure of the printed solutions of PSO and GA."""
     return [found.measure(phase, search)[index] for search in SEARCHES]
 
 
 @BOOK.claim("power-lead-ssp")
 def measure_power_lead(found: NaoResults) -> float:
-    """Return GA's power less PSO's [mW]."""
     pso, ga = measure_levels(found, "ssp", "power_W")
     return 1000 * (ga - pso)
 
@@ -275,7 +270,6 @@ def measure_power_lead(found: NaoResults) -> float:
 @BOOK.claim("torque-change-ssp", phase="ssp", index="torque_change_Nm")
 @BOOK.claim("torque-change-dsp", phase="dsp", index="torque_change_Nm")
 def measure_share(found: NaoResults, phase: str, index: str) -> float:
-    """Return PSO's figure above GA's [%]."""
     pso, ga = measure_levels(found, phase, index)
     return 100 * (pso / ga - 1)
 
@@ -285,14 +279,12 @@ def measure_share(found: NaoResults, phase: str, index: str) -> float:
 @BOOK.claim("mean-lead-dsp", phase="dsp", indexes=MARGINS[2:], sign=-1)
 @BOOK.claim("min-lead-dsp", phase="dsp", indexes=MARGINS[:2])
 def measure_leads(found: NaoResults, phase: str, indexes: Sequence[str], sign: int = 1) -> list[float]:
-    """Return PSO's margins less GA's to a tenth [mm], or the reverse."""
     pso, ga = (found.measure(phase, search) for search in SEARCHES)
     return [round(1000 * sign * (pso[index] - ga[index]), 1) for index in indexes]
 
 
 @BOOK.claim("more-stable")
 def measure_more_stable(found: NaoResults) -> list[float]:
-    """Return margins of double support less those of single support [mm]."""
     ssp, dsp = (found.measure(phase, "PSO") for phase in PHASES)
     return [1000 * (dsp[index] - ssp[index]) for index in MARGINS]
 
@@ -303,7 +295,6 @@ def measure_more_stable(found: NaoResults) -> list[float]:
 @BOOK.claim("slower-dsp", sweep="durations-dsp", last_first=True)
 @BOOK.claim("swing-beyond", sweep="swings")
 def measure_sweep(found: NaoResults, sweep: str, *, last_first: bool = False) -> list[float] | None:
-    """Return optima over a sweep [W], ascending in the variable."""
     powers = found.list_powers(sweep)
     return powers[::-1] if powers and last_first else powers
 
@@ -311,7 +302,6 @@ def measure_sweep(found: NaoResults, sweep: str, *, last_first: bool = False) ->
 @BOOK.claim("lower-hip-x", axis="x")
 @BOOK.claim("lower-hip-y", axis="y")
 def measure_lower_hip(found: NaoResults, axis: str) -> list[list[float]]:
-    """Return least margins as printed and with the lowest hip, by phase [mm]."""
     index = f"dbm_{axis}_min_m"
     changes = [{}, {"hip_height_m": 0.0}]
     return [
@@ -325,20 +315,17 @@ def measure_lower_hip(found: NaoResults, axis: str) -> list[list[float]]:
 
 @BOOK.claim("straight")
 def measure_straight(found: NaoResults) -> list[list[float]]:
-    """Return least margins as printed and without vertical motion [mm]."""
     gaits = [[found.measure(phase, "PSO", **change) for change in ({}, STRAIGHT)] for phase in PHASES]
     return [[1000 * gait[index] for gait in pair] for pair in gaits for index in MARGINS[:2]]
 
 
 @BOOK.claim("oscillation")
 def measure_oscillation(found: NaoResults) -> list[list[float]]:
-    """Return powers without and with vertical motion, by phase [W]."""
     return [[found.measure(phase, "PSO", **change)["power_W"] for change in (STRAIGHT, {})] for phase in PHASES]
 
 
 @BOOK.claim("oscillation-torque")
 def measure_oscillation_torque(found: NaoResults) -> list[list[float]]:
-    """Return rms torques without and with vertical motion, by phase [Nm]."""
     return [[_root_mean(found.sample(phase, **change).arrays["tau"]) for change in (STRAIGHT, {})] for phase in PHASES]
 
 
@@ -348,7 +335,6 @@ def _root_mean(values: Any) -> float:
 
 @BOOK.claim("relief")
 def measure_relief(found: NaoResults) -> list[list[float]]:
-    """Return rms torques of knees and ankles with the lowest and the highest hip [Nm]."""
     rows = []
     for phase in PHASES:
         ends = [found.sample(phase, hip_height_m=at) for at in (found.lowest_hip_m(phase), HIPS_M[0])]
@@ -361,7 +347,6 @@ def measure_relief(found: NaoResults) -> list[list[float]]:
 @BOOK.claim("few-mm")
 @BOOK.claim("hip-variation", searches=("GA", "PSO"))
 def measure_hip_range(found: NaoResults, searches: Sequence[str] = SEARCHES) -> list[float]:
-    """Return the vertical range of the hip in single support [mm]."""
     return [1000 * float(np.ptp(found.sample("ssp", search).arrays["hip"][:, 2])) for search in searches]
 
 
@@ -376,7 +361,6 @@ def _compute_energies(found: NaoResults, search: str, *, heat: bool = True) -> d
 @BOOK.claim("knees", kind="Knee")
 @BOOK.claim("hips", kind="Hip")
 def measure_joints(found: NaoResults, kind: str) -> list[float]:
-    """Return the share of a kind of joint less the largest of the others, by search [%]."""
     leads = []
     for search in SEARCHES:
         drawn, shares = _compute_energies(found, search), dict.fromkeys((*KINDS, "arms"), 0.0)
@@ -389,7 +373,6 @@ def measure_joints(found: NaoResults, kind: str) -> list[float]:
 
 @BOOK.claim("swing-hip")
 def measure_swing_hip(found: NaoResults) -> list[float]:
-    """Return the swing leg's share in the power of both hips' roll and pitch, with heat and without [%]."""
     shares = []
     for heat in (True, False):
         drawn = _compute_energies(found, "PSO", heat=heat)
@@ -400,7 +383,6 @@ def measure_swing_hip(found: NaoResults) -> list[float]:
 
 @BOOK.claim("swing-joints")
 def measure_swing_joints(found: NaoResults) -> list[float]:
-    """Return how much more knee and ankle pitch change than the hip's pitch between swing heights [deg]."""
     ends = [found.sample("ssp", swing_height_m=at) for at in (0.015, 0.030)]
     columns = [ends[0].joints.index(f"R{joint}Pitch") for joint in ("Hip", "Knee", "Ankle")]
     hip, knee, ankle = np.degrees(np.abs(ends[1].arrays["q"] - ends[0].arrays["q"]).max(axis=0)[columns])
@@ -412,7 +394,6 @@ def measure_swing_joints(found: NaoResults) -> list[float]:
 @BOOK.claim("too-fast-ssp", phase="ssp", end=0)
 @BOOK.claim("too-fast-dsp", phase="dsp", end=0)
 def measure_pace(found: NaoResults, phase: str, end: int) -> float:
-    """Return how far the margin of PSO's printed path at an extreme pace is below the best one [%]."""
     problem, time = _load(phase, ())[0], TIMES[phase]
     x = dict(zip(problem.names, PRINTED[phase, "PSO"].x, strict=True))
     margins = []
@@ -425,7 +406,6 @@ def measure_pace(found: NaoResults, phase: str, end: int) -> float:
 
 @BOOK.claim("lateral-margin")
 def measure_lateral_margin(found: NaoResults) -> float:
-    """Return the loss of mean margin in y with halved lateral velocities [mm]."""
     x6, x7 = PRINTED["ssp", "PSO"].x[5:7]
     halved = found.measure("ssp", "PSO", hip_vy_start_m_s=x6 / 2, hip_vy_end_m_s=x7 / 2)
     return 1000 * (found.measure("ssp", "PSO")["dbm_y_mean_m"] - halved["dbm_y_mean_m"])
@@ -433,7 +413,6 @@ def measure_lateral_margin(found: NaoResults) -> float:
 
 @BOOK.claim("arms")
 def measure_arms(found: NaoResults) -> list[float]:
-    """Return the largest gain of a margin by the arms' swing, by phase [mm]."""
     gains = []
     for phase in PHASES:
         held = evaluate(_make_spec(phase, found.reading, arms="held"), PRINTED[phase, "PSO"].x)
@@ -444,7 +423,6 @@ def measure_arms(found: NaoResults) -> list[float]:
 @BOOK.claim("statistic-ssp", rank_sum=70)
 @BOOK.claim("statistic-dsp", rank_sum=90)
 def measure_statistic(found: NaoResults, rank_sum: int, runs: int = 11) -> list[float]:
-    """Return z with a continuity correction, and its two-sided and left-tailed p."""
     z = (rank_sum - runs * (2 * runs + 1) / 2 + 0.5) / math.sqrt(runs**2 * (2 * runs + 1) / 12)
     p = math.erfc(abs(z) / math.sqrt(2))
     return [z, p, p / 2]
@@ -453,7 +431,6 @@ def measure_statistic(found: NaoResults, rank_sum: int, runs: int = 11) -> list[
 @BOOK.claim("better-ssp", runs=True, phase="ssp")
 @BOOK.claim("better-dsp", runs=True, phase="dsp")
 def measure_better(found: NaoResults, phase: str) -> Found:
-    """Return GA's median power less PSO's [mW], and the p-value of the rank-sum test."""
     pso, ga = (found.final_powers(phase, search) for search in SEARCHES)
     return Found(1000 * float(np.median(ga) - np.median(pso)), p=approximate_rank_sum(pso, ga).p_two_sided)
 
@@ -461,14 +438,12 @@ def measure_better(found: NaoResults, phase: str) -> Found:
 @BOOK.claim("same-optimum-ssp", runs=True, phase="ssp")
 @BOOK.claim("same-optimum-dsp", runs=True, phase="dsp")
 def measure_run_excess(found: NaoResults, phase: str) -> list[float]:
-    """Return the powers of PSO's runs above IPOPT's optimum, ascending [%]."""
     best = found.optimum(phase)["power_W"]
     return sorted(100 * (power / best - 1) for power in found.final_powers(phase, "PSO"))
 
 
 @BOOK.claim("torque-rank", runs=True)
 def measure_run_torques(found: NaoResults) -> list[float]:
-    """Return the torque changes at the ends of PSO's runs of single support [Nm]."""
     return [run.verdict.indexes["torque_change_Nm"] for run in found.searches["ssp", "PSO"]]
 
 
@@ -476,7 +451,6 @@ def measure_run_torques(found: NaoResults) -> list[float]:
 @BOOK.effect("samples")
 @BOOK.effect("masses")
 def describe_reading(results: Mapping[str, NaoResults]) -> str:
-    """Return how far the margins of either reading are from the printed ones."""
     return "largest error of the printed margins: " + "; ".join(
         f"{reading} reading {_find_error(results[reading], 'ssp'):.2f} mm in single support, "
         f"{_find_error(results[reading], 'dsp', MARGINS[:2]):.2f} mm in least margins of double support"

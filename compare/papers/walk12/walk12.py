@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
@@ -228,32 +228,27 @@ def _make_runs(effort: Walk12Effort, spec: ProblemSpec, *, ga: bool = False) -> 
 @BOOK.claim("f", rows=TABLE_3)
 @BOOK.claim("f-of-table-4", rows=TABLE_4)
 def list_f(found: Results, rows: Sequence[PaperRow]) -> list[float]:
-    """Return f of printed gaits under the printed f1max."""
     return [compute_f(row, row.f1max, **found.options) for row in rows]
 
 
 @BOOK.claim("f1-last")
 def compute_last_f1(found: Results) -> float:
-    """Return f1 of the printed gait at lambda = 1."""
     return found.f1[-1]
 
 
 @BOOK.claim("f1max")
 def compute_f1max(found: Results) -> float:
-    """Return the model's largest f1 at T = 1 s."""
     return F1MAX * found.best("1").verdict.objective
 
 
 @BOOK.claim("optimal")
 def list_gaps(found: Results) -> list[float]:
-    """Return how far the printed gaits of Table III are below the optima [%]."""
     pairs = zip(list_f(found, TABLE_3), found.optima, strict=True)
     return [100 * (1 - f / best.verdict.objective) for f, best in pairs]
 
 
 @BOOK.claim("optimal-over-time")
 def list_gaps_over_time(found: Results) -> list[float]:
-    """Return how far the printed gaits of Table IV are below the optima [%]."""
     rows = zip(TABLE_4, found.f1max_over_time, found.optima_over_time, strict=True)
     return [100 * (1 - compute_f(row, most, **found.options) / best.verdict.objective) for row, most, best in rows]
 
@@ -276,38 +271,32 @@ def compute_lead_by_print(found: Results) -> float:
 @BOOK.claim("steps", columns=(0,))
 @BOOK.claim("variables", columns=(1, 2, 3))
 def list_variables(found: Results, columns: Sequence[int]) -> list[float]:
-    """Return variables of the optima of Table III [mm]."""
     return [1e3 * get_point(best)[k] for best in found.optima for k in columns]
 
 
 @BOOK.claim("steps-over-time")
 def list_steps_over_time(found: Results) -> list[float]:
-    """Return step lengths of the optima of Table IV [mm]."""
     return [1e3 * get_point(best)[0] for best in found.optima_over_time]
 
 
 @BOOK.claim("most-stable")
 def compute_lead(found: Results) -> float:
-    """Return by how much f1 of the printed gait at lambda = 1 is above that of the next one [%]."""
     *others, last = found.f1
     return 100 * (last / max(others) - 1)
 
 
 @BOOK.claim("short-steps")
 def list_front(found: Results) -> list[float]:
-    """Return the largest f1 over step lengths."""
     return [run.verdict.indexes["f1_per_m2s"] for run in found.front]
 
 
 @BOOK.claim("slower")
 def list_steps_by_f1(found: Results) -> list[float]:
-    """Return step lengths of the printed gaits in the order of f1 [mm]."""
     return [1e3 * row.s for _, row in sorted(zip(found.f1, TABLE_3, strict=True), key=lambda pair: pair[0])]
 
 
 @BOOK.claim("margin")
 def list_optimal_f1(found: Results) -> list[float]:
-    """Return f1 of the optima of Table III."""
     return [best.verdict.indexes["f1_per_m2s"] for best in found.optima]
 
 
@@ -321,45 +310,38 @@ def compute_stable_share(x: Sequence[float], zmp: str) -> float:
 
 @BOOK.claim("static")
 def list_last_shares(found: Results) -> list[float]:
-    """Return the shares of the printed gait and the optimum of lambda = 1."""
     return [compute_stable_share(x, found.zmp) for x in (LAST.x, get_point(found.best("1")))]
 
 
 @BOOK.claim("speed-hip", share=0.5)
 @BOOK.claim("speed-foot", share=1.0)
 def list_speeds(found: Results, share: float) -> list[float]:
-    """Return the speeds of the printed gaits of lambda = 0.15, 0.1 and 1 at T = 1 s [m/s]."""
     return [share * row.s for row in (SECOND_ROW, SMALL, LAST)]
 
 
 @BOOK.claim("faster")
 def compute_step_difference(found: Results) -> float:
-    """Return by how much the printed step of lambda = 0.1 is longer than that of 0.15 [mm]."""
     return 1e3 * (SMALL.s - SECOND_ROW.s)
 
 
 @BOOK.claim("time-steps")
 def count_time_steps(found: Results) -> int:
-    """Return the time steps that a generation takes in one second of walking."""
     return GA.population * PRINTED_STEPS
 
 
 @BOOK.claim("trend")
 def compute_trend(found: Results) -> float:
-    """Return the change of f1max from the shortest to the longest T [%]."""
     slow, *_, fast = found.f1max_over_time
     return 100 * (slow / fast - 1)
 
 
 @BOOK.claim("f1-over-time")
 def list_f1_over_time(found: Results) -> list[float]:
-    """Return f1 of the printed gaits by rising T."""
     return [compute_f1(row, **found.options) for row in reversed(TABLE_4)]
 
 
 @BOOK.claim("f1max-over-time")
 def list_f1max_over_time(found: Results) -> list[float]:
-    """Return the model's largest f1 at each T."""
     return found.f1max_over_time
 
 
@@ -370,7 +352,6 @@ def compute_spread(values: Sequence[float]) -> float:
 
 @BOOK.claim("share-over-time")
 def list_share_spreads(found: Results) -> list[float]:
-    """Return the spreads over T of f1 / f1max by the printed numbers and of the optima [%]."""
     pairs = zip(found.optima_over_time, found.f1max_over_time, strict=True)
     ours = [best.verdict.indexes["f1_per_m2s"] / most for best, most in pairs]
     return [compute_spread([row.implied_f1 / row.f1max for row in TABLE_4]), compute_spread(ours)]
@@ -378,7 +359,6 @@ def list_share_spreads(found: Results) -> list[float]:
 
 @BOOK.claim("slows")
 def list_speeds_over_time(found: Results) -> list[list[float]]:
-    """Return speeds by rising T: of the printed gaits and the optima [m/s]."""
     ours = [get_point(best)[0] for best in found.optima_over_time]
     pairs = list(zip(TABLE_4, ours, strict=True))[::-1]
     return [[row.s / row.step_time_s for row, _ in pairs], [s / row.step_time_s for row, s in pairs]]
@@ -386,13 +366,11 @@ def list_speeds_over_time(found: Results) -> list[list[float]]:
 
 @BOOK.claim("f-over-time")
 def compute_f_spread(found: Results) -> float:
-    """Return the spread of the optimal f over T [%]."""
     return compute_spread([best.verdict.objective for best in found.optima_over_time])
 
 
 @BOOK.claim("accuracy")
 def list_zmp_errors(found: Results) -> list[float]:
-    """Return the largest distances between the ZMP and the point without moment, both on one height [mm]."""
     zmp = "exact" if found.reading == RAISED else found.zmp
     points = [[follow(row.x, zmp=reading)["zmp_foot"] for reading in (zmp, "moment-free")] for row in TABLE_3]
     return [1e3 * float(np.linalg.norm(a - b, axis=1).max()) for a, b in points]
@@ -400,13 +378,11 @@ def list_zmp_errors(found: Results) -> list[float]:
 
 @BOOK.claim("motor-mass")
 def compute_motor_mass(found: Results) -> float:
-    """Return the mass of Table I by motor [kg]."""
     return float(ca.sum1(walk12_model.list_masses(load_point_mass_biped()))) / len(JOINTS)
 
 
 @BOOK.claim("ranges")
 def compute_unreachable_share(found: Results) -> float:
-    """Return the share of the gaits within (7) with a leg that does not reach, by (4) and (6) [%]."""
     problem, robot = load_walk12(), load_point_mass_biped()
     points = qmc.scale(qmc.Sobol(len(NAMES), rng=0).random(SAMPLES), problem.lower, problem.upper)
     (s, n, lift, bend), t = points.T[:, :, None], np.linspace(0.0, 1.0, 21)
@@ -422,7 +398,6 @@ def compute_unreachable_share(found: Results) -> float:
 
 @BOOK.claim("moments")
 def list_rod_changes(found: Results) -> list[float]:
-    """Return the size of the changes of f1 by uniform rods for thighs and shanks [%]."""
     robot, (phases, weights) = load_point_mass_biped(), (np.array(part).ravel() for part in make_rule("gauss", 20))
     m = np.array(walk12_model.list_masses(robot)).ravel()
     x, phase = SX.sym("x", len(NAMES)), SX.sym("phase")
@@ -456,7 +431,6 @@ def find_branch() -> float:
 
 @BOOK.claim("inverse-kinematics")
 def compute_leg_room(found: Results) -> float:
-    """Return how much farther apart hip and ankle of all gaits are than where (2) misses [mm]."""
     robot, knees = load_point_mass_biped(), [JOINTS.index(name) for name in ("theta_3", "theta_10")]
     gaits = [*(row.x for row in TABLE_3), *map(get_point, found.optima)]
     bent = max(float(follow(x)["q"][:, knees].max()) for x in gaits)
@@ -484,7 +458,6 @@ _bind_ranks()
 
 @BOOK.claim("epochs", runs=True)
 def compute_gain(found: Results) -> float:
-    """Return what the median run of the GA gains in f after epoch 15 [%]."""
     gains = []
     for run in found.find_runs(f"{EPOCHS_WEIGHT:g}", "ga"):
         f = np.array(run.history.objective, dtype=float)
@@ -493,42 +466,36 @@ def compute_gain(found: Results) -> float:
     return float(np.median(gains))
 
 
-def describe_changes(**options: str) -> str:
+def describe_changes(results: Mapping[str, Results], **options: str) -> str:
     """Return the changes of f1 of Table III by options."""
     changes = [100 * (compute_f1(row, **options) / compute_f1(row) - 1) for row in TABLE_3]
     return f"f1 of Table III changes by {min(changes):+.2f} to {max(changes):+.2f} %"
 
 
+EFFECTS: Mapping[str, Mapping[str, Any]] = {
+    "appendix": {"zmp": "appendix"},
+    "load": {"zmp": "moment-free"},
+    "step": {"quadrature": "runge-kutta"},
+}
+for _name, _option in EFFECTS.items():
+    BOOK.effect(_name)(partial(describe_changes, **_option))
+
+
 @BOOK.effect("ankle")
 def describe_ankle(results: Mapping[str, Results]) -> str:
-    """Return how many f are met in both readings."""
     counts = [count_met(results[reading]) for reading in (LITERAL, RAISED)]
     options = OPTIONS[RAISED]
-    return f"{describe_changes(**options)}; {counts[1]} of 7 f are within 1 % instead of {counts[0]}"
+    return f"{describe_changes(results, **options)}; {counts[1]} of 7 f are within 1 % instead of {counts[0]}"
 
 
 @BOOK.effect("a1")
 def describe_a1(results: Mapping[str, Results]) -> str:
-    """Return the effect of the misprint."""
     f1max = [compute_f1max(results[reading]) for reading in ("(A1)", LITERAL)]
-    return f"{describe_changes(zmp='appendix-as-printed')}; f1max is {f1max[0]:.1f} instead of {f1max[1]:.1f} 1/(m² s)"
-
-
-@BOOK.effect("appendix")
-def describe_appendix(results: Mapping[str, Results]) -> str:
-    """Return the effect of the approximate positions."""
-    return describe_changes(zmp="appendix")
-
-
-@BOOK.effect("load")
-def describe_load(results: Mapping[str, Results]) -> str:
-    """Return the effect of the true load."""
-    return describe_changes(zmp="moment-free")
+    return f"{describe_changes(results, zmp='appendix-as-printed')}; f1max is {f1max[0]:.1f} instead of {f1max[1]:.1f} 1/(m² s)"
 
 
 @BOOK.effect("horizon")
 def describe_horizon(results: Mapping[str, Results]) -> str:
-    """Return how far f of Table IV is from the print with both horizons."""
     texts = []
     for reading in (LITERAL, SECOND):
         pairs = zip(list_f(results[reading], TABLE_4), TABLE_4, strict=True)
@@ -536,21 +503,13 @@ def describe_horizon(results: Mapping[str, Results]) -> str:
     return f"f of the printed gaits differs from the print by {texts[0]} %; over one second by {texts[1]} %"
 
 
-@BOOK.effect("step")
-def describe_step(results: Mapping[str, Results]) -> str:
-    """Return the effect of the printed integration step."""
-    return describe_changes(quadrature="runge-kutta")
-
-
 @BOOK.effect("yardstick")
 def describe_yardstick(results: Mapping[str, Results]) -> str:
-    """Return both values of f1max."""
     return f"the model's largest f1 at T = 1 s is {compute_f1max(results[LITERAL]):.2f} 1/(m² s)"
 
 
 @BOOK.effect("bounds")
 def describe_bounds(results: Mapping[str, Results]) -> str:
-    """Return optima without bent knees."""
     found = results[LITERAL]
     pairs = [[found.best(f"{prefix}{w:g}").verdict.objective for prefix in ("unbent-", "")] for w in UNBENT_WEIGHTS]
     words = ", ".join(
@@ -561,7 +520,6 @@ def describe_bounds(results: Mapping[str, Results]) -> str:
 
 @BOOK.effect("branch")
 def describe_branch(results: Mapping[str, Results]) -> str:
-    """Return by how much (2) misses the hip of a vertical leg where all variables are at their upper bounds."""
     robot = load_point_mass_biped()
     d1, d2, distance = robot.thigh_m, robot.shank_m, robot.leg_m - 2 * CORNER_M
     theta_a = math.acos((d1**2 + d2**2 - distance**2) / (2 * d1 * d2))
@@ -576,13 +534,11 @@ def describe_branch(results: Mapping[str, Results]) -> str:
 
 @BOOK.effect("ground")
 def describe_ground(results: Mapping[str, Results]) -> str:
-    """Return how deep the foot goes."""
     return f"{1e3 * SECOND_ROW.H:g} mm below the ground for the gait of λ = 0.15; Q is over the first step"
 
 
 @BOOK.effect("jump")
 def describe_jump(results: Mapping[str, Results]) -> str:
-    """Return the jump of the hip's lateral velocity."""
     return f"where steps meet it jumps by {math.pi * SECOND_ROW.n:.2f} m/s for the gait of λ = 0.15"
 
 
