@@ -12,8 +12,9 @@ from casadi import DM, MX, SX
 from nlp_gait.formulation import Point
 from nlp_gait.gaits.stairs import planar_biped as biped
 from nlp_gait.gaits.stairs.leg_network import ONLINE, solve_legs_by_network
-from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_posture, compute_stair_height
-from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, GOVERNING, SETBACK, collect_governing, make_stair_plan, read_stair
+from nlp_gait.gaits.stairs.plan_samples import make_step_symbols
+from nlp_gait.gaits.stairs.planned_motion import Stair, StepKind, compute_stair_height
+from nlp_gait.gaits.stairs.stair import EDGE_WIDTH, SETBACK, collect_governing, read_stair
 from nlp_gait.symbolic import quantised
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.quantised import Contact, Equations, Ground, QuantisedState, solve_definite
@@ -102,9 +103,9 @@ class ClosedLoop:
         return "H" if self.base == "hip" else "T'" if self.kind == "landing" else "A'"
 
     def locate_base(self, hip: SX) -> tuple[SX, SX, SX]:
-        """Return place, velocity and acceleration (2,) of the base, from those of the hip (6,) and the stance ankle's place [m]."""
+        """Return place [m], velocity and acceleration (2,) of the base, from those of the hip (6,) if that is the base."""
         if self.base == "hip":
-            return tuple(ca.vertsplit(hip, 2))
+            return hip[:2], hip[2:4], hip[4:]
         return SX(DM([biped.load_toe_foot_biped().foot_m * (self.kind == "landing"), 0])), SX(2, 1), SX(2, 1)
 
     def inputs(self, point: Point, ops: Nonsmooth) -> tuple[MX, MX]:
@@ -187,19 +188,14 @@ class ClosedLoop:
         torque = quantised.controller_torque(parts["control"], parts["desired"], following, G)
 
         acceleration = (following.v - state.v) / QUANTUM
-        weight, moment, pull = SX(0), SX(0), SX(0)
         place, _, push = self.locate_base(parts["hip"])
         found = biped.locate_points(state.q, place, self.base_point)
-        for link, middle in biped.locate_centres(found).items():
-            mass = biped.get_rod(link).mass_kg
-            velocity = ca.jtimes(middle, state.q, state.v)
-            a = ca.jtimes(velocity, state.q, state.v) + ca.jtimes(middle, state.q, acceleration) + push
-            spin = parts["spin"] * acceleration[biped.LINKS.index(link)] * (-1 if link == "UH" else 1)  # clockwise
-            weight += mass * (a[1] + biped.GRAVITY)
-            pull += mass * a[0]
-            moment += (
-                mass * (middle[0] * (a[1] + biped.GRAVITY) - middle[1] * a[0]) - biped.get_rod(link).inertia_kgm2 * spin
-            )
+        centres = biped.locate_centres(found)
+        accelerations = {link: self._accelerate(centre, state, acceleration) + push for link, centre in centres.items()}
+        forces, spins = biped.compute_pushes(accelerations, acceleration)
+        pull, weight = ca.vertsplit(sum(forces.values(), SX(2, 1)))
+        moment = sum((biped.compute_moment(centres[link], forces[link]) for link in biped.LINKS), SX(0))
+        moment += parts["spin"] * sum(spins.values(), SX(0))
         least = biped.LEAST_LOAD * biped.load_toe_foot_biped().mass_kg * biped.GRAVITY
         zmp = moment / ca.fmax(weight - parts["slope"] * pull, least)  # (eq. 49)
         return ca.Function(
@@ -208,6 +204,11 @@ class ClosedLoop:
             ca.cse([torque, zmp]),
             {"is_diff_in": [True, True, False, True]},
         )
+
+    @staticmethod
+    def _accelerate(place: SX, state: QuantisedState, acceleration: SX) -> SX:
+        velocity = ca.jtimes(place, state.q, state.v)
+        return ca.jtimes(velocity, state.q, state.v) + ca.jtimes(place, state.q, acceleration)
 
     def _symbols(self) -> tuple[QuantisedState, list[SX], dict[str, Any]]:
         """Return the state, the inputs given and tuned, and their parts by name, with controller and desired state."""
@@ -224,11 +225,8 @@ class ClosedLoop:
 
 def _make_desired(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of (time, governing parameters, stair, reach margin) to the desired state and the hip's (22,)."""
-    s, passing = SX.sym("s", 4), SX.sym("passing", 4)
-    values, size, margin = SX.sym("values", len(GOVERNING)), SX.sym("size", 2), SX.sym("margin")
-    plan = make_stair_plan(values)
-    step = compute_posture(plan, Stair(size[0], size[1]), s, passing / plan.durations, margin, ops, kind)
-    given = ca.vertcat(values, size, margin)
+    (s, passing, *constants), plan, _, step = make_step_symbols(ops, kind)
+    given = ca.vertcat(*constants)
     angles = (ca.vertcat(moving, foot) for moving, foot in zip(step.q[:2], step.foot[:2], strict=True))
     pose = ca.Function("pose", [s, passing, given], [*angles, step.hip.position, step.hip.velocity])
     time = SX.sym("time")

@@ -142,7 +142,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     Its inputs are s, the current phase, governing parameters, size, reach margin and rear share: that of the
     whole ground force on the rear toe at the start, which falls to zero over the double support.
     """
-    inputs, plan, stair, step = _make_symbols(ops, kind)
+    inputs, plan, stair, step = make_step_symbols(ops, kind)
     rear_share = SX.sym("rear_share")
     s = inputs[0]
     dynamics = biped.make_loads("T")
@@ -160,7 +160,7 @@ def sample_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
 
 def make_balanced_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of one sample with the load on both feet by ``compute_balance``; inputs without a rear share."""
-    inputs, plan, stair, step = _make_symbols(ops, kind)
+    inputs, plan, stair, step = make_step_symbols(ops, kind)
     s, passing, *_ = inputs
     torque, power, *ground = compute_balance(step, plan, s, passing, _compute_slope(stair, kind), kind)
     outputs = _list_outputs(inputs, plan, step, torque[: len(biped.JOINTS)], power, *ground)
@@ -179,16 +179,10 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
     q, v, a = (ca.vertcat(part, foot) for part, foot in zip(step.q, step.foot, strict=True))
     place = biped.locate_points(q, step.stance_ankle.position)
     middles, accelerations = biped.locate_centres(place), _accelerate_centres(Motion(q, v, a), step.stance_ankle)
-    push = {
-        link: biped.get_rod(link).mass_kg * (accelerations[link] + ca.vertcat(0, biped.GRAVITY)) for link in biped.LINKS
-    }
-    turn = {
-        link: biped.get_rod(link).inertia_kgm2 * a[i] * (1 if link == "UH" else -1)
-        for i, link in enumerate(biped.LINKS)
-    }
+    push, turn = biped.compute_pushes(accelerations, a)
     force = sum(push.values(), SX(2, 1))
     load = ca.fmax(force[1], biped.LEAST_LOAD * biped.GRAVITY * biped.load_toe_foot_biped().mass_kg)
-    points = sum((_compute_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
+    points = sum((biped.compute_moment(middles[link], push[link]) for link in biped.LINKS), SX(0))
     moment = points + sum(turn.values(), SX(0))
 
     sole, toe, rear_sole, rear_toe = (place[name] for name in ("S'", "T'", "S", "T"))
@@ -200,16 +194,20 @@ def compute_balance(step: Posture, plan: StairPlan, s: SX, passing: SX, slope: S
         heel = double * ((on > 1) * toe[0] + (on > 0) * (on <= 1) * sole[0])
     front = ca.fmin(ca.fmax(moment / load, heel), toe[0])
     back = ca.vertcat(ca.fmin(ca.fmax(moment / load, rear), rear_toe[0]), rear_toe[1])
-    arm = ca.fmin(_compute_moment(back, force) - front * load, -LEAST_ARM)
+    arm = ca.fmin(biped.compute_moment(back, force) - front * load, -LEAST_ARM)
     share = SX(0) if kind == "first" else double * ca.fmin(ca.fmax((moment - front * load) / arm, 0), 1)
 
     torque, rate = [], []
     for joint, links, sense, between in JOINT_SIDES.values():
-        total = sum((_compute_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0))
-        torque.append(-sense * (total - share * _compute_moment(back - place[joint], force)))
+        total = sum(
+            (biped.compute_moment(middles[link] - place[joint], push[link]) + turn[link] for link in links), SX(0)
+        )
+        torque.append(-sense * (total - share * biped.compute_moment(back - place[joint], force)))
         first, second = (v[biped.LINKS.index(link)] for link in between)
         rate.append(first + second if "UH" in between else first - second)
-    pressure = (moment - share * _compute_moment(back, force)) / ca.fmax((1 - share) * load, biped.LEAST_LOAD * load)
+    pressure = (moment - share * biped.compute_moment(back, force)) / ca.fmax(
+        (1 - share) * load, biped.LEAST_LOAD * load
+    )
     behind = heel if kind == "first" else double * rear
     zmp = points / ca.fmax(force[1] - slope * force[0], biped.LEAST_LOAD * load)  # (eq. 49)
     power = ca.vertcat(*torque) * ca.vertcat(*rate)
@@ -227,11 +225,6 @@ def _accelerate_centres(q: Motion, ankle: Motion) -> dict[str, SX]:
     return biped.locate_centres(biped.sum_along_links("A'", ankle.acceleration, acceleration))
 
 
-def _compute_moment(at: SX, force: SX) -> SX:
-    """Moment of a force about the origin, counter-clockwise [N m]."""
-    return at[0] * force[1] - at[1] * force[0]
-
-
 def _list_outputs(inputs: list[SX], plan: StairPlan, step: Posture, *loads: SX) -> list[SX]:
     places = [step.hip.position, step.ankle.position, step.foot.position, step.stance_ankle.position]
     return [ca.dot(plan.durations, inputs[0]), *step.q, step.reach, *loads[:-1], *places, loads[-1]]
@@ -244,7 +237,7 @@ def _compute_slope(stair: Stair[SX], kind: StepKind) -> SX:
 
 def make_clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
     """Return the function of heights (3,) of toe, sole and ankle above the stair; inputs of ``make_balanced_function``."""
-    inputs, _, stair, step = _make_symbols(ops, kind)
+    inputs, _, stair, step = make_step_symbols(ops, kind)
     found = biped.locate_points(biped.link_angles(step.q.position), step.stance_ankle.position)
     heights = [
         found[name][1] - planned.compute_stair_height(found[name][0], stair, SETBACK, EDGE_WIDTH, kind)
@@ -256,7 +249,7 @@ def make_clearance_function(ops: Nonsmooth, kind: StepKind) -> ca.Function:
 @cache
 def make_reach_function(per_phase: int, kind: StepKind) -> ca.Function:
     """Return the function of governing parameters, size and reach margin to cosines of both knees (2, m) at the samples."""
-    inputs, _, _, step = _make_symbols(Exact(), kind)
+    inputs, _, _, step = make_step_symbols(Exact(), kind)
     s, passing = PlannedStep(per_phase=per_phase).grid
     one = ca.Function("reach", inputs, [ca.cse(step.reach)])
     given = [SX.sym("given", size.shape) for size in inputs[2:]]
@@ -266,7 +259,8 @@ def make_reach_function(per_phase: int, kind: StepKind) -> ca.Function:
     )
 
 
-def _make_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+def make_step_symbols(ops: Nonsmooth, kind: StepKind) -> tuple[list[SX], StairPlan, Stair[SX], Posture]:
+    """Return symbols s, passing, governing parameters, size and reach margin; the plan, the stair and the posture of these."""
     s, passing, values = SX.sym("s", 4), SX.sym("passing", 4), SX.sym("governing", len(GOVERNING))
     size, margin = SX.sym("size", 2), SX.sym("margin")
     plan, stair = make_stair_plan(values), Stair(size[0], size[1])

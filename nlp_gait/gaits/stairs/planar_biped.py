@@ -143,6 +143,20 @@ def locate_centres(found: Mapping[str, SX]) -> dict[str, SX]:
     return {link: (found[a] + found[b]) / 2 for link, (a, b) in ENDS.items()}
 
 
+def compute_moment(place: SX, force: SX) -> SX:
+    """Return the moment of a force about the origin, counter-clockwise [N m]."""
+    return place[0] * force[1] - place[1] * force[0]
+
+
+def compute_pushes(accelerations: Mapping[str, SX], spins: SX) -> tuple[dict[str, SX], dict[str, SX]]:
+    """Return the forces (2,) [N] and counter-clockwise moments [N m] that move the links, from their centres and spins (9,)."""
+    upward = ca.vertcat(0, GRAVITY)
+    forces = {link: get_rod(link).mass_kg * (accelerations[link] + upward) for link in LINKS}
+    senses = [1 if link == "UH" else -1 for link in LINKS]
+    moments = {link: get_rod(link).inertia_kgm2 * spins[i] * senses[i] for i, link in enumerate(LINKS)}
+    return forces, moments
+
+
 def make_dynamics(q: SX, qd: SX, angles: SX, base: str = "A'") -> EquationsOfMotion:
     """Return the equations of motion about a fixed base (``locate_points``); link angles (9,) [rad] are functions of q (n,)."""
     spins = ca.jtimes(angles, q, qd)
