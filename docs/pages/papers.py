@@ -47,4 +47,3 @@ def _format_parts(parts: Iterable[dict[str, Any]]) -> list[str]:
         else:
             blocks.append(part["text"])
     return blocks
-

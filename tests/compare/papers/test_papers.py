@@ -12,6 +12,7 @@ from compare.papers.rules import Ruling
 from docs.pages.papers import RECORDS, paper_page
 from nlp_gait.errors import OutputError
 
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REPRODUCTIONS)
 def test_a_quick_run_confirms_the_record(name: str, tmp_path: Path) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from compare.drawing.figures import make_figure
 from compare.report.document import Document, Figure, Prose, Section, Table
 from compare.report.writing import write_document, write_parts
