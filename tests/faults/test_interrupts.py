@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -21,7 +22,7 @@ import nlp_gait
 from compare.cli import app
 from compare.papers import load_reproduction
 from compare.papers.paper_runs import Effort, Runner
-from compare.questions import sweep
+from compare.questions import prices, robust_gait, sweep, variants
 from compare.study.record import read_record
 from compare.study.store import Computation
 from nlp_gait.backends.kernel.compiled import CompiledObjective
@@ -179,7 +180,7 @@ def test_reproduce_reports_its_stored_results(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(module, "REPRODUCTION", replace(load_reproduction("nao"), compute=run_two))
     done = run("reproduce", "nao", "--out", str(tmp_path))
     assert f"1 finished results are stored in {tmp_path}; rerun the command to continue" in done.stderr
-    assert [path.name for path in (tmp_path / "store").iterdir()] == ["one.json"]
+    assert [path.name.partition("-")[0] for path in (tmp_path / "store").iterdir()] == ["one"]
 
 
 @pytest.mark.slow
@@ -197,19 +198,42 @@ def test_simulate_keeps_the_simulation(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.slow
-def test_sweep_before_its_first_solve_and_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = ("sweep", "walk12", "--over", "foot_lift_m=0.01,0.02", "--starts", "1", "--out", str(tmp_path))
-    with monkeypatch.context() as patch:
-        press_after(patch, sweep, "solve_both_ways", 1)
-        assert run(*asked).stderr == (
-            f"nlp-gait: interrupted after 0 of 4 solves; 1 finished results are stored in {tmp_path}; rerun the command "
-            "to continue\n"
-        )
-    assert not list(tmp_path.glob("*.*"))
+@pytest.mark.parametrize(
+    ("owner", "function", "line", "said"),
+    [
+        (sweep, "solve_both_ways", "sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1", " after 0 of 4 solves"),
+        (variants, "solve", "variants --over motors", " after 0 of 8 variants"),
+        (robust_gait, "solve", "robust", ""),
+        (prices, "Continuation", "prices walk12", ""),
+    ],
+)
+def test_a_question_before_its_first_result_counts_the_stored_results(
+    owner: object, function: str, line: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / "solve-1.json").write_text("{}")
+    press_after(monkeypatch, owner, function, 1)
+    error = run(*line.split(), "--out", str(tmp_path)).stderr
+    stored = int(re.fullmatch(rf"nlp-gait: interrupted{said}; (\d) finished results are stored .*\n", error)[1])  # type: ignore[index]
+    assert stored == len(list(tmp_path.glob("store/*.json"))) >= 1
+    assert f"are stored in {tmp_path}; rerun the command to continue\n" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["store"]
+
+
+@pytest.mark.slow
+def test_variants_writes_the_finished_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    press_after(monkeypatch, variants, "solve", 2)
+    done = run(*"variants --over motors --set intervals=3 --starts 1 --out".split(), str(tmp_path))
+    assert f"after 1 of 8 variants; the results are in {tmp_path}; rerun the command to continue\n" in done.stderr
+    assert len((tmp_path / "nao-ssp-variants.csv").read_text().splitlines()) == 2
+
+
+@pytest.mark.slow
+def test_sweep_while_it_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib.figure import Figure
 
     press_after(monkeypatch, Figure, "savefig", 1)
-    done = run(*asked)
+    done = run(*"sweep walk12 --over foot_lift_m=0.01,0.02 --starts 1 --out".split(), str(tmp_path))
     sentence = f"interrupted at the end; the results are in {tmp_path}; rerun the command to continue"
     assert done.stderr == f"nlp-gait: {sentence}\n"
     assert "walk12 by ipopt" in done.stdout and len(list(tmp_path.glob("*.png"))) == 1

@@ -8,7 +8,7 @@ import pytest
 
 from compare.drawing.figures import save
 from compare.report import writing
-from tests.compare.cli.calls import as_json, is_one_sentence, nlp_gait, one_sentence, process
+from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
 from tests.compare.pictures import save_coarsely
 
 PSO_OF_THE_PAPER = "0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
@@ -90,44 +90,6 @@ def test_same_seed_same_result_with_one_or_two_processes(tmp_path, undrawn_pages
 
     runs = search("1")
     assert [seed for seed, _, _ in runs] == [3, 4, 5] and runs == search("2")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["evaluate", "nao-spp", "--x", "1"], ["unknown problem 'nao-spp'", "nao-ssp"]),
-        (["solve", "nao-ssp", "--set", "swing_hight_m=0.02"], ["unknown parameter", "swing_height_m"]),
-        (["solve", "nao-ssp", "--set", "torque_change_limit=0.02"], ["unknown parameter", "torque_change_limit_Nm"]),
-        (["sweep", "nao-ssp", "--over", "intervals=10:20:2"], ["is an option of nao-ssp", "--set intervals="]),
-        (["solve", "nao-ssp", "--robot", "nao-v7"], ["unknown robot 'nao-v7'", "nao-v"]),
-        (["evaluate", "nao-ssp", "--x", "0.31,2"], ["must have 9 values"]),
-        (["evaluate", "nao-ssp", "--x", "nan" + PSO_OF_THE_PAPER[4:]], ["hip_height_m must be finite", "nan"]),
-        (
-            ["evaluate", "nao-ssp", "--x", PSO_OF_THE_PAPER[:-1] + "inf"],
-            ["single_support_time_s must be finite", "inf"],
-        ),
-        (["evaluate", "nao-ssp", "--x", "a,b"], ["must be a number", "'a'"]),
-        (["solve", "nao-ssp", "--set", "hip_height_m.lower=0.5"], ["inverted", "hip_height_m"]),
-        (["solve", "nao-ssp", "--set", "LKneePitch_rad.lower=3"], ["inverted", "LKneePitch_rad"]),
-        (["solve", "nao-ssp", "--set", "swing_height_m=0.5"], ["cannot be fixed at 0.5", "0.015, 0.03"]),
-        (["solve", "nao-ssp", "--set", "torque_change_limit_Nm"], ["NAME=VALUE"]),
-        (["compare", "nao-ssp", "--out", "/proc/nowhere"], ["cannot write", "--out"]),
-        (["solve", "nao-ssp", "--set", "intervals=0"], ["intervals must be a whole number >= 1", "got 0"]),
-        (["solve", "nao-ssp", "--set", "derivatives=numeric"], ["derivatives", "finite-difference"]),
-        (["plan", "--turn-deg", "90", "--speed", "0.05"], ["whose steps differ", "leave out --speed"]),
-        (["plan", "--stairs", "0.02x0.2:3", "--steps", "4"], ["stairs determine steps", "leave out --steps"]),
-    ],
-)
-def test_bad_input_is_one_sentence(arguments, words):
-    error = one_sentence(*arguments)
-    for word in words:
-        assert word in error
-
-
-def test_a_process_that_refuses_ends_with_status_1_and_one_sentence():
-    done = process("solve", "nao-ssp", "--set", "swing_hight_m=0.02")
-    assert done.returncode == 1 and done.stdout == ""
-    assert is_one_sentence(done.stderr) and "swing_height_m" in done.stderr
 
 
 def test_unreachable_pose_is_evaluated_and_named():

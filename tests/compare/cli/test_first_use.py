@@ -14,7 +14,7 @@ import nlp_gait
 from compare.cli import PANELS, app, printing
 from compare.cli.compare import HOW_TO_READ, READ_FIRST
 from compare.cli.printing import PlainConsole, print_table
-from tests.compare.cli.calls import as_json, one_sentence
+from tests.compare.cli.calls import as_json
 
 ROOT = Path(__file__).parents[3]
 HEADER = (
@@ -114,7 +114,6 @@ def test_a_problem_is_listed_for_a_robot():
         for robot in ((), ("--robot", ROOT / "tests/fuzz/seeds/biped/crooked.urdf"))
     ]
     assert heights[1] > 1.2 * heights[0]
-    assert "--robot takes a problem" in one_sentence("list", "pso", "--robot", "nao-v5")
 
 
 def test_every_setting_of_every_algorithm_is_listed_with_its_meaning():

@@ -1,17 +1,12 @@
-"""`pareto` and `certainty` as scripts use them, Ctrl-C where questions are answered, and a linear solver that is not there."""
+"""`pareto`, `certainty` and `solve` as scripts use them."""
 
 from __future__ import annotations
 
 import json
-import signal
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from compare.questions import prices, robust_gait, variants
-from compare.questions.pareto import front as pareto_front
-from nlp_gait.backends.solvers.solver import IterationWatch
 from tests.compare.cli.calls import nlp_gait, one_sentence
 
 pytestmark = pytest.mark.usefixtures("coarse_pictures")
@@ -44,22 +39,6 @@ def test_pareto_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
         *PARETO, "--against", "speed", "--search", "NSGA2=100", "--runs", "1", "--out", tmp_path
     )  # from its stored results
     assert "price" in again.stdout and " W per m/s " in again.stdout and "wrote " in again.stdout
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--against", "dbm_z"], ["unknown objective next to power 'dbm_z'", "dbm_y_mean"]),
-        (["--search", "NSGA2"], ["--search takes NAME=BUDGET,BUDGET", "'NSGA2'"]),
-        (["--search", "NSGA3=100"], ["Known: NSGA2, CMOPSO", "'NSGA3'"]),
-        (["--search", "NSGA2=10"], ["at least the population of 100", "[10]"]),
-    ],
-)
-def test_pareto_refuses_in_one_sentence_before_the_work(arguments: list[str], words: list[str], tmp_path: Path) -> None:
-    error = one_sentence(*PARETO, *arguments, "--out", tmp_path)
-    for word in words:
-        assert word in error
-    assert not list(tmp_path.rglob("*.json"))
 
 
 def test_certainty_prints_one_object_and_writes_its_files(tmp_path: Path) -> None:
@@ -98,80 +77,3 @@ def test_solve_takes_any_nlp_solver_by_name(tmp_path: Path) -> None:
     written = json.loads(out.read_text())
     assert "; slsqp\n" in shown and written["solver"] == "slsqp" and written["linear_solver"] == ""
     assert written["claimed"] and written["active_constraints"] == []
-    assert "unknown NLP solver 'simplex'" in one_sentence("solve", "walk12", "--solver", "simplex")
-
-
-def press(*_: object, **__: object) -> None:
-    signal.raise_signal(signal.SIGINT)
-
-
-def pressed_in_call(number: int, function: Callable[..., object]) -> Callable[..., object]:
-    """The function, with Ctrl-C in place of one of its calls."""
-    count = 0
-
-    def counted(*arguments: object, **named: object) -> object:
-        nonlocal count
-        count += 1
-        return press() if count == number else function(*arguments, **named)
-
-    return counted
-
-
-def test_ctrl_c_within_an_iteration_of_a_front_keeps_the_stored_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun: list[str] = []
-    evaluate = IterationWatch.eval
-
-    def counted(watch: IterationWatch, arguments: object) -> object:
-        if begun:
-            press()
-        return evaluate(watch, arguments)
-
-    ends = pareto_front._solve_ends
-
-    def found(*arguments: object, **named: object) -> object:
-        result = ends(*arguments, **named)  # type: ignore[arg-type]
-        begun.append("front")
-        return result
-
-    monkeypatch.setattr(IterationWatch, "eval", counted)
-    monkeypatch.setattr(pareto_front, "_solve_ends", found)
-    steps = tmp_path / "store"
-    steps.mkdir()
-    (steps / "earlier.json").write_text("{}")
-    error = one_sentence(*PARETO, "--search", "none", "--out", tmp_path, status=130)
-    kept = [path.name.partition("-")[0] for path in steps.iterdir()]
-    assert kept.count("solve") == 4 and len(kept) == 5  # both ends of the front
-    assert (
-        error == f"nlp-gait: interrupted; 5 finished results are stored in {tmp_path}; rerun the command to continue\n"
-    )
-
-
-def test_ctrl_c_in_variants_writes_the_finished_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(variants, "solve", pressed_in_call(2, variants.solve))
-    done = nlp_gait(
-        *("variants", "nao-ssp", "--over", "motors", "--set", "intervals=3", "--starts", "1", "--out", tmp_path),
-        status=130,
-    )
-    assert (
-        f"interrupted after 1 of 8 variants; the results are in {tmp_path}; rerun the command to continue\n"
-        in done.stderr
-    )
-    assert len((tmp_path / "nao-ssp-variants.csv").read_text().splitlines()) == 2
-
-
-def test_ctrl_c_before_the_first_result_counts_the_stored_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "store").mkdir()
-    (tmp_path / "store" / "solve-1.json").write_text("{}")
-    for module in (variants, robust_gait):
-        monkeypatch.setattr(module, "solve", press)
-    monkeypatch.setattr(prices, "Continuation", press)
-    out = ["--out", tmp_path]
-    kept = f"finished results are stored in {tmp_path}; rerun the command to continue\n"
-    assert f"after 0 of 8 variants; 1 {kept}" in one_sentence("variants", "--over", "motors", *out, status=130)
-    assert f"interrupted; 1 {kept}" in one_sentence("robust", *out, status=130)
-    assert f"interrupted; 1 {kept}" in one_sentence("prices", "walk12", *out, status=130)
-    assert [path.name for path in tmp_path.iterdir()] == ["store"]

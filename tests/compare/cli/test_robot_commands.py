@@ -37,29 +37,6 @@ def test_simulate_without_the_extra_refuses_in_one_sentence(gait, monkeypatch):
     assert "pip install 'nlp-gait[sim]'" in one_sentence("simulate", gait)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["export", "GAIT", "--to", "webot"], ["unknown kind 'webot'", "webots"]),
-        (["export", "GAIT", "--to", "csv", "--set", "a=1"], ["leave out --set"]),
-        (["export", "nao-ssp", "--to", "nl"], ["name their folder by --out DIR"]),
-        (["export", "absent.json", "--to", "csv"], ["'absent.json' cannot be read"]),
-        (["export", "GAIT", "--to", "gif", "--out", "walk.avi"], ["must end in .gif"]),
-        (["simulate", "GAIT", "--torque-limits", "peak"], ["urdf, stall, continuous", "'peak'"]),
-        (["simulate", "GAIT", "--sole", "oval"], ["rectangle, polygon", "'oval'"]),
-        (["simulate", "GAIT", "--drive", "fast"], ["unknown drive 'fast'", "feed-forward"]),
-        (["simulate", "GAIT", "--drive", "absent.toml"], ["drive 'absent.toml' cannot be read"]),
-        (["simulate", "GAIT", "--push", "1"], ["--push takes X,Y or X,Y,S, got '1'"]),
-    ],
-)
-def test_bad_input_is_one_sentence(gait, arguments, words):
-    if arguments[0] == "simulate":
-        pytest.importorskip("mujoco")
-    error = one_sentence(*(gait if a == "GAIT" else a for a in arguments))
-    for word in words:
-        assert word in error
-
-
 def test_a_drive_is_read_from_a_file(gait, tmp_path):
     pytest.importorskip("mujoco")
     drive = tmp_path / "drive.toml"

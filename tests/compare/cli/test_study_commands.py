@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from compare.cli.compare import list_solver_names
-from tests.compare.cli.calls import as_json, nlp_gait, one_sentence
+from tests.compare.cli.calls import as_json, nlp_gait
 
 pytestmark = pytest.mark.usefixtures("undrawn_pages")
 
@@ -57,29 +57,6 @@ def test_report_is_rebuilt_from_records_alone(folder: Path, tmp_path: Path) -> N
     assert len(headers) == 2 and all(json.loads(path.read_text())["scenarios"][0]["runs"] for path in headers)
     assert (tmp_path / "report.html").as_posix() in files
     assert "little-pso" in (tmp_path / "report.md").read_text()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["compare", "--resume", "--out", "{folder}", "--runs", "3"], ["--resume", "omit --runs"]),
-        (["compare", "nao-ssp", "--config", "x.toml", "--out", "{new}"], ["--config", "omit [PROBLEM]"]),
-        (["compare", "--resume", "--out", "{new}"], ["no study to resume"]),
-        (["compare", "--config", "{new}/none.toml", "--out", "{new}"], ["cannot be read"]),
-        (["compare", "nao-ssp", "--algorithms", "psso", "--out", "{new}"], ["unknown algorithm 'psso'", "pso"]),
-        (["compare", "nao-ssp", "--handling", "penalty", "--out", "{new}"], ["penalty=WEIGHT"]),
-        (["compare", "nao-ssp", "--handling", "dep", "--out", "{new}"], ["unknown constraint handling 'dep'", "deb"]),
-        (["compare", "nao-ssp", "--handling", "deb=2", "--out", "{new}"], ["others none"]),
-        (["compare", "nao-ssp", "--time-limit", "-1", "--out", "{new}"], ["time_limit_s must be"]),
-        (["report", "{new}"], ["contains no records"]),
-    ],
-)
-def test_wrong_use_is_one_sentence(arguments: list[str], words: list[str], folder: Path, tmp_path: Path) -> None:
-    filled = [a.replace("{folder}", str(folder)).replace("{new}", str(tmp_path)) for a in arguments]
-    error = one_sentence(*filled)
-    for word in words:
-        assert word in error
-    assert not list(tmp_path.rglob("*.json"))
 
 
 def test_a_search_is_polished(tmp_path: Path) -> None:

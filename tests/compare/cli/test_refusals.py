@@ -1,0 +1,93 @@
+"""What every command refuses: one sentence that names what is wrong and what is allowed, before anything is written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.compare.cli.calls import is_one_sentence, one_sentence, process
+from tests.compare.records import DSP_X
+
+POINT = "0.31,-0.002,0.0034,0.008,0.0025,0.0243,-0.0256,0.015,4"
+BENCH = "bench --out {new} --instances walk12-w015"
+PARETO = "pareto nao-ssp --set intervals=4 --points 5 --out {new}"
+# A command line, and the words of the sentence, separated by "|".
+REFUSED = {
+    "evaluate nao-spp --x 1": "unknown problem 'nao-spp'|nao-ssp",
+    "evaluate nao-ssp --x 0.31,2": "must have 9 values",
+    f"evaluate nao-ssp --x nan{POINT[4:]}": "hip_height_m must be finite|nan",
+    f"evaluate nao-ssp --x {POINT[:-1]}inf": "single_support_time_s must be finite|inf",
+    "evaluate nao-ssp --x a,b": "must be a number|'a'",
+    "solve nao-ssp --set swing_hight_m=0.02": "unknown parameter|swing_height_m",
+    "solve nao-ssp --set torque_change_limit=0.02": "unknown parameter|torque_change_limit_Nm",
+    "solve nao-ssp --robot nao-v7": "unknown robot 'nao-v7'|nao-v",
+    "solve nao-ssp --set hip_height_m.lower=0.5": "inverted|hip_height_m",
+    "solve nao-ssp --set LKneePitch_rad.lower=3": "inverted|LKneePitch_rad",
+    "solve nao-ssp --set swing_height_m=0.5": "cannot be fixed at 0.5|0.015, 0.03",
+    "solve nao-ssp --set torque_change_limit_Nm": "NAME=VALUE",
+    "solve nao-ssp --set intervals=0": "intervals must be a whole number >= 1|got 0",
+    "solve nao-ssp --set derivatives=numeric": "derivatives|finite-difference",
+    "solve walk12 --limit FrictionCone": "walk12 takes no limits|leave out --limit",
+    "solve nao-ssp --limit Friction": "unknown limit 'Friction'|FrictionCone",
+    "solve walk12 --solver simplex": "unknown NLP solver 'simplex'",
+    "plan --steps 2 --limit Friction": "unknown limit 'Friction'|FrictionCone",
+    "list pso --robot nao-v5": "--robot takes a problem",
+    "compare nao-ssp --out /proc/nowhere": "cannot write|--out",
+    "compare --resume --out {new} --runs 3": "--resume|omit --runs",
+    "compare nao-ssp --config x.toml --out {new}": "--config|omit [PROBLEM]",
+    "compare --resume --out {new}": "no study to resume",
+    "compare --config {new}/none.toml --out {new}": "cannot be read",
+    "compare nao-ssp --algorithms psso --out {new}": "unknown algorithm 'psso'|pso",
+    "compare nao-ssp --handling penalty --out {new}": "penalty=WEIGHT",
+    "compare nao-ssp --handling dep --out {new}": "unknown constraint handling 'dep'|deb",
+    "compare nao-ssp --handling deb=2 --out {new}": "others none",
+    "compare nao-ssp --time-limit -1 --out {new}": "time_limit_s must be",
+    "compare gb2:absent:3 --out {new}": "unknown family of GaitBench 2",
+    "report {new}": "contains no records",
+    "reproduce walk1 --out {new}": "unknown reproduction 'walk1'; did you mean 'walk12'?",
+    "reproduce walk12 --effort {new}/bad.toml --out {new}": "runs must be a whole number, got 'many'",
+    "reproduce walk12 --effort {new}/bad.toml --quick --out {new}": "omit one",
+    "sweep nao-ssp --over intervals=10:20:2": "is an option of nao-ssp|--set intervals=",
+    "sweep nao-dsp --over hip_height_m=low:high:3 --out {new}": "--over takes",
+    f"{PARETO} --against dbm_z": "unknown objective next to power 'dbm_z'|dbm_y_mean",
+    f"{PARETO} --search NSGA2": "--search takes NAME=BUDGET,BUDGET|'NSGA2'",
+    f"{PARETO} --search NSGA3=100": "Known: NSGA2, CMOPSO|'NSGA3'",
+    f"{PARETO} --search NSGA2=10": "at least the population of 100|[10]",
+    f"{BENCH} --algorithm psoo": "unknown algorithm 'psoo'",
+    f"{BENCH} --algorithm pso --label pso": "is a solver of the baseline",
+    "bench --instances ssp-v55 --out {new}": "unknown instance of GaitBench 'ssp-v55'",
+    "bench --families ssp --seeds 5:3 --out {new}": "--seeds takes FIRST:END, test:COUNT",
+    f"{BENCH} --tune 3": "--tune needs a search that runs here",
+    "export {gait} --to webot": "unknown kind 'webot'|webots",
+    "export {gait} --to csv --set a=1": "leave out --set",
+    "export {gait} --to csv --limit FrictionCone": "leave out --set and --limit",
+    "export {gait} --to gif --out walk.avi": "must end in .gif",
+    "export nao-ssp --to nl": "name their folder by --out DIR",
+    "export absent.json --to csv": "'absent.json' cannot be read",
+    "export walk12-w15 --to objective --out {new}": "did you mean 'walk12-w015'",
+    "simulate {gait} --torque-limits peak": "urdf, stall, continuous|'peak'",
+    "simulate {gait} --sole oval": "rectangle, polygon|'oval'",
+    "simulate {gait} --drive fast": "unknown drive 'fast'|feed-forward",
+    "simulate {gait} --drive absent.toml": "drive 'absent.toml' cannot be read",
+    "simulate {gait} --push 1": "--push takes X,Y or X,Y,S, got '1'",
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_a_command_refuses_in_one_sentence(line: str, tmp_path: Path) -> None:
+    if line.startswith("simulate"):
+        pytest.importorskip("mujoco")
+    gait = tmp_path / "gait.json"
+    gait.write_text(json.dumps({"problem": "nao-dsp", "x": DSP_X}))
+    (tmp_path / "bad.toml").write_text('{"runs": "many"}')
+    error = one_sentence(*line.format(new=tmp_path, gait=gait).split())
+    assert all(word in error for word in REFUSED[line].split("|")), error
+    assert list(tmp_path.rglob("*.json")) == [gait]
+
+
+def test_a_process_that_refuses_ends_with_status_1_and_one_sentence() -> None:
+    done = process("solve", "nao-ssp", "--set", "swing_hight_m=0.02")
+    assert done.returncode == 1 and done.stdout == ""
+    assert is_one_sentence(done.stderr) and "swing_height_m" in done.stderr
