@@ -1,5 +1,7 @@
 """What a gait problem is, how to make or change one, and a gait of one that was found."""
 
+from typing import TYPE_CHECKING, Any
+
 from nlp_gait.formulation.assembly import (
     Assembly,
     Constraint,
@@ -16,9 +18,18 @@ from nlp_gait.formulation.assembly import (
 )
 from nlp_gait.formulation.display import Display, SimulationModel
 from nlp_gait.formulation.gait_problem import GaitProblem, SolverHints, Start
-from nlp_gait.formulation.registry import list_problems, load, maker
-from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
+from nlp_gait.providers import import_object
+
+if TYPE_CHECKING:
+    from nlp_gait.formulation.registry import list_problems, load, maker
+    from nlp_gait.formulation.result import Result, load_result, sample_at_period, sample_finely, sample_signals
+
+# Imported on first use: what is part of a problem needs neither the registry nor results.
+_LATER = {
+    "registry": ("list_problems", "load", "maker"),
+    "result": ("Result", "load_result", "sample_at_period", "sample_finely", "sample_signals"),
+}
 
 __all__ = [
     "Array",
@@ -51,3 +62,11 @@ __all__ = [
     "sample_finely",
     "sample_signals",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first used."""
+    for module, names in _LATER.items():
+        if name in names:
+            return import_object(f"{__name__}.{module}:{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

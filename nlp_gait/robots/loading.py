@@ -15,11 +15,9 @@ from nlp_gait.decoding import decode, read_dataclass
 from nlp_gait.errors import RobotDataError, UnknownNameError, format_value, unknown, warn_once
 from nlp_gait.files import check_path, convert_errors
 from nlp_gait.robots.inference import EXTENTS, SIDES, Feet, Side, find_legs, infer_feet
-from nlp_gait.robots.mjcf import list_dependencies, read_mjcf
 from nlp_gait.robots.perturbation import perturb, split_name
 from nlp_gait.robots.robot import Foot, Joint, Link, Robot, check_robot_name, make_unit_axis
 from nlp_gait.robots.tree import check_inertias, reverse_joint, shift_to_com
-from nlp_gait.robots.urdf import list_meshes, read_urdf
 from nlp_gait.robots.welding import Joints, Links, RobotParts, find_faults, weld_faults
 
 MODEL_ENDINGS = (".urdf", ".xml")
@@ -135,6 +133,9 @@ def list_robot_files(name_or_path: str) -> set[str]:
         found.add(source)
         source = _resolve(_read(source).extends or "", source)
     if source.endswith(MODEL_ENDINGS):
+        from nlp_gait.robots.mjcf import list_dependencies
+        from nlp_gait.robots.urdf import list_meshes
+
         with convert_errors(f"robot file {source!r}", RobotDataError):
             found |= {source, *(list_dependencies(source) if source.endswith(".xml") else list_meshes(source))}
     return {os.path.abspath(file) for file in found}
@@ -195,6 +196,9 @@ def _describe(source: str, seen: tuple[str, ...] = ()) -> RobotDescription:
 
 
 def _read_model(source: str, inertia_about: str | None) -> RobotDescription:
+    from nlp_gait.robots.mjcf import read_mjcf
+    from nlp_gait.robots.urdf import read_urdf
+
     with convert_errors(f"robot file {source!r}", RobotDataError):
         if source.endswith(".xml"):
             model = read_mjcf(source)

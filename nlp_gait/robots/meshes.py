@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,14 +25,6 @@ STL_HEADER, STL_TRIANGLE = 84, 50  # bytes
 DEEPEST_NODE = 32  # of a Collada scene
 MOST_POINTS = 4_000_000
 RIM = 24  # points of a cylinder's edge
-
-
-class FootShapes(NamedTuple):
-    """Shapes that move with a foot."""
-
-    points: Array  #: (N, 3) corners of boxes and meshes, edges of cylinders and lowest points of spheres [m]
-    kind: str  #: ``"collision"``, or ``"visual"`` if the foot has no collision shapes
-    missing: tuple[str, ...] = ()  #: meshes that do not exist
 
 
 def find_mesh(address: str, robot_file: Path) -> Path | None:

@@ -15,10 +15,10 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.limits import read_in_child
-from nlp_gait.robots.meshes import FootShapes, list_shape_points, move_points
+from nlp_gait.robots.meshes import list_shape_points, move_points
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, to_vector
-from nlp_gait.robots.welding import LinkFrame, RobotParts, join_frames, list_carriers
+from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 LOG = logging.getLogger("nlp_gait")
 UNLIMITED_RAD_S = 1000.0  # MJCF has no speed limits

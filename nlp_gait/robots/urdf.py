@@ -12,7 +12,6 @@ import numpy as np
 from nlp_gait.errors import MissingExtraError, RobotDataError, warn_once
 from nlp_gait.files import protect_input, read_bytes
 from nlp_gait.robots.meshes import (
-    FootShapes,
     find_mesh,
     list_shape_points,
     make_pose,
@@ -22,7 +21,7 @@ from nlp_gait.robots.meshes import (
 )
 from nlp_gait.robots.robot import LARGEST_NUMBER, Joint, are_plausible, make_unit_axis
 from nlp_gait.robots.tree import Array, Mass, compute_point_inertia, to_vector
-from nlp_gait.robots.welding import LinkFrame, RobotParts, join_frames, list_carriers
+from nlp_gait.robots.welding import FootShapes, LinkFrame, RobotParts, join_frames, list_carriers
 
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 OWNERS = ("robot", "link", "joint")

@@ -5,9 +5,17 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from nlp_gait.errors import RobotDataError
-from nlp_gait.robots.meshes import FootShapes
 from nlp_gait.robots.robot import Joint, Link
 from nlp_gait.robots.tree import Array, Mass, combine_masses, to_vector, weld_child
+
+
+class FootShapes(NamedTuple):
+    """Shapes that move with a foot."""
+
+    points: Array  #: (N, 3) corners of boxes and meshes, edges of cylinders and lowest points of spheres [m]
+    kind: str  #: ``"collision"``, or ``"visual"`` if the foot has no collision shapes
+    missing: tuple[str, ...] = ()  #: meshes that do not exist
+
 
 Links = dict[str, Link]
 Joints = dict[str, Joint]

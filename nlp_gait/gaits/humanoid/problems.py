@@ -7,15 +7,8 @@ from nlp_gait.errors import InputError
 from nlp_gait.formulation import GaitProblem, maker
 from nlp_gait.formulation.added_limits import AddedLimits
 from nlp_gait.gaits.biped.flight import CLEARANCE_M, Flight
-from nlp_gait.gaits.biped.problems import (
-    CycleOptions,
-    LoadOptions,
-    PhaseOptions,
-    WalkOptions,
-    make_cycle_problem,
-    make_support_problem,
-    make_walk_problem,
-)
+from nlp_gait.gaits.biped.problems import LoadOptions, PhaseOptions, make_support_problem
+from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, make_cycle_problem, make_walk_problem
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.gaits.humanoid.turning import check_turns
 

@@ -6,8 +6,7 @@ of the time T, and a torque is that of gravity plus 1 / T^2 times that of the mo
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
@@ -16,42 +15,35 @@ from casadi import SX
 from nlp_gait.formulation import Array, GaitProblem
 from nlp_gait.formulation.power_form import WIDENING, PowerForm, PowerRows
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
+from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.limits import SCALES
+from nlp_gait.gaits.biped.load_sharing import Division
+from nlp_gait.gaits.biped.support_phases import place_hip, place_soles, place_stance
+from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import measure_leg
-from nlp_gait.gaits.nao.least_power.power_instants import PAIRS, PowerInstant, PowerPhase
+from nlp_gait.gaits.nao.least_power.power_instants import (
+    PAIRS,
+    PowerInstant,
+    PowerPhase,
+    make_double_support,
+    make_single_support,
+)
 from nlp_gait.robots import Robot
 
-# Options of the phases that these formulas are for.
-FORM_OPTIONS = {
-    "derivatives": "analytic",
-    "trajectory": "cubic",
-    "objective": "power",
-    "motors": "",
-    "arms": "carried",
-    "zmp_gravity": "physical",
-    "zmp_masses": 25,
-    "rule": "trapezoid",
-}
 # Up to this angle its tangent is monotone; slack for angles that break their limits within the judge's tolerance [rad].
 STEEPEST, ANGLE_SLACK = 1.5, 1e-5
 
 
-def has_power_form(options: Mapping[str, Any]) -> bool:
-    """Return whether these formulas are those of a phase with the options, with one sample in each interval."""
-    usual = all(options.get(name, value) == value for name, value in FORM_OPTIONS.items())
-    return usual and bool(options["samples_per_interval"] < 2)
-
-
-def make_power_form_maker(
-    robot: Robot, make_phase: Callable[[float], PowerPhase]
-) -> Callable[[GaitProblem], PowerForm]:
-    """Return the maker of a phase's power form; ``make_phase`` takes the knee's largest cosine, see ``make_leg_frames``."""
-
-    def make(problem: GaitProblem) -> PowerForm:
-        margin = problem.value("reach_margin")
-        return _make_power_form(problem, robot, make_phase((1.0 - margin) + FEASIBILITY_TOLERANCE + WIDENING))
-
-    return make
+def make_power_form(problem: GaitProblem, body: NaoBody, step_m: float, rule: Division | None) -> PowerForm:
+    """Return the power form of single support, or of double support with a rule that shares the torso, see ``share_torso``."""
+    cosine = (1.0 - problem.value("reach_margin")) + FEASIBILITY_TOLERANCE + WIDENING
+    if rule is None:
+        phase = make_single_support(body.robot, place_stance(body, step_m), ARM_SWING[Support.SINGLE], cosine)
+    else:
+        soles = place_soles(body, step_m)
+        places = soles, place_hip(body, soles), ARM_SWING[Support.DOUBLE]
+        phase = make_double_support(body.robot, *places, rule, cosine)
+    return _make_form(problem, body.robot, phase)
 
 
 def to_z(x: Array) -> Array:
@@ -117,7 +109,7 @@ class _Outputs:
         )
 
 
-def _make_power_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerForm:
+def _make_form(problem: GaitProblem, robot: Robot, phase: PowerPhase) -> PowerForm:
     z, values, out = SX.sym("z", len(problem.names)), problem.parameter_values, _Outputs()
     assert problem.grid is not None  # phases have one; for the type checker
     intervals = problem.grid.parts

@@ -1,0 +1,49 @@
+"""Walking of NAO: its cycle and its whole walk; options are in ``gaits.nao``."""
+
+from collections.abc import Sequence
+
+from nlp_gait.errors import InputError
+from nlp_gait.formulation import GaitProblem, maker
+from nlp_gait.gaits.biped.footholds import Foothold
+from nlp_gait.gaits.biped.walking import CycleOptions, WalkOptions, make_cycle_problem, make_walk_problem
+from nlp_gait.gaits.nao.problems import NaoMotorOptions
+
+
+@maker
+def nao_cycle(robot: NaoMotorOptions, options: CycleOptions) -> GaitProblem:
+    """Walking cycle of NAO: one step, whose mirror image is the next one.
+
+    The published phases cannot be chained: single support ends with the hip 0.03 m ahead of the stance foot, double support
+    starts 0.01 m ahead of it, and arms and velocities differ too. Here the states at both switches, the times and the step
+    length are variables, and the cycle repeats after mirroring left to right.
+
+    ``objective="energy-per-metre"`` leaves the speed free; ``"power"``, and ``"torque"`` for the mean of the sum of squared
+    torques, are those at the speed ``speed_m_s``, a parameter: the step length is then speed times the time of the cycle. By
+    ``torso_share="lever"`` the nearer foot carries more, so that the load passes from foot to foot; as printed, the farther one.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walking cycle by this package.
+    """
+    return make_cycle_problem(robot.make_body(), options)
+
+
+@maker
+def nao_walk(robot: NaoMotorOptions, options: WalkOptions) -> GaitProblem:
+    """Whole walk of NAO from standing to standing: weight shift, half step, steps, half step, weight shift.
+
+    All inner steps are one cycle, as in ``nao-cycle``; its speed may have limits, which are parameters. The feet advance by one
+    step length less than there are steps, because the first and the last one are half steps.
+
+    ``steps`` are swings of a foot, both half steps included. On ground that rises forward by ``slope_deg`` all places are in its
+    axes, in which gravity is tilted. ``footholds``, rows ``x,y,z,yaw`` [m, degrees] separated by semicolons, are where the right
+    foot, the left foot and so on land instead; then every step has its own states. All angles are 0: one motor turns both feet.
+
+    Source:
+        Phases of Gupta, Pratihar, Deb (2023), sections 3 and 4; joined to a walk by this package.
+    """
+
+    def check(places: Sequence[Foothold]) -> None:
+        if any(place.yaw for place in places):
+            raise InputError("footholds of NAO all point forward; leave out angles")
+
+    return make_walk_problem(robot.make_body(), options, check)
