@@ -99,23 +99,21 @@ def write_nl(nlp: ca.Function, bounds: Mapping[str, Array], start: Array, title:
 def _write_expressions(tape: list[Instruction], n: int) -> tuple[list[str], dict[int, str]]:
     """Return the definitions of values used more than once, and the expression of each output by its place."""
     twice = (ca.OP_FMIN, ca.OP_FMAX)  # use their arguments twice
-    uses = Counter(
-        place for instruction in tape for place in instruction.arguments * (1 + (instruction.operation in twice))
-    )
+    uses = Counter(place for node in tape for place in node.arguments * (1 + (node.operation in twice)))
     texts: dict[int, str] = {}
     defined, outputs = list[str](), dict[int, str]()
-    for k, instruction in enumerate(tape):
-        arguments = [texts[argument] for argument in instruction.arguments]
-        if instruction.operation == ca.OP_OUTPUT:
-            outputs[instruction.place] = arguments[0]
-        elif instruction.operation == ca.OP_INPUT:
-            texts[k] = f"v{instruction.place}"
-        elif instruction.operation == ca.OP_CONST:
-            texts[k] = f"n{instruction.constant!r}"
-        elif instruction.operation not in OPERATIONS:
-            raise InputError(f"an .nl file cannot express operation {instruction.operation} of CasADi")
+    for k, node in enumerate(tape):
+        arguments = [texts[argument] for argument in node.arguments]
+        if node.operation == ca.OP_OUTPUT:
+            outputs[node.place] = arguments[0]
+        elif node.operation == ca.OP_INPUT:
+            texts[k] = f"v{node.place}"
+        elif node.operation == ca.OP_CONST:
+            texts[k] = f"n{node.constant!r}"
+        elif node.operation not in OPERATIONS:
+            raise InputError(f"an .nl file cannot express operation {node.operation} of CasADi")
         else:
-            texts[k] = OPERATIONS[instruction.operation].format(*arguments)
+            texts[k] = OPERATIONS[node.operation].format(*arguments)
             if uses[k] > 1:
                 defined.append(f"V{n + len(defined)} 0 0\n{texts[k]}")
                 texts[k] = f"v{n + len(defined) - 1}"

@@ -39,14 +39,14 @@ def maker(make: Maker) -> Maker:
     hints: dict[str, Any] = get_type_hints(make)
     groups = {name: hint for name, hint in hints.items() if hasattr(hint, "__dataclass_fields__") and name != "return"}
     listed = [inspect.signature(kind).parameters for kind in groups.values()] or [inspect.signature(make).parameters]
-    known = {name: option for options in listed for name, option in options.items()}
+    parameters = {name: option for options in listed for name, option in options.items()}
 
     @lock_casadi
     @functools.wraps(make)
     def make_problem(**options: Any) -> GaitProblem:
         options = {name: _to_python(value) for name, value in options.items()}
         check_options(make_problem, options)
-        call = {name: option.default for name, option in known.items()} | options
+        call = {name: option.default for name, option in parameters.items()} | options
         given = {name: kind(**{f.name: call[f.name] for f in fields(kind)}) for name, kind in groups.items()}
         problem = make(**(given or call))
         if not isinstance(problem, GaitProblem):
@@ -62,7 +62,7 @@ def maker(make: Maker) -> Maker:
             problem = replace(problem, refine=lambda factor: make_problem(**{**call, refined_by: count * factor}))
         return problem.with_origin(make_problem, call)
 
-    make_problem.__signature__ = inspect.Signature(list(known.values()))  # type: ignore[attr-defined]
+    make_problem.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
     make_problem.__annotations__ = {k: v for kind in groups.values() or [make] for k, v in get_type_hints(kind).items()}
     make_problem.checks_options = True  # type: ignore[attr-defined]
     return make_problem
@@ -218,10 +218,8 @@ def check_mathematics(problem: GaitProblem) -> None:
         raise InputError(f"{owner}: duplicated rows: {', '.join(duplicates[:5])}")
     inputs = [point.x, point.p]
     bounds: dict[str, MX] = {}
-    expressions = {
-        "objective": assembly.objective,
-        **{f"index {name!r}": value for name, value in assembly.indexes.items()},
-    }
+    expressions = {"objective": assembly.objective}
+    expressions |= {f"index {name!r}": value for name, value in assembly.indexes.items()}
     for constraint in assembly.constraints:
         row = f"constraint {constraint.name!r}"
         expressions[row] = constraint.value

@@ -55,9 +55,9 @@ class Evaluations:
     jacobian: int = 0
     hessian: int = 0
 
-    def __add__(self, other: Evaluations) -> Evaluations:
+    def __add__(self, added: Evaluations) -> Evaluations:
         """Sum by kind."""
-        return Evaluations(**{kind: getattr(self, kind) + getattr(other, kind) for kind in asdict(self)})
+        return Evaluations(**{kind: getattr(self, kind) + getattr(added, kind) for kind in asdict(self)})
 
     def by_kind(self) -> dict[str, int]:
         """Return counts by kind; only f for a solver that calls nothing else."""

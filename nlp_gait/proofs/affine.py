@@ -120,24 +120,20 @@ def _encode(function: ca.Function, half_open: Collection[int]) -> tuple[Any, Arr
     """Return the instructions (count, 4), as operation, result and arguments, and the constants (count,)."""
     tape = list(read_tape(function))
     code = np.full((len(tape), 4), -1, dtype=np.int32)
-    inputs_below = {
-        k
-        for k, instruction in enumerate(tape)
-        if instruction.operation == ca.OP_INPUT and instruction.place in half_open
-    }
-    for k, instruction in enumerate(tape):
-        operation, places = instruction.operation, [tape[j].register for j in instruction.arguments]
+    inputs_below = {k for k, node in enumerate(tape) if node.operation == ca.OP_INPUT and node.place in half_open}
+    for k, node in enumerate(tape):
+        operation, places = node.operation, [tape[j].register for j in node.arguments]
         if operation == ca.OP_OUTPUT:
-            code[k, :3] = operation, instruction.place, places[0]
+            code[k, :3] = operation, node.place, places[0]
             continue
         if operation == ca.OP_INPUT:
-            places = [instruction.place]
+            places = [node.place]
         elif operation in BINARY:
-            if operation == ca.OP_LE and instruction.arguments[1] in inputs_below:
+            if operation == ca.OP_LE and node.arguments[1] in inputs_below:
                 operation = HALF_OPEN_LE
-            elif operation == ca.OP_LT and instruction.arguments[0] in inputs_below:
+            elif operation == ca.OP_LT and node.arguments[0] in inputs_below:
                 operation = HALF_OPEN_LT
         elif operation not in (*UNARY, ca.OP_CONST):
             raise InputError(f"function {function.name()!r}: CasADi's operation number {operation} cannot be enclosed")
-        code[k, : 2 + len(places)] = operation, instruction.register, *places
-    return code, np.array([instruction.constant for instruction in tape])
+        code[k, : 2 + len(places)] = operation, node.register, *places
+    return code, np.array([node.constant for node in tape])

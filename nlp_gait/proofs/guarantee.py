@@ -79,9 +79,7 @@ def guarantee(problem: GaitProblem, x: Array) -> Guarantee:
         for name, (low, high) in phase_means.items():
             before = means.get(name, (0.0, 0.0))
             means[name] = (before[0] + low, before[1] + high)
-    violations = tuple(
-        sorted((v for phase_violations, _, _ in results for v in phase_violations), key=lambda v: v.from_s)
-    )
+    violations = tuple(sorted((v for rows, _, _ in results for v in rows), key=lambda v: v.from_s))
     proven = any(v.least > FEASIBILITY_TOLERANCE for v in violations)
     satisfied = False if proven else None if violations else True
     sampled = tuple(dict.fromkeys(name for phase in phases for name in phase.sampled))

@@ -108,18 +108,18 @@ def make_tape(function: ca.Function) -> tuple[Integers, Array]:
     """
     graph, outputs = _Graph(function), dict[int, int]()
     results: list[int | float | _Condition] = []  # of each instruction: number of a quantity, a number, or a condition
-    for instruction in read_tape(function):
-        given = [results[k] for k in instruction.arguments]
-        if instruction.operation == ca.OP_CONST:
-            results.append(instruction.constant)
-        elif instruction.operation == ca.OP_INPUT:
-            results.append(graph.add(INPUT, value=float(instruction.place)))
-        elif instruction.operation == ca.OP_OUTPUT:
+    for node in read_tape(function):
+        given = [results[k] for k in node.arguments]
+        if node.operation == ca.OP_CONST:
+            results.append(node.constant)
+        elif node.operation == ca.OP_INPUT:
+            results.append(graph.add(INPUT, value=float(node.place)))
+        elif node.operation == ca.OP_OUTPUT:
             results += given
             assert not isinstance(given[0], _Condition)  # no problem has such an output; for the type checker
-            outputs[instruction.place] = graph.add(NUMBER, value=given[0]) if isinstance(given[0], float) else given[0]
+            outputs[node.place] = graph.add(NUMBER, value=given[0]) if isinstance(given[0], float) else given[0]
         else:
-            results.append(_add(graph, instruction.operation, given))
+            results.append(_add(graph, node.operation, given))
     return _arrange(graph, [outputs[k] for k in range(len(outputs))])
 
 

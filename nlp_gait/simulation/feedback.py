@@ -131,9 +131,8 @@ class BalanceController:
         place = plan.at("hip", time)[0] - share @ feet
         force = settings.spring_N_per_m * (place - share @ measured.places)
         force += settings.damper_Ns_per_m * (plan.rate("hip", time)[0] - measured.velocity)
-        moment = settings.tilt_spring_Nm_per_rad * (
-            to_rotation_vector(planned @ measured.attitude.T) - measured.tilt_error
-        )
+        tilt = to_rotation_vector(planned @ measured.attitude.T) - measured.tilt_error
+        moment = settings.tilt_spring_Nm_per_rad * tilt
         moment -= settings.tilt_damper_Nms_per_rad * measured.rate
         wrench = np.concatenate([force, moment])
         integral = self._integral + settings.growth_per_s * settings.period_s * wrench

@@ -72,27 +72,27 @@ class Hessian:
                 _add_outer(row, second_row, place, contributions)
 
     def _add_samples(self, samples: StagePlaces, bar: int, contributions: Products) -> None:
-        plan, derivatives, count = self.plan, samples.derivatives, samples.count
+        plan, sample, count = self.plan, samples.derivatives, samples.count
         ma, nv = len(samples.active), len(samples.used)
-        number = plan.add_function(derivatives.second)
+        number = plan.add_function(sample.second)
         weights = PlaceBlock(bar, nv, nv, 1, 0)
         gradient = plan.allocate(count * ma)
         write = PlaceBlock(gradient, ma, ma, 1, 0)
         pattern = np.zeros((ma, ma), bool)
-        pattern[tuple(derivatives.hessian.get_triplet())] = True
-        if derivatives.directional:
+        pattern[tuple(sample.hessian.get_triplet())] = True
+        if sample.directional:
             place = plan.allocate(count * ma * samples.width)
             change = PlaceBlock(place, ma * samples.width, ma, samples.width, 1)
             given = (samples.read, weights, samples.place_directions(plan))
             plan.add_call(SECOND, Call(number, count, samples.count_directions(), given, (write, change)))
         else:
-            upper = ca.triu(derivatives.hessian)
+            upper = ca.triu(sample.hessian)
             place = plan.allocate(count * upper.nnz())
             change = PlaceBlock(place, upper.nnz(), upper.nnz(), 1, 0)
             plan.add_call(SECOND, Call(number, count, None, (samples.read, weights), (write, change)))
-            entry_of = np.full((ma, ma), -1)
+            entry = np.full((ma, ma), -1)
             i, j = upper.get_triplet()
-            entry_of[i, j] = entry_of[j, i] = np.arange(upper.nnz())
+            entry[i, j] = entry[j, i] = np.arange(upper.nnz())
         for e in range(count):
             for a in range(ma):
                 row = samples.rows[e][a]
@@ -103,9 +103,7 @@ class Hessian:
                     _add_outer(row, Row(columns, places), ONE, contributions)
                     continue
                 for b in np.flatnonzero(pattern[a]):
-                    factor = place + (
-                        (e * ma + a) * ma + b if derivatives.directional else e * upper.nnz() + entry_of[a, b]
-                    )
+                    factor = place + ((e * ma + a) * ma + b if sample.directional else e * upper.nnz() + entry[a, b])
                     _add_outer(row, samples.rows[e][b], int(factor), contributions)
         places = np.full(len(samples.glue.entries), -1)
         for a, i in enumerate(samples.active):

@@ -204,26 +204,26 @@ class StagePlaces:
 
     def _add_output_rows(self, assembler: Assembler) -> None:
         """Add the call of the first derivatives, and the derivatives of the outputs with respect to the variables."""
-        plan, derivatives, count = assembler.plan, self.derivatives, self.count
+        plan, sample, count = assembler.plan, self.derivatives, self.count
         ma, nv = len(self.active), len(self.used)
-        number = plan.add_function(derivatives.first)
-        if derivatives.directional:
+        number = plan.add_function(sample.first)
+        if sample.directional:
             place = plan.allocate(count * nv * self.width)
             write = PlaceBlock(place, nv * self.width, nv, self.width, 1)
             inputs = (self.read, self.place_directions(plan))
             plan.add_call(FIRST, Call(number, count, self.count_directions(), inputs, (write,)))
         else:
-            nonzeros = derivatives.jacobian.nnz()
+            nonzeros = sample.jacobian.nnz()
             place = plan.allocate(count * nonzeros)
             write = PlaceBlock(place, nonzeros, nonzeros, 1, 0)
             plan.add_call(FIRST, Call(number, count, None, (self.read,), (write,)))
-        entry_of = np.full((nv, ma), -1)
-        output, source = derivatives.jacobian.get_triplet()
-        entry_of[output, source] = np.arange(len(output))
+        entry = np.full((nv, ma), -1)
+        output, source = sample.jacobian.get_triplet()
+        entry[output, source] = np.arange(len(output))
         mark, begin = len(plan.steps[FIRST]), plan.size
         for e in range(count):
             for o, name in enumerate(self.used):
-                read = np.flatnonzero(entry_of[o] >= 0)
+                read = np.flatnonzero(entry[o] >= 0)
                 rows = [self.rows[e][a] for a in read]
                 columns = unite(row.columns for row in rows)
                 y = self.before + e * self.outputs + name
@@ -231,9 +231,7 @@ class StagePlaces:
                     base = place + (e * nv + o) * self.width
                     assembler.derivatives[y] = Row(columns, base + np.searchsorted(self.columns[e], columns))
                     continue
-                slopes = place + (
-                    (e * nv + o) * ma + read if derivatives.directional else e * nonzeros + entry_of[o, read]
-                )
+                slopes = place + ((e * nv + o) * ma + read if sample.directional else e * nonzeros + entry[o, read])
                 if all(len(row.places) == 1 and row.places[0] == ONE for row in rows) and len(columns) == len(rows):
                     order = np.argsort([row.columns[0] for row in rows])
                     assembler.derivatives[y] = Row(columns, slopes[order])

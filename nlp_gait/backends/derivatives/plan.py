@@ -56,11 +56,9 @@ def write_function(name: str, function: ca.Function) -> str:
     """
     tape = list(read_operations(function))
     free = {
-        k: f"in[{instruction.place}]"
-        if instruction.operation == ca.OP_INPUT
-        else f"v_number({format_number(instruction.constant)})"
-        for k, instruction in enumerate(tape)
-        if instruction.operation in (ca.OP_INPUT, ca.OP_CONST)
+        k: f"in[{node.place}]" if node.operation == ca.OP_INPUT else f"v_number({format_number(node.constant)})"
+        for k, node in enumerate(tape)
+        if node.operation in (ca.OP_INPUT, ca.OP_CONST)
     }
     body = [k for k in range(len(tape)) if k not in free]
     piece = {k: i // PIECE for i, k in enumerate(body)}
@@ -78,17 +76,17 @@ def write_function(name: str, function: ca.Function) -> str:
         )
         declared: set[int] = set()
         for k in body[number * PIECE : (number + 1) * PIECE]:
-            instruction = tape[k]
-            for value in instruction.arguments:
+            node = tape[k]
+            for value in node.arguments:
                 if value not in declared:
                     declared.add(value)
                     lines.append(f"const Vector t{value} = {free.get(value) or f'kept[{kept[value]}]'};")
-            names = [f"t{value}" for value in instruction.arguments]
-            if instruction.operation == ca.OP_OUTPUT:
-                lines.append(f"out[{instruction.place}] = {names[0]};")
+            names = [f"t{value}" for value in node.arguments]
+            if node.operation == ca.OP_OUTPUT:
+                lines.append(f"out[{node.place}] = {names[0]};")
                 continue
             declared.add(k)
-            lines.append(f"const Vector t{k} = {EXPRESSIONS[instruction.operation].format(*names, f='v_')};")
+            lines.append(f"const Vector t{k} = {EXPRESSIONS[node.operation].format(*names, f='v_')};")
             if k in kept:
                 lines.append(f"kept[{kept[k]}] = t{k};")
         lines.append("}")
@@ -197,21 +195,18 @@ class DerivativePlan:
         begin = len(self.tape)
         value_places: list[int] = []
         registers: dict[int, int] = {}
-        for instruction in read_operations(function):
-            arguments = [value_places[k] for k in instruction.arguments]
-            if instruction.operation == ca.OP_INPUT:
-                value_places.append(int(source[instruction.place]))
+        for node in read_operations(function):
+            arguments = [value_places[k] for k in node.arguments]
+            if node.operation == ca.OP_INPUT:
+                value_places.append(int(source[node.place]))
                 continue
-            if instruction.operation == ca.OP_CONST:
-                value_places.append(self.place_constant(instruction.constant))
+            if node.operation == ca.OP_CONST:
+                value_places.append(self.place_constant(node.constant))
                 continue
-            if instruction.operation == ca.OP_OUTPUT:
-                operation, target = CODES[ca.OP_ASSIGN], int(targets[instruction.place])
+            if node.operation == ca.OP_OUTPUT:
+                operation, target = CODES[ca.OP_ASSIGN], int(targets[node.place])
             else:
-                operation, target = (
-                    CODES[instruction.operation],
-                    registers.setdefault(instruction.register, len(registers)),
-                )
+                operation, target = CODES[node.operation], registers.setdefault(node.register, len(registers))
                 target = -1 - target  # replaced below, where the number of registers is known
             value_places.append(target)
             self.tape.append((operation, target, arguments[0], arguments[-1]))
