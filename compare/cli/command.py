@@ -20,7 +20,6 @@ from typing import Annotated, Any
 import typer
 
 from compare.cli.printing import Output, fail, print_output, say_error
-from metaheuristics.errors import SearchError
 from nlp_gait.errors import GaitError
 from nlp_gait.files import protect_inputs
 from nlp_gait.interrupts import raise_interrupts
@@ -44,6 +43,8 @@ NO_SPACE = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 def command(function: Callable[..., Output]) -> Callable[..., None]:
     """Make a function a Typer command: groups become options, and its output is printed; expected errors are one sentence."""
+    from metaheuristics.errors import SearchError  # imports NumPy, which the list of commands does without
+
     parameters = inspect.signature(function, eval_str=True).parameters.values()
     groups: dict[str, Any] = {p.name: p.annotation for p in parameters if is_dataclass(p.annotation)}
 

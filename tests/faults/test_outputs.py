@@ -135,4 +135,4 @@ def test_slsqp_with_every_variable_fixed_ends_at_that_point() -> None:
     problem = load("walk12")
     x = problem.by_name((problem.lower + problem.upper) / 2)
     found = solve(problem, fix=x, solver=make_solver("slsqp"))
-    assert dict(found.x) == pytest.approx(x) and found.iterations == 0
+    assert dict(found.x) == pytest.approx(x) and found.best.iterations == 0
