@@ -3,16 +3,14 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
 import numpy as np
 
 from nlp_gait.formulation.assembly import NumericPoint
 from nlp_gait.formulation.signals import Array, Columns, Signals, make_vector_columns
+from nlp_gait.robots.robot import Robot
 
 LEFT, RIGHT, TRUNK = "left", "right", "trunk"
-# A ``nlp_gait.robots.Robot``. This package only passes it on, so it does not import it.
-RobotModel: TypeAlias = Any
 
 # What the engine needs of a motion in addition to the joints' q, qd and tau. The floor, or its lowest part, is at z = 0.
 SIMULATED = {
@@ -40,7 +38,7 @@ class Tread:
 class SimulationModel:
     """What a physics engine needs of a problem."""
 
-    robot: RobotModel  #: as the engine models it, where links that never move are welded
+    robot: Robot  #: as the engine models it, where links that never move are welded
     gravity: float  #: magnitude [m/s^2]
     slope_rad: float = 0.0  #: by which the floor rises forward; all places are in its axes
     heat_loss: str | None = None  #: parameter with the heat constant K [W/(Nm)^2]; None for motors without known heat
@@ -131,7 +129,7 @@ class Display:
     #: Stick figures from time histories and the parameters by name
     skeleton: Callable[[Signals, Mapping[str, float]], Skeleton] | None = None
     simulation_model: SimulationModel | None = None  #: what a physics engine needs
-    robot: RobotModel | None = None  #: whose joints move, if it is a tree of rigid links
+    robot: Robot | None = None  #: whose joints move, if it is a tree of rigid links
     durations: tuple[str, ...] = ()  #: variables with the duration of each phase, in order
 
 
