@@ -10,7 +10,7 @@ import numpy as np
 from casadi import SX
 
 from nlp_gait.formulation import Array, Result, Signals
-from nlp_gait.gaits.biped.load_sharing import share_torso
+from nlp_gait.gaits.biped.loads import share_torso
 from nlp_gait.gaits.biped.samples import BOTH_FEET
 from nlp_gait.gaits.nao.body import GRAVITY
 from nlp_gait.robots import Robot

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import Self, TypeAlias
+from typing import Literal, Self, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -15,17 +15,19 @@ from casadi import DM, SX
 from nlp_gait.errors import InputError
 from nlp_gait.formulation import Array, InstantPoint, Parameter, Variable
 from nlp_gait.formulation.added_limits import AddedLimits
-from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.curves import HIP_CURVES, Splines, Trajectory
 from nlp_gait.gaits.biped.goals import HEAT_LOSS
 from nlp_gait.gaits.biped.limits import Box, Limit, Margins, compute_margins
 from nlp_gait.gaits.biped.motors import Motors
 from nlp_gait.gaits.biped.samples import BOTH_FEET, LEAST_DURATION, Instant
 from nlp_gait.robots import Robot
-from nlp_gait.robots.tree import make_tree, mirror_sign
-from nlp_gait.symbolic.dynamics import Wrench, newton_euler, tilt_gravity
+from nlp_gait.robots.tree import mirror_sign
+from nlp_gait.symbolic.dynamics import tilt_gravity
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, add_motions, constant_motion, cubic, stack
+
+ZmpGravity = Literal["physical", "printed"]
+ZmpMasses = Literal[25, 23]
 
 
 class Support(StrEnum):
@@ -114,6 +116,8 @@ class Body(ABC):
     added_limits: AddedLimits = AddedLimits()  # of the user, for all gaits of this body
     # Whether the share of the torso that a leg carries in double support includes these arms
     carries_shared_arms: bool = False
+    zmp_gravity: ZmpGravity = "physical"  # sign of g in the ZMP
+    zmp_masses: ZmpMasses = 25  # point masses of a printed ZMP; by 23, neck and head are at the torso's centre of mass
 
     @property
     def robot(self) -> Robot:
@@ -149,45 +153,6 @@ class Body(ABC):
         """Of the whole robot [N]."""
         return self.robot.mass_kg * self.gravity
 
-    def compute_torques(
-        self,
-        fixed_link: str,
-        joints: Sequence[str],
-        motions: Mapping[str, Motion],
-        shares: Mapping[str, SX] | None = None,
-    ) -> tuple[dict[str, SX], Wrench]:
-        """Return the torques of the joints above a fixed link, and the wrench on it; see ``newton_euler``."""
-
-        def solve(
-            link: str, names: Sequence[str], factors: Mapping[str, SX] | None = shares
-        ) -> tuple[dict[str, SX], Wrench]:
-            tree = make_tree(self.robot, link, names)
-            return newton_euler(tree, q, qd, qdd, self.gravity_vector, factors, self.upright)
-
-        q, qd, qdd = ({name: motion[order] for name, motion in motions.items()} for order in range(3))
-        torques, wrench = solve(fixed_link, joints)
-        arms = [name for name in joints if name in self.separate_joints]
-        legs = [name for name in joints if name not in arms]
-        if arms and shares and self.carries_shared_arms:
-            (share,) = shares.values()
-            carried = {self.robot.joint(name).child: share for name in self.separate_joints}
-            torques = solve(fixed_link, (*legs, *self.separate_joints), {**shares, **carried})[0]
-            torques = {name: torques[name] for name in legs} | solve(self.robot.root, arms)[0]
-        elif arms:
-            torques = solve(self.robot.root, arms)[0] | solve(fixed_link, legs)[0]
-        return torques, wrench
-
-    def find_zmp_wrench(
-        self,
-        wrench: Wrench,
-        fixed_link: str,
-        joints: Sequence[str],
-        motions: Mapping[str, Motion],
-        shares: Mapping[str, SX] | None = None,
-    ) -> Wrench:
-        """Return the wrench on a fixed link from which its ZMP follows: by default that of the dynamics."""
-        return wrench
-
     def ankle(self, side: str) -> tuple[float, float]:
         """Return the place of an ankle above its foot ``"L"`` or ``"R"``: across the walking direction, and its height [m]."""
         return self.feet_y["LR".index(side)], self.robot.feet[BOTH_FEET[side]].ankle_height_m
@@ -213,48 +178,12 @@ class Body(ABC):
         """Round a place that follows from the step [m]."""
         return x
 
-    @property
-    def hip_variables(self) -> tuple[Variable, ...]:
-        """Hip height and velocities at both ends of a phase: the first variables of every phase (section 4)."""
-        low, high = self.hip_height_m
-        rows = [("hip_height_m", "m", low, high, f"height of the {self.hip_name} at both ends")]
-        bounds = {"z": (-0.05, 0.05, "vertical"), "x": (0.001, 0.2, "sagittal"), "y": (-0.2, 0.2, "lateral")}
-        for axis, (least, most, word) in bounds.items():
-            for end in ("start", "end"):
-                limits = self.scale_time(min(least, least * self.swing_speed)), self.scale_time(most * self.swing_speed)
-                rows.append((f"hip_v{axis}_{end}_m_s", "m/s", *limits, f"{word} velocity at the {end}"))
-        return make_variables(*rows)
-
-    @property
-    def lift_variable(self) -> Variable:
-        """Height of the swing."""
-        lower, upper = self.scale_length(0.015), self.scale_length(0.03)
-        return Variable(name=LIFT, unit="m", lower=lower, upper=upper, description="highest point of the swing foot")
-
     def make_splines(self, phase: Support, trajectory: Trajectory) -> Splines:
         """Return the splines of a phase; a swing foot stays on its line across the walking direction."""
         units = dict.fromkeys(HIP_CURVES, "m") | dict.fromkeys(self.angle_names(phase), "rad")
         if phase == Support.SINGLE:
             units |= {"foot_x": "m", "foot_z": "m"}
         return Splines(trajectory=trajectory, units=units, length_scale=self.length_scale)
-
-    def make_time_variable(self, phase: Support) -> Variable:
-        """Return the duration of a phase."""
-        least, most = {Support.SINGLE: (0.4, 4.0), Support.DOUBLE: (0.2, 2.0)}[phase]
-        word = {Support.SINGLE: "from lift-off to touch-down", Support.DOUBLE: "from touch-down to the next lift-off"}[
-            phase
-        ]
-        lower, upper = self.scale_time(least / self.swing_speed), self.scale_time(most)
-        return Variable(name=TIMES[phase], unit="s", lower=lower, upper=upper, description=word)
-
-    def narrow(self, variable: Variable) -> Variable:
-        """Return a variable with the bounds in proportion to NAO's, between which gaits start."""
-        if variable.unit == "s":
-            return replace(variable, lower=min(variable.lower * self.swing_speed, variable.upper))
-        if variable.unit not in TIMED_UNITS:
-            return variable
-        lower = max(variable.lower, variable.lower / self.swing_speed)
-        return replace(variable, lower=lower, upper=variable.upper / self.swing_speed)
 
     @property
     def angle_variables(self) -> tuple[Variable, ...]:

@@ -14,6 +14,7 @@ from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Grid, Si
 from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable, make_parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, Support
+from nlp_gait.gaits.biped.bounds import tighten_bounds
 from nlp_gait.gaits.biped.cycle_motion import (
     AFTER,
     LANDING,
@@ -26,11 +27,12 @@ from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.impact import Impact
 from nlp_gait.gaits.biped.limits import BalanceMargins, Box, Limit, compute_margins, make_rows
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits, make_start_within_reach
 from nlp_gait.gaits.biped.samples import Loader, Planner
 from nlp_gait.gaits.biped.sequence import BALANCE, CYCLE, ENERGY_PER_METRE, TORQUE_JUMP, Part, Sequence, Switch
-from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
+from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.symbolic.nonsmooth import Exact, Nonsmooth
 
 SPEED = "speed_m_s"
@@ -183,7 +185,7 @@ def plan_cycle(
     drawn = at_given_speed or landing == "inelastic"
     start = sharing.start(names, partial(draw_start, names) if drawn else None)
     if not body.closed_form:
-        usual = [body.narrow(variable) for variable in cycle.decisions]
+        usual = [tighten_bounds(body, variable) for variable in cycle.decisions]
         start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)
     return make_cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
 

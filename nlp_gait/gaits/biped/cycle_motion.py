@@ -13,6 +13,7 @@ from casadi import DM, SX, fmax, vertcat, vertsplit
 from nlp_gait.formulation import InstantPoint, Variable
 from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.gaits.biped.body import LIFT, Body, Coordinate, Support, read_duration
+from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.limits import REACH_MARGIN
 from nlp_gait.gaits.biped.samples import Instant, Planner
@@ -65,9 +66,9 @@ def make_cycle_variables(body: Body, inelastic: bool = False) -> tuple[Variable,
         states += [*make_landing_rates(body), speed]
     return (
         *states,
-        body.lift_variable,
-        body.make_time_variable(Support.SINGLE),
-        body.make_time_variable(Support.DOUBLE),
+        make_lift_variable(body),
+        make_time_variable(body, Support.SINGLE),
+        make_time_variable(body, Support.DOUBLE),
         step,
     )
 
@@ -79,7 +80,7 @@ def make_landing_rates(body: Body) -> list[Variable]:
 
 def make_state_variables(body: Body, name: str, switch: str) -> list[Variable]:
     """Return the variables of the state at a switch of ``SWITCHES``, whose names contain ``name``."""
-    height, vz, _, vx, _, vy, _ = body.hip_variables
+    height, vz, _, vx, _, vy, _ = make_hip_variables(body)
     at = f"at {name.replace('_', '-')}"
     low, high = (round(share * body.leg_length_m, 3) for share in HIP_X_SHARES[switch])
     table = [

@@ -19,7 +19,7 @@ from nlp_gait.gaits.biped.body import LIFT, RIGHT_YAW, TIMES, TORSO_YAW, Body, S
 from nlp_gait.gaits.biped.cycle_motion import SWITCHES, interpolate_states, make_cycle_variables, read_state
 from nlp_gait.gaits.biped.footholds import Foothold, find_support_sides, list_feet, list_swings
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Margins, RowsAndIndexes
-from nlp_gait.gaits.biped.load_sharing import make_divided_loads
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.samples import Instant, Planner
 from nlp_gait.gaits.biped.sequence import End, Part

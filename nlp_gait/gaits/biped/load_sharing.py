@@ -21,13 +21,13 @@ from nlp_gait.formulation.assembly import make_variables
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.gaits.biped.body import Body
 from nlp_gait.gaits.biped.limits import Limit, RowsAndIndexes, make_rows, make_rows_at_samples
+from nlp_gait.gaits.biped.loads import make_divided_loads
 from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader, Planner, Samples
 from nlp_gait.robots import Foot
 from nlp_gait.robots.tree import make_tree
 from nlp_gait.symbolic import balance
 from nlp_gait.symbolic.dynamics import Wrench, newton_euler
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
-from nlp_gait.symbolic.rotations import UP, axis_rotation
 
 COMPONENTS = {f"{half}_{axis}": unit for half, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"}
 LARGEST_DEGREE = 12
@@ -40,28 +40,8 @@ START_SHARE = 0.02
 CORNERS = ("+x", "-x", "+y", "-y")
 TURNS = tuple(f"{sense}{first}{second}" for sense in "+-" for first in "+-" for second in "+-")
 
-Division = Literal["printed", "lever"]
 TorsoShare = Literal["printed", "lever", "free"]
 LOAD_DEGREE = 4
-
-
-def share_torso(
-    hip_y: SX, rule: Division, feet_y: tuple[float, float] | tuple[SX, SX] = (0.05, -0.05)
-) -> dict[str, SX]:
-    """Compute the share of the torso's mass that each leg carries from the hip's distances to the feet; both add up to 1.
-
-    The hip's place and the feet's, by default NAO's, are across the walking direction [m]. Distances are signed, so that a hip
-    outside the feet gives shares outside 0 and 1 and no kink. By the rule ``"printed"`` a share is proportional to the distance
-    *from* that leg's own foot, as in the equations; by ``"lever"`` to the distance from the other foot, as the text says: the
-    nearer foot carries more.
-
-    Source:
-        Gupta, Pratihar, Deb (2023), eqs. (28), (29).
-    """
-    from_left, from_right = feet_y[0] - hip_y, hip_y - feet_y[1]
-    width = feet_y[0] - feet_y[1]
-    left, right = from_left / width, from_right / width  # (eqs. 28, 29)
-    return {"L": left, "R": right} if rule == "printed" else {"L": right, "R": left}
 
 
 class LoadSharing:
@@ -167,35 +147,6 @@ def make_planned_loads(body: Body) -> Loader:
         both = own + wrench + ca.vertcat(SX(3, 1), ca.cross(arm, wrench[:3]))
         offset = balance.zmp_of_wrench(Wrench(both[:3], both[3:]), 0.0, body.weight)
         return now._replace(torques=torques, zmp=feet["L"] + offset, wrenches={"L": own, "R": wrench})
-
-    return loads
-
-
-def make_divided_loads(body: Body, rule: Division) -> Loader:
-    """Return a function of the torques of each half from its own foot, and the combined ZMP of both feet."""
-    robot, weight = body.robot, body.weight
-
-    def loads(now: Instant) -> Instant:
-        shares = share_torso(now.hip[1], rule, body.feet_y)
-        if now.yaw.shape[0]:  # across the mean of both feet's directions
-            mean = axis_rotation(UP, -now.yaw / 2)
-            hip_y, *feet_y = ((mean @ place)[1] for place in (now.hip, *now.ankles.values()))
-            shares = share_torso(hip_y, rule, (feet_y[0], feet_y[1]))
-        torques: dict[str, SX] = {}
-        zmps, ground_loads, wrenches = [], [], {}
-        for side, name in BOTH_FEET.items():
-            foot = robot.feet[name]
-            half = foot.link, body.leg_joints[side], now.joints, {robot.root: shares[side]}
-            own, wrench = body.compute_torques(*half)
-            acting = body.find_zmp_wrench(wrench, *half)
-            height = foot.ankle_height_m
-            if side == "R" and now.yaw.shape[0]:  # from the axes of its foot
-                wrench, acting = (Wrench(*(axis_rotation(UP, now.yaw) @ part for part in w)) for w in (wrench, acting))
-            wrenches[side] = balance.shift_down(wrench, height)
-            torques |= own
-            zmps.append(now.ankles[side][:2] + balance.zmp_of_wrench(acting, height, weight))
-            ground_loads.append(balance.ground_load(acting, weight))
-        return now._replace(torques=torques, zmp=balance.combine_zmps(zmps, ground_loads), wrenches=wrenches)
 
     return loads
 

@@ -10,16 +10,17 @@ from casadi import SX
 
 from nlp_gait.formulation import Grid, InstantPoint
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support, read_duration
+from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.curves import Trajectory, move_hip
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import REACH_MARGIN, BalanceMargins, Box, Margins, SplineClearance, compute_margins
 from nlp_gait.gaits.biped.load_sharing import LoadSharing
+from nlp_gait.gaits.biped.loads import make_single_support_loads
 from nlp_gait.gaits.biped.phase import Derivatives, Phase
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits
-from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant, Loader
+from nlp_gait.gaits.biped.samples import BOTH_FEET, Instant
 from nlp_gait.robots import Foot, Robot
 from nlp_gait.symbolic import trajectories
-from nlp_gait.symbolic.balance import shift_down, zmp_of_wrench
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion
 
@@ -135,9 +136,9 @@ def make_support_phase(
     balance = limit_to_sole(body, stance.support_xy) if swings else limit_to_box(make_support_box(body.robot, soles))
     clearance = (SplineClearance(sole, step_m, LIFT),) if swings and splines.count else ()
     curve_limits = body.make_curve_limits(name, splines.count)
-    lift = (body.lift_variable,) if swings else ()
-    own = (*lift, body.make_time_variable(name), *splines.variables, *sharing.variables)
-    variables = (*body.hip_variables, *body.angle_variables, *own)
+    lift = (make_lift_variable(body),) if swings else ()
+    own = (*lift, make_time_variable(body, name), *splines.variables, *sharing.variables)
+    variables = (*make_hip_variables(body), *body.angle_variables, *own)
     names = [variable.name for variable in variables]
     return Phase(
         body=body,
@@ -174,17 +175,3 @@ def swing_foot(
     return trajectories.stack(
         forward, trajectories.constant_motion(y), rise._replace(position=rise.position + ankle_height)
     )
-
-
-def make_single_support_loads(body: Body) -> Loader:
-    """Return a function of the torques from the left foot, which supports the robot, and of the ZMP under it."""
-    foot = body.robot.feet["left"]
-
-    def loads(now: Instant) -> Instant:
-        chain = foot.link, tuple(body.robot.joints), now.joints
-        torques, wrench = body.compute_torques(*chain)
-        offset = zmp_of_wrench(body.find_zmp_wrench(wrench, *chain), foot.ankle_height_m, body.weight)
-        wrenches = {"L": shift_down(wrench, foot.ankle_height_m), "R": SX(6, 1)}
-        return now._replace(torques=torques, zmp=now.ankles["L"][:2] + offset, wrenches=wrenches)
-
-    return loads

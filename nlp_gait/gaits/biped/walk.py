@@ -30,17 +30,18 @@ from nlp_gait.formulation import (
 from nlp_gait.formulation.assembly import InstantPoint, NumericPoint, Parameter, make_parameters
 from nlp_gait.formulation.display import Tread
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
+from nlp_gait.gaits.biped.bounds import make_lift_variable
 from nlp_gait.gaits.biped.cycle import make_cycle_margins
 from nlp_gait.gaits.biped.cycle_motion import STEP, PhaseMotion, make_planner, read_state
 from nlp_gait.gaits.biped.flight import Flight
 from nlp_gait.gaits.biped.footholds import Foothold
 from nlp_gait.gaits.biped.limits import RowsAndIndexes
-from nlp_gait.gaits.biped.load_sharing import make_divided_loads
+from nlp_gait.gaits.biped.loads import make_divided_loads, make_single_support_loads
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.phase_problem import add_robot, make_goal, make_phase_limits
 from nlp_gait.gaits.biped.samples import LEAST_DURATION, Loader, Planner
 from nlp_gait.gaits.biped.sequence import CYCLE, ENERGY_PER_METRE, End, Part, Sequence
-from nlp_gait.gaits.biped.support_phases import limit_to_box, make_single_support_loads, make_support_box
+from nlp_gait.gaits.biped.support_phases import limit_to_box, make_support_box
 from nlp_gait.gaits.biped.walk_parts import (
     DURATION,
     GREATEST_SPEED,
@@ -212,7 +213,7 @@ def _raise_lift(variable: Variable, body: Body, flight: Flight) -> Variable:
     if not variable.name.endswith(LIFT):
         return variable
     least = flight.find_least_lift(2 if variable.name == LIFT else 1)
-    return replace(variable, lower=least, upper=round(least + body.lift_variable.upper, 4))
+    return replace(variable, lower=least, upper=round(least + make_lift_variable(body).upper, 4))
 
 
 def plan_whole_walk(body: Body, steps: int, grid: Grid, flight: Flight | None = None) -> GaitProblem:

@@ -12,6 +12,7 @@ import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
+from nlp_gait.gaits.biped.bounds import make_lift_variable, tighten_bounds
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables, make_state_variables
 from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, Part
 
@@ -73,7 +74,7 @@ def make_phase_variables(body: Body) -> tuple[Variable, ...]:
     return (
         *make_state_variables(body, "begin", "lift_off"),
         *make_state_variables(body, "end", "touch_down"),
-        body.lift_variable,
+        make_lift_variable(body),
         replace(single, name=DURATION),
         replace(step, name=RIGHT_FROM),
         step,
@@ -93,8 +94,8 @@ def make_walk_variables(body: Body, steps: int) -> tuple[Variable, ...]:
         kind = Support.SINGLE if part.kind is Support.SINGLE else Support.DOUBLE
         found.append(replace(own[TIMES[kind]], name=part.duration, description=f"duration of the phase {part.name}"))
         if kind is Support.SINGLE:
-            words = f"{body.lift_variable.description}, phase {part.name}"
-            found.append(replace(body.lift_variable, name=part.lift, description=words))
+            words = f"{make_lift_variable(body).description}, phase {part.name}"
+            found.append(replace(make_lift_variable(body), name=part.lift, description=words))
     return tuple(found)
 
 
@@ -156,7 +157,7 @@ def make_walk_start(
         if part.kind is Support.SINGLE:
             alike[part.lift] = LIFT
     return WalkStart(
-        variables=[body.narrow(variable) for variable in variables],
+        variables=[tighten_bounds(body, variable) for variable in variables],
         alike=alike,
         pose=State(STAND, "lift_off").find_alike(body) | {SHIFT: TIMES[Support.DOUBLE]},
         rise=math.tan(body.slope_rad),

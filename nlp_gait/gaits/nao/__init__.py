@@ -11,7 +11,7 @@ Options that the problems share:
     rotational_inertia     false takes every link as a point mass, in torques and ZMP
     step_length_m          from foot to foot; 0 for 0.06 m in proportion
     torso_share            rule that divides the torso's mass between the legs in double support, see
-                           ``load_sharing.share_torso``; free plans the ground's wrench on the second foot instead
+                           ``loads.share_torso``; free plans the ground's wrench on the second foot instead
     load_degree            of that wrench's polynomials over double support
     trajectory             of hip, swing foot and arms, or of every free joint: the paper's cubics, or cubics plus splines
     samples_per_interval   above 1 for a grid that is denser than the intervals; 0 for what suits the trajectory: 1 with

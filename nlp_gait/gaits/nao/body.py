@@ -1,7 +1,7 @@
 """NAO as its gaits take it: its joints, its closed-form legs under an upright torso, the swing of its arms, its motors."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,7 +17,6 @@ from nlp_gait.gaits.biped.samples import Instant, Samples
 from nlp_gait.gaits.nao import joints as nao_joints
 from nlp_gait.robots import Robot, load_robot
 from nlp_gait.robots.tree import find_partner, make_point_masses, weld
-from nlp_gait.symbolic.dynamics import Wrench
 from nlp_gait.symbolic.kinematics import leg_angles
 from nlp_gait.symbolic.nonsmooth import Nonsmooth
 from nlp_gait.symbolic.trajectories import Motion, constant_motion, cubic
@@ -136,43 +135,6 @@ class NaoBody(Body):
     """NAO, or a robot of its build: closed-form legs under an upright torso, arms that swing as in the paper."""
 
     arms: Arms = "carried"  # held: at rest in the middle of their swing
-    zmp_gravity: ZmpGravity = "physical"  # sign of g in the ZMP
-    zmp_masses: ZmpMasses = (
-        25  # point masses of the ZMP as printed; by 23, neck and head are at the torso's centre of mass
-    )
-
-    def find_zmp_wrench(
-        self,
-        wrench: Wrench,
-        fixed_link: str,
-        joints: Sequence[str],
-        motions: Mapping[str, Motion],
-        shares: Mapping[str, SX] | None = None,
-    ) -> Wrench:
-        """Return the wrench of the ZMP: by the printed sign of g, that of point masses whose accelerations are reversed.
-
-        With z'' - g for z'' + g, both sums of (19) and (20) are those of a motion with -x'', -y'', -z'': the wrench at rest
-        minus the inertial part. It has no term I omega.
-
-        Source:
-            Gupta, Pratihar, Deb (2023), eqs. (19), (20), with g = 9.8 m/s^2; the masses of double support, section 3.2.
-        """
-        if self.zmp_gravity == "physical" and self.zmp_masses == 25:
-            return wrench
-        at_rest = {name: Motion(motion.position, SX(0), SX(0)) for name, motion in motions.items()}
-        masses = self.lump_masses()
-        moving, resting = (masses.compute_torques(fixed_link, joints, m, shares)[1] for m in (motions, at_rest))
-        if self.zmp_gravity == "physical":
-            return moving
-        return Wrench(2 * resting.force - moving.force, 2 * resting.moment - moving.moment)
-
-    def lump_masses(self) -> "NaoBody":
-        """Return NAO as the point masses of its ZMP."""
-        robot = make_point_masses(self.robot)
-        if self.zmp_masses == 23:
-            torso = replace(robot.links[robot.root], com_m=self.full.links[robot.root].com_m)
-            robot = replace(robot, links={**robot.links, robot.root: torso})
-        return replace(self, motors=replace(self.motors, robot=robot))
 
     def round_place(self, x: float) -> float:
         """Round to a micrometre, so that the paper's numbers come out exactly."""

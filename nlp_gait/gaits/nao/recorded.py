@@ -15,14 +15,15 @@ from nlp_gait.formulation.assembly import NumericPoint, RowsOverTime, Variable
 from nlp_gait.formulation.blocks import make_labels
 from nlp_gait.formulation.signals import JointAngles
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Support
+from nlp_gait.gaits.biped.bounds import make_hip_variables, make_lift_variable, make_time_variable
 from nlp_gait.gaits.biped.cycle import WalkingCycle, make_cycle_margins, make_cycle_problem
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables
 from nlp_gait.gaits.biped.goals import Goal
 from nlp_gait.gaits.biped.limits import BalanceMargins, Limit, RowsAndIndexes, make_rows
-from nlp_gait.gaits.biped.load_sharing import Division, make_divided_loads
+from nlp_gait.gaits.biped.loads import Division, make_divided_loads, make_single_support_loads
 from nlp_gait.gaits.biped.phase_problem import make_phase_limits, make_phase_problem
 from nlp_gait.gaits.biped.samples import CORNERS, LEAST_DURATION, Samples
-from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_single_support_loads, make_support_box
+from nlp_gait.gaits.biped.support_phases import limit_to_box, limit_to_sole, make_support_box
 from nlp_gait.gaits.nao.body import make_nao
 from nlp_gait.gaits.nao.joint_phase import JointPhase
 from nlp_gait.gaits.nao.recorded_motion import FINE, RecordedMotion, make_places_function, read_motion
@@ -201,17 +202,17 @@ def make_recorded_phase(
 def make_recorded_phase_problem(kind: Support, motion: RecordedMotion, grid: Grid) -> GaitProblem:
     """Return the problem of one recorded phase, whose time is its variable."""
     body = motion.body
-    height, vz0, vz1, vx0, vx1, vy0, vy1 = body.hip_variables
+    height, vz0, vz1, vx0, vx1, vy0, vy1 = make_hip_variables(body)
     ends = ({"z": height, "vx": vx0, "vy": vy0, "vz": vz0}, {"z": height, "vx": vx1, "vy": vy1, "vz": vz1})
     hip, left = HipLimits(ends, ("start", "end")), body.support[:2]
     foot: Limit
     if kind is Support.SINGLE:
-        balance, foot = limit_to_sole(body, left), SwingLimits(motion, body.lift_variable)
+        balance, foot = limit_to_sole(body, left), SwingLimits(motion, make_lift_variable(body))
     else:
         places = motion.right_foot(np.linspace(0.0, motion.duration_s, FINE))
         x, y = (places[:, :2].mean(axis=0) + (0.0, left[1])).tolist()
         balance, foot = limit_to_box(make_support_box(body.robot, {"L": left, "R": (x, y)})), StandingLimits()
-    variables = (body.make_time_variable(kind),)
+    variables = (make_time_variable(body, kind),)
     phase = make_recorded_phase(motion, kind, variables, grid, "printed", (balance, hip, foot))
     title = f"A recorded gait of {body.title}, {'single' if kind is Support.SINGLE else 'double'} support"
     return replace(make_phase_problem(kind, "", phase), name=f"recorded-{kind}", title=title)

@@ -17,7 +17,7 @@ from nlp_gait.formulation.power_form import WIDENING, PowerForm, PowerRows
 from nlp_gait.formulation.solution import FEASIBILITY_TOLERANCE
 from nlp_gait.gaits.biped.body import Support
 from nlp_gait.gaits.biped.limits import SCALES
-from nlp_gait.gaits.biped.load_sharing import Division
+from nlp_gait.gaits.biped.loads import Division
 from nlp_gait.gaits.biped.support_phases import place_hip, place_soles, place_stance
 from nlp_gait.gaits.nao.body import ARM_SWING, NaoBody
 from nlp_gait.gaits.nao.joints import measure_leg

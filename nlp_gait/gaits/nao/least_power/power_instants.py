@@ -11,7 +11,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import DM, SX
 
-from nlp_gait.gaits.biped.load_sharing import Division, share_torso
+from nlp_gait.gaits.biped.loads import Division, share_torso
 from nlp_gait.gaits.biped.support_phases import Point2, Stance, make_support_box, swing_foot
 from nlp_gait.gaits.nao.body import GRAVITY, move_arms
 from nlp_gait.gaits.nao.joints import ARM_JOINTS, LEG_JOINTS, measure_leg
