@@ -3,7 +3,7 @@
 From a robot to the first constraint, in reading order:
 
     Body      the robot: joints, legs, feet, size, motors, and how its joints follow from hip and feet (``body.py``);
-              its torques and its ZMP are functions (``loads.py``), as are its variables (``bounds.py``) and drawing (``skeleton.py``)
+              its torques and ZMP (``loads.py``), variables (``bounds.py``) and drawing (``skeleton.py``) are functions
     Point     values of variables and parameters by name (``nlp_gait.formulation``)
     Instant   motion of the robot at one instant, then its torques, ZMP and ground wrenches (``samples.py``)
     Phase     single or double support: a plan of instants over a Grid, loads, limits and a goal (``phase.py``)

@@ -35,7 +35,7 @@ def make_time_variable(body: Body, phase: Support) -> Variable:
     return Variable(name=TIMES[phase], unit="s", lower=lower, upper=upper, description=word)
 
 
-def tighten_bounds(body: Body, variable: Variable) -> Variable:
+def make_usual_bounds(body: Body, variable: Variable) -> Variable:
     """Return a variable with the bounds in proportion to NAO's, between which gaits start."""
     if variable.unit == "s":
         return replace(variable, lower=min(variable.lower * body.swing_speed, variable.upper))

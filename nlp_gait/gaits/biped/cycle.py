@@ -14,7 +14,7 @@ from nlp_gait.formulation import Array, Assembly, Display, GaitProblem, Grid, Si
 from nlp_gait.formulation.assembly import Objective, Parameter, Point, Variable, make_parameters
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped.body import TIMES, Body, Support
-from nlp_gait.gaits.biped.bounds import tighten_bounds
+from nlp_gait.gaits.biped.bounds import make_usual_bounds
 from nlp_gait.gaits.biped.cycle_motion import (
     AFTER,
     LANDING,
@@ -185,7 +185,7 @@ def plan_cycle(
     drawn = at_given_speed or landing == "inelastic"
     start = sharing.start(names, partial(draw_start, names) if drawn else None)
     if not body.closed_form:
-        usual = [tighten_bounds(body, variable) for variable in cycle.decisions]
+        usual = [make_usual_bounds(body, variable) for variable in cycle.decisions]
         start = make_start_within_reach(usual, (SPEED,) if at_given_speed else (), reach, start)
     return make_cycle_problem(f"{body.family}-cycle", cycle, start, rows_over_time=body.closed_form, repeats=True)
 

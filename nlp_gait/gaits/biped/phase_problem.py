@@ -15,7 +15,7 @@ from nlp_gait.formulation.display import Display, SimulationModel, Skeleton, Tre
 from nlp_gait.formulation.gait_problem import draw_uniform
 from nlp_gait.gaits.biped import limits
 from nlp_gait.gaits.biped.body import Body
-from nlp_gait.gaits.biped.bounds import tighten_bounds
+from nlp_gait.gaits.biped.bounds import make_usual_bounds
 from nlp_gait.gaits.biped.goals import HEAT_LOSS, INSTEAD, Goal
 from nlp_gait.gaits.biped.phase import Phase
 from nlp_gait.gaits.biped.skeleton import draw_robot
@@ -58,7 +58,7 @@ def make_phase_problem(name: str, title: str, phase: Phase, *, searchable: bool 
     """Return the problem of one phase, whose name and title lack the robot's; not ``searchable``, it needs gradients."""
     body, start = phase.body, phase.start
     if not body.closed_form:
-        usual = [tighten_bounds(body, variable) for variable in phase.variables]
+        usual = [make_usual_bounds(body, variable) for variable in phase.variables]
         start = make_start_within_reach(usual, (), lambda at: phase.sample(at, Exact()).reach, start)
     problem = GaitProblem(
         name=f"{body.family}-{name}",

@@ -12,7 +12,7 @@ import numpy as np
 
 from nlp_gait.formulation import Array, GaitProblem, Variable
 from nlp_gait.gaits.biped.body import LIFT, TIMES, Body, Support
-from nlp_gait.gaits.biped.bounds import make_lift_variable, tighten_bounds
+from nlp_gait.gaits.biped.bounds import make_lift_variable, make_usual_bounds
 from nlp_gait.gaits.biped.cycle_motion import STEP, SWITCHES, make_cycle_variables, make_state_variables
 from nlp_gait.gaits.biped.sequence import CYCLE, CYCLE_END, LIFT_OFF, End, Part
 
@@ -157,7 +157,7 @@ def make_walk_start(
         if part.kind is Support.SINGLE:
             alike[part.lift] = LIFT
     return WalkStart(
-        variables=[tighten_bounds(body, variable) for variable in variables],
+        variables=[make_usual_bounds(body, variable) for variable in variables],
         alike=alike,
         pose=State(STAND, "lift_off").find_alike(body) | {SHIFT: TIMES[Support.DOUBLE]},
         rise=math.tan(body.slope_rad),

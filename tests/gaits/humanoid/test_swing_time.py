@@ -10,7 +10,7 @@ import pytest
 from nlp_gait.backends.plan_walk import describe_own_bounds
 from nlp_gait.formulation import load
 from nlp_gait.gaits.biped.body import Support
-from nlp_gait.gaits.biped.bounds import make_hip_variables, make_time_variable, tighten_bounds
+from nlp_gait.gaits.biped.bounds import make_hip_variables, make_time_variable, make_usual_bounds
 from nlp_gait.gaits.humanoid.body import Humanoid, make_humanoid
 from nlp_gait.robots.biped import compare_swing, find_least_swing_time
 from tests.robots.crooked import crooked
@@ -45,15 +45,15 @@ def test_bounds_of_a_robot_of_other_size_are_wider_and_those_of_naos_size_the_pa
     assert time.upper == body.scale_time(4.0)
     assert nao.swing_speed == 1.0 and make_time_variable(nao, Support.SINGLE).lower == pytest.approx(0.4)
     for variable in (*make_hip_variables(body), time):
-        usual = tighten_bounds(body, variable)
+        usual = make_usual_bounds(body, variable)
         assert variable.lower <= usual.lower < usual.upper <= variable.upper
-    assert tighten_bounds(body, time).lower == pytest.approx(body.scale_time(0.4), rel=1e-3)
+    assert make_usual_bounds(body, time).lower == pytest.approx(body.scale_time(0.4), rel=1e-3)
 
 
 def test_random_starts_are_in_proportion_to_naos(tmp_path: Path) -> None:
     problem = load("humanoid-ssp", robot=crooked(tmp_path), intervals=2)
     body = make_humanoid(problem.options["robot"])
-    usual = [tighten_bounds(body, variable) for variable in problem.variables]
+    usual = [make_usual_bounds(body, variable) for variable in problem.variables]
     x = problem.start_point(np.random.default_rng(0))
     assert all(v.lower <= value <= v.upper for v, value in zip(usual, x, strict=True))
     slow = problem.with_values(**{"single_support_time_s.upper": usual[-1].lower / 2})
